@@ -1,0 +1,341 @@
+"""The configuration: one frozen model per section of the TOML file.
+
+`parse` turns TOML text into a `Config` or raises `ConfigError`, whose lines are one sentence per
+fault: the key, the value and what is allowed. A wrong configuration is never repaired in silence.
+Parameters of the paper carry the paper's names and, where it gives one, the paper's value.
+"""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import PurePath
+from typing import Annotated, Any, Literal, Union
+
+import tomli
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from drslamd.conventions import MAX_ROBOT_ID
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Rate = Annotated[float, Field(gt=0, le=50, allow_inf_nan=False)]
+Metres = Annotated[float, Field(allow_inf_nan=False, ge=-5, le=5)]
+RobotId = Annotated[int, Field(ge=0, le=MAX_ROBOT_ID)]
+Baud = Annotated[int, Field(ge=1200, le=4_000_000)]
+
+
+class Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class RobotSection(Section):
+    id: RobotId
+    """Unique in the team; the lowest living id of a group gives the frame of that group."""
+
+
+class TeamSection(Section):
+    key_file: str = ""
+    """File made by `drslamd keygen`, mode 0600, the same on every robot."""
+    insecure: bool = False
+    """True runs without a key: whoever is on the network can then forge messages."""
+
+    @model_validator(mode="after")
+    def _key_or_explicitly_none(self) -> TeamSection:
+        if bool(self.key_file) == self.insecure:
+            raise ValueError(
+                "give either key_file (made by `drslamd keygen`) or insecure = true, not "
+                + ("both" if self.insecure else "neither")
+            )
+        return self
+
+
+class UwbSection(Section):
+    port: str
+    """Serial device of the LinkTrack module; a path below /dev/serial/by-id survives replugging."""
+    baud: Baud = 921_600
+    id: Annotated[int, Field(ge=0, le=0xFFFFFFFF)] | None = None
+    """8-bit id in DR_MODE0, 32-bit id in DR_MODE1; `robot.id` when left out."""
+    max_range_m: Annotated[float, Field(gt=0, le=1000)] = 120.0
+    antenna_x_m: Metres = 0.0
+    antenna_y_m: Metres = 0.0
+    """Position of the antenna in the body frame: x forward, y to the left."""
+
+
+class CanSection(Section):
+    interface: str = "socketcan"
+    """A python-can interface name; `socketcan` on robots."""
+    channel: str = "can0"
+    bitrate: Annotated[int, Field(ge=10_000, le=1_000_000)] | None = None
+    """Only for adapters that python-can sets up itself; SocketCAN links come up configured."""
+
+
+class WheelSection(Section):
+    track_m: Annotated[float, Field(gt=0.01, le=10)]
+    """Distance between the left and the right wheels; for skid steering the effective one."""
+    max_speed_mps: Annotated[float, Field(gt=0, le=50)] = 3.0
+    """Faster is taken for a counter that was reset, not for motion."""
+    reverse_left: bool = False
+    reverse_right: bool = False
+
+
+class SerialWheelSection(WheelSection):
+    port: str
+    baud: Baud = 115_200
+
+
+class KobukiSection(SerialWheelSection):
+    source: Literal["kobuki"]
+    track_m: Annotated[float, Field(gt=0.01, le=10)] = 0.230
+    counts_per_metre: Positive = 11_724.4
+    """2 pi 0.035 m at 2578.33 counts per turn (Kobuki's diff_drive)."""
+
+
+class RoboteqSection(SerialWheelSection):
+    source: Literal["roboteq"]
+    counts_per_metre: Positive
+    poll_hz: Annotated[float, Field(ge=1, le=100)] = 25.0
+    swap_channels: bool = False
+    """True when channel 1 drives the right wheels."""
+
+
+class AsciiSection(SerialWheelSection):
+    source: Literal["ascii"]
+    counts_per_metre: Positive
+
+
+class CanWheelSection(WheelSection):
+    can: CanSection = CanSection()
+
+
+class OdriveSection(CanWheelSection):
+    source: Literal["odrive"]
+    left_axis: Annotated[int, Field(ge=0, le=63)]
+    right_axis: Annotated[int, Field(ge=0, le=63)]
+    wheel_radius_m: Annotated[float, Field(gt=0.005, le=2)]
+    gear: Annotated[float, Field(gt=0, le=1000)] = 1.0
+    """Motor turns per wheel turn."""
+
+
+class AgilexSection(CanWheelSection):
+    source: Literal["agilex"]
+
+
+class DbcSection(CanWheelSection):
+    source: Literal["dbc"]
+    dbc_file: str
+    measures: Literal["counts", "wheel_speeds", "twist"]
+    left: str = ""
+    right: str = ""
+    """`Message.Signal` of each side: counts, or m/s after `unit`."""
+    linear: str = ""
+    angular: str = ""
+    """`Message.Signal` of a twist: m/s and rad/s after `unit`."""
+    counts_per_metre: Positive | None = None
+    counter_bits: Annotated[int, Field(ge=8, le=64)] = 32
+    id_mask: Annotated[int, Field(ge=1, le=0x1FFFFFFF)] = 0x1FFFFFFF
+    """Applied to an id before the look-up, for ids that hold a node number."""
+    left_node: int | None = None
+    right_node: int | None = None
+    """The bits outside `id_mask` that tell the two sides apart."""
+    unit: Positive = 1.0
+    """Factor from the unit of the speed signals to m/s (and rad/s)."""
+
+    @model_validator(mode="after")
+    def _signals_fit_the_measure(self) -> DbcSection:
+        wanted = ("linear", "angular") if self.measures == "twist" else ("left", "right")
+        missing = [name for name in wanted if getattr(self, name).count(".") != 1]
+        if missing:
+            raise ValueError(
+                f'measures = "{self.measures}" needs {" and ".join(missing)} as "Message.Signal"'
+            )
+        if self.measures == "counts" and self.counts_per_metre is None:
+            raise ValueError('measures = "counts" needs counts_per_metre')
+        return self
+
+
+Wheels = Annotated[
+    Union[
+        KobukiSection, RoboteqSection, AsciiSection, OdriveSection, AgilexSection, DbcSection
+    ],
+    Field(discriminator="source"),
+]
+
+
+class OdometrySection(Section):
+    """Noise of dead reckoning per path length (defaults: medians over recorded wheeled robots)."""
+
+    scale_sigma: Annotated[float, Field(gt=0, le=0.5)] = 0.03
+    yaw_sigma_deg_per_m: Annotated[float, Field(gt=0, le=20)] = 0.15
+    random_translation_per_sqrt_m: Annotated[float, Field(gt=0, le=1)] = 0.01
+    random_yaw_deg_per_sqrt_m: Annotated[float, Field(gt=0, le=20)] = 0.5
+
+
+class RelativePoseSection(Section):
+    """Module 1 (paper III-A)."""
+
+    algorithm: Literal["drslamd", "paper"] = "drslamd"
+    rate_hz: Rate = 1.0
+    tau: Annotated[int, Field(ge=3, le=1000)] = 50
+    """Window of `algorithm = "paper"`, in samples at 10 Hz."""
+    delta: Annotated[float, Field(ge=0.01, le=0.8)] = 0.1
+    """Step of the coarse search over phi and theta, radians."""
+    window_max_s: Annotated[float, Field(ge=1, le=120)] = 30.0
+    """Longest window of `algorithm = "drslamd"`."""
+    range_sigma_m: Annotated[float, Field(gt=0, le=5)] = 0.10
+    range_bias_sigma_m: Annotated[float, Field(gt=0, le=5)] = 0.30
+    """How far the constant bias of a pair may be from zero before anything is measured."""
+
+
+class ConsistencySection(Section):
+    """Module 2 (paper III-B)."""
+
+    epsilon: Annotated[float, Field(gt=0, lt=1)] = 0.1
+    """Significance level: the gate is the chi-squared quantile at 1 - epsilon, 3 degrees."""
+    rate_hz: Rate = 1.0
+
+
+class OptimizerSection(Section):
+    """Module 3 (paper III-C)."""
+
+    algorithm: Literal["banded", "rbcd"] = "banded"
+    rate_hz: Rate = 1.0
+    rank: Annotated[int, Field(ge=2, le=20)] = 5
+    """Rank of the relaxation that `algorithm = "rbcd"` optimises."""
+
+
+class GossipSection(Section):
+    provider: Literal["native", "liblcm"] = "native"
+    group: str = "239.255.76.67"
+    port: Annotated[int, Field(ge=1, le=65535)] = 7667
+    interface: str = ""
+    """Name or address of the network interface; empty leaves the choice to the routing table."""
+    ttl: Annotated[int, Field(ge=0, le=32)] = 1
+    """0 keeps everything on this host (tests), 1 on this network."""
+    url: str = ""
+    """For `provider = "liblcm"`: any URL that the lcm package takes; made from the keys above
+    when empty."""
+
+    @model_validator(mode="after")
+    def _group_is_multicast(self) -> GossipSection:
+        parts = self.group.split(".")
+        numbers = [int(p) for p in parts if p.isdigit() and int(p) < 256]
+        if len(parts) != 4 or len(numbers) != 4 or not 224 <= numbers[0] <= 239:
+            raise ValueError(
+                f'group = "{self.group}": must be an IPv4 multicast address, '
+                "224.0.0.0 to 239.255.255.255"
+            )
+        if self.url and self.provider != "liblcm":
+            raise ValueError('url is read only with provider = "liblcm"')
+        return self
+
+
+class DaemonSection(Section):
+    state_dir: str = ""
+    """Default: $STATE_DIRECTORY under systemd, else ~/.local/state/drslamd."""
+    status_socket: str = ""
+    """Default: drslamd-<id>.sock in $RUNTIME_DIRECTORY under systemd, else in the state folder."""
+    log_level: Literal["debug", "info", "warning", "error"] = "info"
+    log_format: Literal["text", "json"] = "text"
+
+
+class Config(Section):
+    robot: RobotSection
+    team: TeamSection
+    uwb: UwbSection
+    wheels: Wheels
+    odometry: OdometrySection = OdometrySection()
+    relative_pose: RelativePoseSection = RelativePoseSection()
+    consistency: ConsistencySection = ConsistencySection()
+    optimizer: OptimizerSection = OptimizerSection()
+    gossip: GossipSection = GossipSection()
+    daemon: DaemonSection = DaemonSection()
+
+    @property
+    def uwb_id(self) -> int:
+        return self.robot.id if self.uwb.id is None else self.uwb.id
+
+
+class ConfigError(Exception):
+    """The file cannot be used; `faults` holds one sentence for each reason."""
+
+    def __init__(self, faults: list[str]) -> None:
+        super().__init__("\n".join(faults))
+        self.faults = faults
+
+
+def parse(text: str, base_dir: str = "") -> Config:
+    """Read TOML text; relative `key_file` and `dbc_file` paths count from `base_dir`.
+
+    Raises:
+        ConfigError: with one sentence per fault.
+    """
+    try:
+        table = tomli.loads(text)
+    except tomli.TOMLDecodeError as error:
+        raise ConfigError([f"not valid TOML: {error}"]) from None
+    for section, key in (("team", "key_file"), ("wheels", "dbc_file")):
+        values = table.get(section)
+        if isinstance(values, dict) and isinstance(values.get(key), str) and values[key]:
+            values[key] = str(PurePath(base_dir) / values[key])
+    try:
+        return Config.model_validate(table)
+    except ValidationError as error:
+        raise ConfigError([_sentence(fault, table) for fault in error.errors()]) from None
+
+
+def _sentence(fault: Any, table: dict[str, Any]) -> str:
+    """One of pydantic's error records as: key = value: what is allowed."""
+    path = [str(part) for part in fault["loc"]]
+    if path and path[0] == "wheels" and len(path) > 1:
+        del path[1]  # the discriminator's value, which is not a key of the file
+    key = ".".join(path)
+    kind, message = fault["type"], fault["msg"].removeprefix("Value error, ")
+    if kind == "extra_forbidden":
+        return f"{key} = {_shown(fault['input'])}: unknown key{_nearest(path, table)}"
+    if kind == "missing":
+        return f"{key}: missing, and it has no default"
+    if kind == "union_tag_not_found":
+        return f"{key}.source: missing; allowed are {_sources()}"
+    if kind == "union_tag_invalid":
+        return f"{key}.source = {_shown(fault['input'].get('source'))}: allowed are {_sources()}"
+    if kind == "value_error":
+        return f"{key}: {message}"
+    return f"{key} = {_shown(fault['input'])}: {message[0].lower()}{message[1:]}"
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _sources() -> str:
+    return ", ".join(f'"{name}"' for name in SOURCES)
+
+
+def _models(path: list[str], table: dict[str, Any]) -> type[BaseModel]:
+    """The model that holds the last key of `path`."""
+    if len(path) == 1:
+        return Config
+    if path[0] == "wheels":
+        wheels = SOURCES[table["wheels"]["source"]]
+        return CanSection if len(path) > 2 else wheels
+    annotation = Config.model_fields[path[0]].annotation
+    assert isinstance(annotation, type) and issubclass(annotation, BaseModel)
+    return annotation
+
+
+def _nearest(path: list[str], table: dict[str, Any]) -> str:
+    allowed = list(_models(path, table).model_fields)
+    close = difflib.get_close_matches(path[-1], allowed, n=1)
+    hint = f"; did you mean {close[0]}?" if close else ""
+    return f"{hint or '; allowed are ' + ', '.join(allowed)}"
+
+
+SOURCES: dict[str, type[WheelSection]] = {
+    "kobuki": KobukiSection,
+    "roboteq": RoboteqSection,
+    "ascii": AsciiSection,
+    "odrive": OdriveSection,
+    "agilex": AgilexSection,
+    "dbc": DbcSection,
+}

@@ -1,0 +1,20 @@
+"""Shared by all tests: where the recordings are, and how the suite polices itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+SHARED = REPOSITORY.parent / "shared"
+"""Recordings and test vectors that are not part of the project; tests that use them skip without."""
+
+
+@pytest.fixture(scope="session")
+def vectors() -> Path:
+    """Folder of the shared wire-format vectors."""
+    folder = SHARED / "reference" / "vectors"
+    if not folder.is_dir():
+        pytest.skip(f"no shared vectors at {folder}")
+    return folder
