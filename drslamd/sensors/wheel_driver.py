@@ -1,0 +1,84 @@
+"""What every source of wheel odometry has in common, whatever the base speaks.
+
+A driver is a state machine without a clock: bytes or CAN frames in, samples out. It decodes a
+message as a whole and checks it before it changes anything. What is wrong with a message is
+counted in `tally`; only a wrong configuration raises, and only when the driver is made.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Protocol, Union, runtime_checkable
+
+from drslamd.events import CanFrame
+from drslamd.sensors.samples import WheelSample
+from drslamd.sensors.tally import Tally
+
+
+class WheelRefusal(Enum):
+    """Why a packet, line or CAN frame that is meant for us is not used."""
+
+    MALFORMED = "not of the form that the protocol gives it"
+    CHECKSUM = "a wrong checksum"
+    OVERLONG = "a line longer than any that is meant for us"
+    SHORT = "fewer bytes than its values take"
+    NOT_FINITE = "a value that is not a finite number"
+    TIME = "a time of the base that does not continue the one before"
+    OLD_PROTOCOL = "a protocol of the base that is not supported"
+
+
+Outcome = Union[list[WheelSample], WheelRefusal, None]
+"""Of one packet, line or CAN frame: accepted with the samples that it completes, refused, or None
+when it is meant for somebody else."""
+
+
+def tallied(tally: Tally[WheelRefusal], outcome: Outcome) -> list[WheelSample]:
+    """The samples of `outcome`, which is counted."""
+    if isinstance(outcome, WheelRefusal):
+        tally.refuse(outcome)
+        return []
+    if outcome is None:
+        tally.ignored += 1
+        return []
+    tally.accepted += 1
+    return outcome
+
+
+class WheelDriver(Protocol):
+    """Common to all drivers.
+
+    Attributes:
+        tally: packets, lines or CAN frames; ignored are those that are meant for somebody else.
+        expects: what the driver looks for, in words for a person.
+    """
+
+    tally: Tally[WheelRefusal]
+    expects: str
+
+    def fault(self) -> str | None:
+        """One sentence about what the base itself reports to be wrong, with a remedy, or None."""
+        return None
+
+
+@runtime_checkable
+class SerialDriver(WheelDriver, Protocol):
+    """A base on a serial port that talks unasked."""
+
+    def feed(self, data: bytes, utime: int) -> list[WheelSample]:
+        """Samples that are complete now that `data` has arrived at `utime` (us)."""
+
+
+@runtime_checkable
+class PolledDriver(SerialDriver, Protocol):
+    """A base on a serial port that has to be asked."""
+
+    def poll(self, utime: int) -> bytes:
+        """What has to be written at `utime` (us); empty when nothing is due."""
+
+
+@runtime_checkable
+class CanDriver(WheelDriver, Protocol):
+    """A base on a CAN bus."""
+
+    def on_frame(self, frame: CanFrame) -> list[WheelSample]:
+        """Samples that `frame` completes."""
