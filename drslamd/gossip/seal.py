@@ -1,0 +1,179 @@
+"""Who made a message, and is it new: version, origin, epoch, counter and tag of every message.
+
+The tag is a keyed BLAKE2b over channel and message with the tag field zero. The key is derived
+from the team key and the origin, so a relay can hand a message on but not change it. A message is
+judged in the order of cost, and nothing is remembered of it before its tag is proven:
+
+    length, type, version, own id, epoch not older than the last one, counter not seen, tag.
+
+Without a team key the tag is made with a key that everybody knows; it then only finds damage.
+"""
+
+from __future__ import annotations
+
+import hmac
+import struct
+from dataclasses import dataclass
+from enum import Enum
+from hashlib import blake2b
+
+from drslamd.conventions import MAX_ROBOT_ID
+from drslamd.gossip.lc02 import MAX_PAYLOAD
+
+VERSION = 1
+KEY_BYTES = 32
+TAG_BYTES = 16
+_HEADER = struct.Struct(">8sbhqqq16s")
+"""LCM's fingerprint, then header_t in LCM's order (big-endian, packed)."""
+_TAG_AT = _HEADER.size - TAG_BYTES
+_PUBLIC_KEY = b"drslamd without a team key      "
+
+WINDOW = 1_024
+"""Counters that a replay window remembers: a minute at 16 messages a second."""
+
+
+class SealFault(Enum):
+    TOO_SHORT = "message too short"
+    TOO_LONG = "message too long"
+    UNKNOWN_TYPE = "unknown message type"
+    WRONG_VERSION = "other version of the messages"
+    BAD_ORIGIN = "origin is no robot id"
+    OWN = "own message"
+    OWN_ID_USED = "another robot uses this id"
+    OLD_EPOCH = "from before a restart of its origin"
+    SEEN = "already seen"
+    WRONG_TAG = "tag does not fit the team key"
+
+
+@dataclass(frozen=True)
+class Header:
+    version: int
+    origin: int
+    epoch: int
+    counter: int
+    utime: int
+
+
+class ReplayWindow:
+    """Which of the last `WINDOW` counters were seen; asking changes nothing."""
+
+    def __init__(self) -> None:
+        self._newest = 0
+        self._seen = 0
+
+    def is_new(self, counter: int) -> bool:
+        if counter > self._newest:
+            return True
+        age = self._newest - counter
+        return age < WINDOW and not self._seen >> age & 1
+
+    def commit(self, counter: int) -> None:
+        if counter > self._newest:
+            shift = min(counter - self._newest, WINDOW)
+            self._seen = (self._seen << shift | 1) & ((1 << WINDOW) - 1)
+            self._newest = counter
+        else:
+            self._seen |= 1 << (self._newest - counter)
+
+
+def team_key(secret: bytes | None) -> bytes:
+    """The key for `Seal`: the secret of the team, or the public one when there is none."""
+    if secret is None:
+        return _PUBLIC_KEY
+    if len(secret) != KEY_BYTES:
+        raise ValueError(f"a team key has {KEY_BYTES} bytes, not {len(secret)}")
+    return secret
+
+
+def _tag(key: bytes, channel: str, message: bytes) -> bytes:
+    digest = blake2b(digest_size=TAG_BYTES, key=key)
+    digest.update(channel.encode("ascii") + b"\0" + message[:_TAG_AT] + bytes(TAG_BYTES))
+    digest.update(message[_HEADER.size :])
+    return digest.digest()
+
+
+def _origin_key(key: bytes, origin: int) -> bytes:
+    return blake2b(struct.pack(">h", origin), key=key, person=b"drslamd origin").digest()
+
+
+class Seal:
+    """Closes our messages and judges those of others."""
+
+    def __init__(self, key: bytes, robot: int, epoch: int, epochs: dict[int, int]) -> None:
+        """
+        Args:
+            key: of `team_key`.
+            robot, epoch: our own.
+            epochs: last known epoch of each peer, as it was kept over our restart.
+        """
+        self._key = key
+        self._keys: dict[int, bytes] = {}
+        self.robot = robot
+        self.epoch = epoch
+        self.epochs = dict(epochs)
+        self._windows: dict[int, ReplayWindow] = {}
+        self._counter = 0
+
+    def header(self, utime: int) -> Header:
+        """The header of our next message."""
+        self._counter += 1
+        return Header(VERSION, self.robot, self.epoch, self._counter, utime)
+
+    def close(self, channel: str, message: bytes) -> bytes:
+        """Fill in the tag of an encoded message."""
+        tag = _tag(self._origin_key(self.robot), channel, message)
+        return message[:_TAG_AT] + tag + message[_HEADER.size :]
+
+    def open(
+        self, channel: str, message: bytes, fingerprints: frozenset[bytes], once: bool = True
+    ) -> Header | SealFault:
+        """Judge one message; only an accepted one is remembered.
+
+        Args:
+            fingerprints: of the types that this channel may carry.
+            once: False for messages whose own numbering makes a repetition harmless.
+        """
+        verdict = self._judge(channel, message, fingerprints, once)
+        if isinstance(verdict, SealFault):
+            return verdict
+        if verdict.epoch != self.epochs.get(verdict.origin):
+            self.epochs[verdict.origin] = verdict.epoch
+            self._windows[verdict.origin] = ReplayWindow()
+        if once:
+            self._windows.setdefault(verdict.origin, ReplayWindow()).commit(verdict.counter)
+        return verdict
+
+    def _judge(
+        self, channel: str, message: bytes, fingerprints: frozenset[bytes], once: bool
+    ) -> Header | SealFault:
+        if len(message) < _HEADER.size:
+            return SealFault.TOO_SHORT
+        if len(message) > MAX_PAYLOAD:
+            return SealFault.TOO_LONG
+        fingerprint, *fields, tag = _HEADER.unpack_from(message)
+        header = Header(*fields)
+        if fingerprint not in fingerprints:
+            return SealFault.UNKNOWN_TYPE
+        if header.version != VERSION:
+            return SealFault.WRONG_VERSION
+        if not 0 <= header.origin <= MAX_ROBOT_ID:
+            return SealFault.BAD_ORIGIN
+        if header.origin == self.robot and header.epoch <= self.epoch:
+            return SealFault.OWN
+        known = self.epochs.get(header.origin, -1)
+        if header.epoch < known:
+            return SealFault.OLD_EPOCH
+        window = self._windows.get(header.origin)
+        if once and window and header.epoch == known and not window.is_new(header.counter):
+            return SealFault.SEEN
+        proof = _tag(self._origin_key(header.origin), channel, message)
+        if not hmac.compare_digest(tag, proof):
+            return SealFault.WRONG_TAG
+        if header.origin == self.robot:
+            return SealFault.OWN_ID_USED
+        return header
+
+    def _origin_key(self, origin: int) -> bytes:
+        if origin not in self._keys:
+            self._keys[origin] = _origin_key(self._key, origin)
+        return self._keys[origin]

@@ -1,0 +1,250 @@
+"""Our side of the conversation: what comes in is judged and sorted, what goes out is sealed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from drslamd.conventions import SECOND_US, Chain
+from drslamd.events import ChannelMessage, Datagram, Send
+from drslamd.gossip import lc02, messages
+from drslamd.gossip.log_sync import LogSync
+from drslamd.gossip.messages import (
+    UNKNOWN_CLOCK,
+    ClosureItem,
+    GraphEntry,
+    Heard,
+    Keyframe,
+    Message,
+    OdometryBatch,
+    Pose,
+    PublicPoses,
+    RangeItem,
+    Status,
+)
+from drslamd.gossip.peer import Peer
+from drslamd.gossip.seal import Header, Seal, SealFault
+
+FORGET_US = 600 * SECOND_US
+"""A peer that was silent for ten minutes is no longer listed."""
+TRAITS_EVERY = 64
+"""Log entries between two that say what our sensors are like."""
+ITEMS_PER_ENTRY = 20
+"""Keyframes, ranges and closures in one log entry; 20 closures are 1,020 bytes."""
+UNVERIFIED_US = 10 * SECOND_US
+"""How long after a message that does not fit the team key it is still spoken of."""
+_FINGERPRINTS = {kind: frozenset([value]) for kind, value in messages.FINGERPRINTS.items()}
+
+
+@dataclass(frozen=True)
+class Received:
+    """One accepted message."""
+
+    origin: Chain
+    message: Message
+
+
+class Team:
+    """Peers, their logs, and the seal on everything."""
+
+    def __init__(self, seal: Seal) -> None:
+        self.seal = seal
+        self.own = Chain(seal.robot, seal.epoch)
+        self.logs = LogSync(seal.robot)
+        self.peers: dict[int, Peer] = {}
+        self.refused: Counter[str] = Counter()
+        self.accepted = 0
+        self.repeats_heard = 0
+        self.own_echoes = 0
+        self.last_echo: int | None = None
+        self.bytes_sent = 0
+        self.messages_sent = 0
+        self._next_seq = 0
+        self._last_refused: dict[SealFault, tuple[int, str]] = {}
+
+    # ---- outgoing ----
+
+    def send(self, message: Message, utime: int) -> Send:
+        """Seal a message."""
+        channel = messages.channel(messages.kind_of(message), self.own.robot)
+        payload = messages.encode(self.seal.header(utime), message)
+        return self._out(channel, self.seal.close(channel, payload))
+
+    def _out(self, channel: str, payload: bytes) -> Send:
+        self.messages_sent += 1
+        self.bytes_sent += 8 + len(channel) + 1 + len(payload)
+        return Send(channel, payload)
+
+    def append(self, entry: GraphEntry, utime: int) -> tuple[GraphEntry, bytes]:
+        """Put an entry on our own log; the caller sends it when anybody is there to hear it."""
+        channel = messages.channel("GRAPH", self.own.robot)
+        sealed = self.seal.close(channel, messages.encode(self.seal.header(utime), entry))
+        decoded = messages.decode("GRAPH", sealed)
+        if not isinstance(decoded, GraphEntry):
+            raise AssertionError(f"own graph entry does not decode: {decoded}")
+        self.logs.add(self.own, decoded, sealed, utime)
+        self._next_seq += 1
+        return decoded, sealed
+
+    def entries(
+        self,
+        traits: tuple[float, ...],
+        keyframes: Sequence[Keyframe],
+        ranges: Sequence[RangeItem],
+        closures: Sequence[ClosureItem],
+    ) -> Iterator[GraphEntry]:
+        """The next entries of our log, each small enough for one datagram."""
+        items = [*keyframes, *ranges, *closures]
+        for first in range(0, len(items), ITEMS_PER_ENTRY):
+            part = items[first : first + ITEMS_PER_ENTRY]
+            yield GraphEntry(
+                self._next_seq,
+                traits if self._next_seq % TRAITS_EVERY == 0 else (),
+                tuple(i for i in part if isinstance(i, Keyframe)),
+                tuple(i for i in part if isinstance(i, RangeItem)),
+                tuple(i for i in part if isinstance(i, ClosureItem)),
+            )
+
+    def send_sealed(self, owner: int, sealed: bytes) -> Send:
+        """A log entry as it was sealed, ours or another's."""
+        return self._out(messages.channel("GRAPH", owner), sealed)
+
+    def repeats(self, utime: int) -> list[Send]:
+        return [self.send_sealed(owner, sealed) for owner, sealed in self.logs.due(utime)]
+
+    def heard(self) -> tuple[Heard, ...]:
+        """For our status: whom we hear, the most recent first."""
+        recent = sorted(self.peers.values(), key=lambda p: -p.last_heard)[: messages.MAX_HEARD]
+        return tuple(
+            Heard(*p.chain, p.clock.delay_us) for p in recent if p.clock.delay_us is not None
+        )
+
+    # ---- incoming ----
+
+    def receive(self, event: Datagram | ChannelMessage) -> Received | None:
+        """Judge one datagram; whatever is wrong with it is counted by its reason."""
+        if isinstance(event, Datagram):
+            framed = lc02.decode(event.data)
+            if isinstance(framed, lc02.FramingFault):
+                self.refused[framed.value] += 1
+                return None
+            channel, payload = framed
+        else:
+            channel, payload = event.channel, event.payload
+        kind = messages.kind_of_channel(channel)
+        if kind is None:
+            self.refused["channel of another program"] += 1
+            return None
+        header = self.seal.open(channel, payload, _FINGERPRINTS[kind], once=kind != "GRAPH")
+        if isinstance(header, SealFault):
+            if header is SealFault.OWN:
+                self.own_echoes += 1
+                self.last_echo = event.utime
+            else:
+                self.refused[header.value] += 1
+                self._last_refused[header] = (event.utime, event.sender)
+            return None
+        message = messages.decode(kind, payload)
+        if isinstance(message, str):
+            self.refused["content out of range"] += 1
+            return None
+        if channel != messages.channel(kind, header.origin):
+            self.refused["channel of another robot"] += 1
+            return None
+        return self._sort(header, message, payload, event.utime)
+
+    def _sort(self, header: Header, message: Message, sealed: bytes, utime: int) -> Received | None:
+        origin = Chain(header.origin, header.epoch)
+        if isinstance(message, GraphEntry):
+            # may come from a relay and long after it was made: says nothing about its origin's
+            # clock or whether it lives
+            if not self.logs.add(origin, message, sealed, utime):
+                self.repeats_heard += 1
+                return None
+            self.accepted += 1
+            return Received(origin, message)
+        self.accepted += 1
+        peer = self.peers.get(origin.robot)
+        if peer is None or peer.chain != origin:
+            peer = self.peers[origin.robot] = Peer(origin, utime)
+        peer.heard(header.counter, header.utime, utime)
+        if isinstance(message, Status):
+            self._status(peer, message, utime)
+        elif isinstance(message, OdometryBatch):
+            peer.extend_track(message)
+        elif isinstance(message, Pose):
+            peer.pose = message
+        elif isinstance(message, PublicPoses):
+            peer.public = message
+        return Received(origin, message)
+
+    def _status(self, peer: Peer, status: Status, utime: int) -> None:
+        peer.status = status
+        for heard in status.heard:
+            if (heard.id, heard.epoch) == self.own:
+                peer.clock.echoed(heard.delay_us)
+        self.logs.peer_holds(status.logs, peer.chain.robot, utime)
+
+    # ---- who is there ----
+
+    def living(self, utime: int) -> dict[int, Peer]:
+        """Peers that are alive and hear us."""
+        return {
+            robot: peer
+            for robot, peer in self.peers.items()
+            if peer.is_alive(utime) and peer.hears(self.own)
+        }
+
+    def present(self, utime: int) -> set[int]:
+        """Robots that live: those we talk to, and those that they vouch for."""
+        direct = self.living(utime)
+        vouched = {
+            heard.id
+            for peer in direct.values()
+            if peer.status
+            for heard in peer.status.heard
+            if heard.epoch == self.logs.epoch(heard.id)
+        }
+        return set(direct) | vouched | {self.own.robot}
+
+    def shifts(self, utime: int) -> dict[int, int]:
+        """Clock of each peer minus ours, us, as well as it is known."""
+        offsets = {robot: peer.clock.offset(utime) for robot, peer in self.peers.items()}
+        return {robot: offset.us for robot, offset in offsets.items() if offset is not None}
+
+    def compare_radio_clocks(self, own_minus_system: int | None, utime: int) -> None:
+        """Use LinkTrack's system_time, where both sides know their clock against it."""
+        for peer in self.peers.values():
+            theirs = peer.status.uwb_clock_us if peer.status else UNKNOWN_CLOCK
+            if own_minus_system is not None and theirs != UNKNOWN_CLOCK:
+                peer.clock.radio(own_minus_system, theirs, utime)
+
+    def conditions(self, utime: int) -> list[tuple[str, str | None]]:
+        """What is wrong with the conversation, by key, in sentences with a remedy."""
+        sentences = {
+            SealFault.WRONG_TAG: "hears messages that do not fit the team key, from {}; "
+            "give all robots the same team.key_file",
+            SealFault.WRONG_VERSION: "hears messages of another version of drslamd, from {}; "
+            "install the same version on all robots",
+            SealFault.OWN_ID_USED: f"another robot uses id {self.own.robot}, at {{}}; "
+            "give every robot a robot.id of its own",
+        }
+        out: list[tuple[str, str | None]] = []
+        for fault, sentence in sentences.items():
+            when, sender = self._last_refused.get(fault, (-UNVERIFIED_US, ""))
+            lasts = utime - when < UNVERIFIED_US
+            key = f"team.{fault.name.lower()}"
+            out.append((key, sentence.format(sender or "an unknown sender") if lasts else None))
+        return out
+
+    def robot_of_uwb(self, uwb_id: int) -> int | None:
+        """The robot that carries this UWB module, None when it is not (yet) known."""
+        for robot, peer in self.peers.items():
+            if peer.status is not None and peer.status.uwb_id == uwb_id:
+                return robot
+        return None
+
+    def forget_silent(self, utime: int) -> None:
+        for robot in [r for r, p in self.peers.items() if utime - p.last_heard > FORGET_US]:
+            del self.peers[robot]
