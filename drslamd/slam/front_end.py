@@ -1,0 +1,163 @@
+"""Modules 1 and 2 as one robot runs them: keyframes, ranges and closures for the pose graph."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from drslamd.config import Config
+from drslamd.conventions import GRID_US, SECOND_US, Chain
+from drslamd.gossip.messages import ClosureItem, Keyframe, RangeItem
+from drslamd.gossip.peer import Peer
+from drslamd.sensors.samples import Motion, RangeSample
+from drslamd.slam import relative_pose
+from drslamd.slam.odometry import STEPS, DeadReckoning, OdometryNoise
+from drslamd.slam.pair import Checked, Pair
+from drslamd.slam.pair_window import Request, Side, request
+from drslamd.slam.pose_graph import TeamGraph
+from drslamd.slam.range_buffer import RangeBuffer
+from drslamd.slam.relative_pose import Estimate
+from drslamd.slam.window_noise import RangeNoise
+
+KEYFRAME_M, KEYFRAME_RAD = 0.05, 0.05
+"""A robot that moved less than this since its last keyframe makes no new one."""
+MAX_UWB_IDS = 64
+"""Modules whose ranges are remembered, 2 MB; a radio cell holds no more."""
+RANGES_FRESH_US = 3 * SECOND_US
+
+
+class FrontEnd:
+    """What this robot measures, prepared for the graph."""
+
+    def __init__(self, config: Config, own: Chain) -> None:
+        self._config = config
+        self._own = own
+        self.noise = OdometryNoise.from_config(config.odometry)
+        self.reckoning = DeadReckoning()
+        self.ranges: dict[int, RangeBuffer] = {}
+        self.pairs: dict[int, Pair] = {}
+        self._segment = 0
+        self._segment_start: int | None = None
+        self._last: Keyframe | None = None
+
+    def on_motion(self, motion: Motion) -> None:
+        self.reckoning.add(motion)
+
+    def on_range(self, sample: RangeSample) -> None:
+        buffer = self.ranges.get(sample.peer_uwb_id)
+        if buffer is None:
+            if len(self.ranges) >= MAX_UWB_IDS:
+                return
+            buffer = self.ranges[sample.peer_uwb_id] = RangeBuffer()
+        buffer.add(sample.utime, sample.range_m)
+
+    def ranged(self, utime: int) -> list[int]:
+        """UWB ids to which ranges came in of late."""
+        return [u for u, b in self.ranges.items() if b.is_fresh(utime, RANGES_FRESH_US)]
+
+    @property
+    def traits(self) -> tuple[float, ...]:
+        """What the team must know of this robot's sensors (see `GraphEntry`)."""
+        n, uwb = self.noise, self._config.uwb
+        return (n.scale, n.yaw_rad_per_m, n.translation_per_sqrt_m, n.yaw_rad_per_sqrt_m,
+                uwb.antenna_x_m, uwb.antenna_y_m)  # fmt: skip
+
+    def keyframe(self) -> Keyframe | None:
+        """The latest sample of our odometry, if we moved since the last keyframe."""
+        track = self.reckoning.track
+        if not len(track):
+            return None
+        if self._segment_start is not None and track.segment_start > self._segment_start:
+            self._segment += 1
+            self._last = None
+        self._segment_start = track.segment_start
+        n = track.end - 1
+        x, y, theta = (int(v) for v in track.steps(n, 1)[0])
+        if self._last is not None:
+            last = self._last
+            moved = np.array([x - last.x, y - last.y, theta - last.theta]) * STEPS
+            if np.hypot(moved[0], moved[1]) < KEYFRAME_M and abs(moved[2]) < KEYFRAME_RAD:
+                return None
+        self._last = Keyframe(n, self._segment, x, y, theta)
+        return self._last
+
+    # ---- pairs ----
+
+    def _owns(self, robot: int, peer: Peer) -> bool:
+        """Are we the one of the two that makes closures?"""
+        theirs = peer.status is not None and self._own.robot in peer.status.ranged
+        return self._own.robot < robot or not theirs
+
+    def _sides(
+        self, living: dict[int, Peer], graph: TeamGraph, utime: int
+    ) -> list[tuple[int, Pair, Side, Side]]:
+        """Owned pairs for which everything is at hand: ranges, both odometries, one clock."""
+        own = graph.chains.get(self._own.robot)
+        if own is None:
+            return []
+        a = Side(self.reckoning.track, own)
+        out = []
+        for robot, peer in living.items():
+            ranges = self.ranges.get(peer.status.uwb_id) if peer.status else None
+            items, offset = graph.chains.get(robot), peer.clock.offset(utime)
+            if ranges is None or not ranges.is_fresh(utime, RANGES_FRESH_US):
+                continue
+            if not self._owns(robot, peer) or items is None or items.chain != peer.chain:
+                continue
+            pair = self.pairs.get(robot)
+            if pair is None or pair.peer != peer.chain:
+                pair = self.pairs[robot] = Pair(self._config, peer.chain, ranges)
+            if offset is not None and offset.uncertainty_us <= GRID_US:
+                out.append((robot, pair, a, Side(peer.track, items, offset.us)))
+            else:
+                pair.verdicts["clock of the peer not known well enough"] += 1
+        return out
+
+    def module1(
+        self, living: dict[int, Peer], graph: TeamGraph, utime: int
+    ) -> list[tuple[int, Request, Callable[[], Estimate]]]:
+        """The relative poses to be computed now: peer, window, computation."""
+        out = []
+        for robot, pair, a, b in self._sides(living, graph, utime):
+            window = request(pair.ranges, a, b, self._config.relative_pose)
+            if isinstance(window, str):
+                pair.verdicts[window] += 1
+            else:
+                out.append((robot, window, self._computation(window, b.items.noise)))
+        return out
+
+    def _computation(self, what: Request, peer_noise: OdometryNoise) -> Callable[[], Estimate]:
+        section = self._config.relative_pose
+        if section.algorithm == "paper":
+            return partial(
+                relative_pose.solve_paper, what.window, section.range_sigma_m, section.delta
+            )
+        ranges = RangeNoise(section.range_sigma_m, section.range_bias_sigma_m)
+        noise = relative_pose.Noise(ranges, self.noise, peer_noise)
+        return partial(relative_pose.solve, what.window, noise, section.delta)
+
+    def module2(self, graph: TeamGraph) -> list[tuple[int, Callable[[], Checked]]]:
+        """The consistency checks to be computed now: peer, computation."""
+        out = []
+        own = graph.chains.get(self._own.robot)
+        for robot, pair in self.pairs.items():
+            items = graph.chains.get(robot)
+            if own is None or items is None or items.chain != pair.peer:
+                continue
+            job = pair.check(own, items, self.noise)
+            if job is not None:
+                out.append((robot, job))
+        return out
+
+    def range_items(self, living: dict[int, Peer], graph: TeamGraph, utime: int) -> list[RangeItem]:
+        """New distances for the graph."""
+        sides = self._sides(living, graph, utime)
+        items = [pair.range_items.next(pair.ranges, a, b, pair.peer) for _, pair, a, b in sides]
+        return [item for item in items if item is not None]
+
+    def closure_items(self) -> list[ClosureItem]:
+        """Closures to tell the team, and to withdraw."""
+        every = self._config.optimizer.algorithm == "rbcd"
+        return [item for pair in self.pairs.values() for item in pair.news(every)]

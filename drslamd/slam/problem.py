@@ -1,0 +1,148 @@
+"""The team's least-squares problem as plain arrays: what every optimiser of module 3 receives.
+
+Poses ``w_T_k`` are numbered in the order of time over all robots. An edge names its two poses by
+that number. Errors are defined here once, so that every optimiser minimises the same cost:
+
+    odometry   e = [R_i' (p_j - p_i), theta_j - theta_i] - measured, corrected by scale and yaw rate
+    closure    the same, without correction
+    range      e = |p_j + R_j q_j - p_i - R_i q_i| + bias - r
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drslamd.conventions import Key
+from drslamd.slam import se2
+from drslamd.slam.se2 import Array
+
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class PoseEdges:
+    """m relative poses i_T_j with covariances (m, 3, 3) of x, y, theta in frame i."""
+
+    i: Index
+    j: Index
+    measured: Array
+    covariance: Array
+
+    def __len__(self) -> int:
+        return len(self.i)
+
+    @cached_property
+    def information(self) -> Array:
+        """(m, 3, 3) inverse covariances."""
+        return np.linalg.inv(self.covariance)
+
+
+@dataclass(frozen=True)
+class Links(PoseEdges):
+    """Odometry: `robot` (m,) numbers the robot whose calibration applies, `path` (m,) metres."""
+
+    robot: Index
+    path: Array
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """m distances between the points q_i on pose i and q_j on pose j (m, 2), body frames."""
+
+    i: Index
+    j: Index
+    q_i: Array
+    q_j: Array
+    measured: Array
+    sigma: Array
+    pair: Index
+    """(m,) numbers the pair of robots whose bias applies."""
+
+    def __len__(self) -> int:
+        return len(self.i)
+
+
+@dataclass(frozen=True)
+class Priors:
+    """Sigmas of the calibration before anything is measured."""
+
+    bias: Array
+    """(pairs,) metres."""
+    scale: Array
+    """(robots,) fraction."""
+    yaw: Array
+    """(robots,) rad/m."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One connected group of robots.
+
+    Attributes:
+        keys: name of each of the n poses.
+        initial: (n, 3) w_T_k.
+        gauge: the pose that is held where `initial` has it.
+    """
+
+    keys: tuple[Key, ...]
+    initial: Array
+    gauge: int
+    links: Links
+    closures: PoseEdges
+    ranges: Ranges
+    priors: Priors
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What an optimiser learned about the sensors, in the numbering of `Priors`."""
+
+    bias: Array
+    scale: Array
+    yaw: Array
+
+    @staticmethod
+    def zero(priors: Priors) -> Calibration:
+        return Calibration(*(np.zeros(len(p)) for p in (priors.bias, priors.scale, priors.yaw)))
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Poses (n, 3) in the order of `Problem.keys`, and how they were reached."""
+
+    poses: Array
+    calibration: Calibration
+    cost: float
+    iterations: int
+    converged: bool
+    covariances: dict[int, Array] = field(default_factory=dict)
+    """Marginals (3, 3) of x, y, theta in w, for the poses that were asked for."""
+
+
+def pose_errors(poses: Array, edges: PoseEdges, measured: Array) -> Array:
+    """(m, 3) predicted minus measured relative poses, in frame i."""
+    error = se2.between(poses[edges.i], poses[edges.j]) - measured
+    error[:, 2] = se2.wrap(error[:, 2])
+    return error
+
+
+def corrected(links: Links, calibration: Calibration) -> Array:
+    """(m, 3) odometry with scale and yaw rate taken out; the bend acts over half of the link."""
+    x, y, theta = links.measured.T
+    keep = 1 - calibration.scale[links.robot]
+    bend = calibration.yaw[links.robot] * links.path
+    return np.stack([keep * x + bend / 2 * y, keep * y - bend / 2 * x, theta - bend], axis=-1)
+
+
+def range_errors(poses: Array, ranges: Ranges, bias: Array) -> tuple[Array, Array, Array, Array]:
+    """Errors (m,), unit line of sight from i to j in w (m, 2), and both arms in w (m, 2)."""
+    arm_i = se2.rotate(poses[ranges.i, 2], ranges.q_i)
+    arm_j = se2.rotate(poses[ranges.j, 2], ranges.q_j)
+    sight = poses[ranges.j, :2] + arm_j - poses[ranges.i, :2] - arm_i
+    distance = np.maximum(np.hypot(sight[:, 0], sight[:, 1]), 1e-6)
+    error = distance + bias[ranges.pair] - ranges.measured
+    return error, sight / distance[:, None], arm_i, arm_j
