@@ -154,9 +154,7 @@ class DbcSection(CanWheelSection):
 
 
 Wheels = Annotated[
-    Union[
-        KobukiSection, RoboteqSection, AsciiSection, OdriveSection, AgilexSection, DbcSection
-    ],
+    Union[KobukiSection, RoboteqSection, AsciiSection, OdriveSection, AgilexSection, DbcSection],
     Field(discriminator="source"),
 ]
 
@@ -320,7 +318,8 @@ def _models(path: list[str], table: dict[str, Any]) -> type[BaseModel]:
         wheels = SOURCES[table["wheels"]["source"]]
         return CanSection if len(path) > 2 else wheels
     annotation = Config.model_fields[path[0]].annotation
-    assert isinstance(annotation, type) and issubclass(annotation, BaseModel)
+    assert isinstance(annotation, type)
+    assert issubclass(annotation, BaseModel)
     return annotation
 
 

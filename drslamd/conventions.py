@@ -40,6 +40,18 @@ class Chain(NamedTuple):
     epoch: int
 
 
+class Segment(NamedTuple):
+    """A part of a chain without a break in its odometry."""
+
+    robot: int
+    epoch: int
+    segment: int
+
+    @property
+    def chain(self) -> Chain:
+        return Chain(self.robot, self.epoch)
+
+
 class Key(NamedTuple):
     """One pose of a team: sample ``n`` of the 10 Hz grid of one chain."""
 

@@ -1,0 +1,1 @@
+"""The only place with sockets, files, serial lines, buses and clocks."""

@@ -1,0 +1,3 @@
+from drslamd.cli import main
+
+raise SystemExit(main())

@@ -1,0 +1,309 @@
+"""One robot's process: the pure `Robot` between its ports, its network and its clock.
+
+Everything here is wiring. Events come from the ports and go into `Robot.handle`; the effects that
+come back are carried out. Computations run in one worker thread, so that sensors are read on time
+while a solve runs; their results come back as events.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+from collections import defaultdict, deque
+from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import structlog
+
+from drslamd import report
+from drslamd.config import CanWheelSection, Config, DbcSection, SerialWheelSection
+from drslamd.conventions import SECOND_US
+from drslamd.events import Effect, Event, JobDone, Note, Save, Send, Solve, Stop, Tick, Write
+from drslamd.gossip.seal import team_key
+from drslamd.io.can_bus import CanBus, require_python_can
+from drslamd.io.clock import Clock, MonotonicClock, wall_epoch
+from drslamd.io.liblcm import Liblcm, require_lcm
+from drslamd.io.multicast import Multicast
+from drslamd.io.serial_port import SerialPort
+from drslamd.io.state_store import StateStore, next_epoch, read_key
+from drslamd.io.status_socket import StatusSocket
+from drslamd.io.systemd import Notifier
+from drslamd.io.transport import Transport
+from drslamd.robot import Robot
+
+STOP_S = 1.5
+"""Longest wait for computations and goodbyes at the end; systemd is promised two seconds."""
+JOB_STUCK_US = 20 * SECOND_US
+"""A computation that takes longer is no progress, and the watchdog is not fed."""
+TIMINGS = 1_000
+"""Durations that are kept for each module."""
+
+log = structlog.get_logger()
+
+
+class Daemon:
+    """Owns the ports, the sockets, the clock and the one `Robot`."""
+
+    def __init__(self, config: Config, clock: Clock | None = None) -> None:
+        """
+        Raises:
+            ConfigError: the team key, the DBC file or a chosen package cannot be used.
+        """
+        self._config = config
+        self._clock = clock or MonotonicClock()
+        secret = None if config.team.insecure else read_key(config.team.key_file)
+        self._store = StateStore(state_dir(config), config.robot.id)
+        state = self._store.load()
+        epochs = {int(robot): int(epoch) for robot, epoch in state.get("epochs", {}).items()}
+        epoch = next_epoch(state, wall_epoch())
+        self.robot = Robot(config, team_key(secret), epoch, epochs, _dbc_text(config))
+        # the new epoch is on disk before anything is sent under it
+        self._store.save(self.robot.state())
+        self._transport = self._make_transport()
+        self._wheels = self._make_wheels()
+        self._uwb = SerialPort("uwb", config.uwb.port, config.uwb.baud, self._clock, self.handle)
+        self._status = StatusSocket(
+            socket_path(config),
+            {
+                "status": lambda: {**report.status(self.robot, self._clock.now()),
+                                   "ms": self._milliseconds()},
+                "trajectory": lambda: report.trajectories(self.robot),
+                "closures": lambda: report.closures(self.robot),
+            },
+        )  # fmt: skip
+        self._notifier = Notifier()
+        self._worker = ThreadPoolExecutor(1, "solver")
+        self._jobs: dict[int, int] = {}
+        self._timings: dict[str, deque[float]] = defaultdict(lambda: deque(maxlen=TIMINGS))
+        self._timer: asyncio.TimerHandle | None = None
+        self._stop = asyncio.Event()
+        self._failure: BaseException | None = None
+        self._carry_out: dict[type[Any], Callable[[Any], None]] = {
+            Send: lambda e: self._transport.send(e.channel, e.payload),
+            Write: self._write,
+            Solve: self._solve,
+            Save: self._save,
+            Note: _note,
+        }
+
+    async def run(self) -> None:
+        """Until SIGTERM or SIGINT; a fault of ours is raised."""
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.add_signal_handler(number, self._stop.set)
+        log.info("daemon.start", robot=self._config.robot.id, epoch=self.robot.own.epoch)
+        if self._config.team.insecure:
+            log.warning("team.insecure", remedy="make a key with: drslamd keygen")
+        if self._store.fault:
+            log.warning("state.fault", what=self._store.fault)
+        parts = (self._transport.run(), self._uwb.run(), self._wheels.run(), self._feed_watchdog())
+        tasks = [self._start(part) for part in parts]
+        fault = await self._status.open()
+        if fault:
+            log.warning("status.fault", what=fault)
+        self.handle(Tick(self._clock.now()))
+        self._notifier.ready()
+        await self._stop.wait()
+        self._notifier.stopping()
+        await self._end(tasks)
+        if self._failure is not None:
+            raise self._failure
+
+    def handle(self, event: Event) -> None:
+        """One event in, its effects carried out."""
+        if self._failure is not None:
+            return
+        try:
+            effects = self.robot.handle(event)
+        except Exception as error:
+            self._fail(error)
+            return
+        for effect in effects:
+            self._perform(effect)
+        self._wake()
+
+    def _perform(self, effect: Effect) -> None:
+        self._carry_out[type(effect)](effect)
+
+    def _wake(self) -> None:
+        """Tick when the robot wants to be woken."""
+        loop = asyncio.get_running_loop()
+        if self._timer is not None:
+            self._timer.cancel()
+        wait_us = max(0, self.robot.next_tick - self._clock.now())
+        self._timer = loop.call_later(
+            wait_us / SECOND_US, lambda: self.handle(Tick(self._clock.now()))
+        )
+
+    # ---- effects ----
+
+    def _write(self, effect: Write) -> None:
+        if effect.port != "wheels" or not isinstance(self._wheels, SerialPort):
+            raise AssertionError(f"nothing may be written to {effect.port}")
+        self._wheels.write(effect.data)
+
+    def _solve(self, effect: Solve) -> None:
+        began = self._clock.now()
+        self._jobs[effect.job_id] = began
+        future = asyncio.get_running_loop().run_in_executor(self._worker, _timed, effect.run)
+
+        def done(finished: asyncio.Future[tuple[Any, float]]) -> None:
+            self._jobs.pop(effect.job_id)
+            if finished.cancelled():
+                return
+            error = finished.exception()
+            if error is not None:
+                self._fail(error)
+                return
+            result, seconds = finished.result()
+            self._timings[effect.name].append(1e3 * seconds)
+            elapsed = round(seconds * SECOND_US)
+            self.handle(JobDone(self._clock.now(), effect.job_id, result, elapsed))
+
+        future.add_done_callback(done)
+
+    def _save(self, effect: Save) -> None:
+        # a sync can take a tenth of a second on an SD card; the worker has the patience
+        before = self._store.fault
+        future = asyncio.get_running_loop().run_in_executor(
+            self._worker, self._store.save, effect.state
+        )
+        future.add_done_callback(lambda _: self._report_store(before))
+
+    def _report_store(self, before: str) -> None:
+        if self._store.fault and self._store.fault != before:
+            log.warning("state.fault", what=self._store.fault)
+
+    # ---- life ----
+
+    def _start(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        task = asyncio.ensure_future(work)
+        task.add_done_callback(self._ended)
+        return task
+
+    def _ended(self, task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and task.exception() is not None:
+            self._fail(task.exception())
+
+    def _fail(self, error: BaseException | None) -> None:
+        """Our own bug: say so once, and end."""
+        if self._failure is None:
+            self._failure = error
+        self._stop.set()
+
+    async def _feed_watchdog(self) -> None:
+        """A sign of life only when the loop, the robot's timers and the solver all moved."""
+        period = self._notifier.watchdog_s or 10.0
+        while True:
+            await asyncio.sleep(period / 3)
+            now = self._clock.now()
+            ticking = now - self.robot.next_tick < SECOND_US
+            stuck = any(now - began > JOB_STUCK_US for began in self._jobs.values())
+            if ticking and not stuck:
+                self._notifier.alive()
+            self._notifier.status(self._one_line())
+
+    def _one_line(self) -> str:
+        picture = report.status(self.robot, self._clock.now())
+        alive = sum(peer["alive"] for peer in picture["peers"].values())
+        problems = "; ".join(picture["problems"])
+        return f"{picture['pose']['state']}, {alive} peers" + (f"; {problems}" if problems else "")
+
+    async def _end(self, tasks: list[asyncio.Task[None]]) -> None:
+        loop = asyncio.get_running_loop()
+        if self._timer is not None:
+            self._timer.cancel()
+        if self._failure is None:
+            for effect in self.robot.handle(Stop(self._clock.now())):
+                self._perform(effect)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        await self._status.close()
+        idle = loop.run_in_executor(
+            None, partial(self._worker.shutdown, True, cancel_futures=False)
+        )
+        await asyncio.wait([idle], timeout=STOP_S)
+        if self._timer is not None:
+            self._timer.cancel()
+        log.info("daemon.stop", robot=self._config.robot.id)
+
+    # ---- parts ----
+
+    def _make_transport(self) -> Transport:
+        section = self._config.gossip
+        if section.provider == "liblcm":
+            require_lcm()
+            return Liblcm(section, self._clock, self.handle)
+        return Multicast(section, self._clock, self.handle)
+
+    def _make_wheels(self) -> SerialPort | CanBus:
+        section = self._config.wheels
+        if isinstance(section, SerialWheelSection):
+            return SerialPort("wheels", section.port, section.baud, self._clock, self.handle)
+        require_python_can()
+        return CanBus(section.can, self._clock, self.handle)
+
+    def _milliseconds(self) -> dict[str, dict[str, Any]]:
+        return {
+            name: {
+                "median": float(np.median(ms)),
+                "p99": float(np.percentile(ms, 99)),
+                "all": [round(value, 3) for value in ms],
+            }
+            for name, ms in self._timings.items()
+        }
+
+
+def _timed(run: Callable[[], Any]) -> tuple[Any, float]:
+    clock = MonotonicClock()
+    began = clock.now()
+    result = run()
+    return result, (clock.now() - began) / SECOND_US
+
+
+def _note(note: Note) -> None:
+    log.log(_LEVELS[note.level.value], note.event, **note.fields)
+
+
+_LEVELS = {"debug": 10, "info": 20, "warning": 30, "error": 40}
+
+
+def _dbc_text(config: Config) -> str:
+    """
+    Raises:
+        ConfigError: the file cannot be read.
+    """
+    from drslamd.config import ConfigError
+
+    if not isinstance(config.wheels, DbcSection):
+        return ""
+    path = Path(config.wheels.dbc_file)
+    try:
+        return path.read_text()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not a text file"
+        raise ConfigError([f"wheels.dbc_file = {str(path)!r}: {reason}"]) from None
+
+
+def state_dir(config: Config) -> Path:
+    """Where this robot keeps its state: as configured, as systemd says, or in the home."""
+    named = config.daemon.state_dir or os.environ.get("STATE_DIRECTORY", "").split(":")[0]
+    return Path(named) if named else Path.home() / ".local" / "state" / "drslamd"
+
+
+def socket_path(config: Config) -> Path:
+    """Where this robot answers questions."""
+    if config.daemon.status_socket:
+        return Path(config.daemon.status_socket)
+    runtime = os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
+    name = f"drslamd-{config.robot.id}.sock"
+    return Path(runtime) / name if runtime else state_dir(config) / name
+
+
+__all__ = ["CanWheelSection", "Daemon", "socket_path", "state_dir"]

@@ -1,0 +1,62 @@
+"""What is wrong, in sentences, and when to say so: when it begins, and now and then after that.
+
+A condition is a key with a sentence that names the fault and its remedy, or None while all is well.
+The same sentences stand in the log and in `drslamd status`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from drslamd.conventions import SECOND_US
+from drslamd.events import Level, Note
+
+REPEAT_US = 60 * SECOND_US
+MAX_CONDITIONS = 512
+"""Keys name our own ports and stages and the at most 255 ids of a team."""
+
+
+@dataclass
+class _Condition:
+    sentence: str
+    since: int
+    noted: int
+
+
+class Health:
+    """The conditions that hold now."""
+
+    def __init__(self) -> None:
+        self._conditions: dict[str, _Condition] = {}
+
+    def set(self, key: str, sentence: str | None, utime: int) -> list[Note]:
+        """State a condition anew; what should be logged about it."""
+        known = self._conditions.get(key)
+        if sentence is None:
+            if known is None:
+                return []
+            del self._conditions[key]
+            return [
+                Note(Level.INFO, f"{key}.well", {"after_s": (utime - known.since) // SECOND_US})
+            ]
+        if known is None:
+            if len(self._conditions) >= MAX_CONDITIONS:
+                return []
+            self._conditions[key] = _Condition(sentence, utime, utime)
+            return [Note(Level.WARNING, f"{key}.fault", {"what": sentence})]
+        due = utime - known.noted >= REPEAT_US
+        known.sentence = sentence
+        if not due:
+            return []
+        known.noted = utime
+        return [
+            Note(
+                Level.WARNING,
+                f"{key}.fault",
+                {"what": sentence, "for_s": (utime - known.since) // SECOND_US},
+            )
+        ]
+
+    def sentences(self) -> dict[str, str]:
+        """What holds now, by key."""
+        return {key: c.sentence for key, c in sorted(self._conditions.items())}

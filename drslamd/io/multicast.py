@@ -1,0 +1,166 @@
+"""LCM over UDP multicast without liblcm: small messages only, on the interface that is named.
+
+liblcm needs a route to the group (an ad-hoc network has none), never receives again after its
+interface was re-created, and can be killed by one malformed datagram. This transport joins by
+interface, hears its own messages as proof that the group works, and joins again when they stop.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+import itertools
+import socket
+import struct
+from collections import deque
+from collections.abc import Callable
+
+from drslamd.config import GossipSection
+from drslamd.events import Datagram, Event, NetworkState
+from drslamd.gossip import lc02
+from drslamd.io.backoff import Backoff
+from drslamd.io.clock import Clock
+
+IP_MULTICAST_ALL = 49
+"""Linux, <linux/in.h>; the socket module does not name it."""
+RECEIVE_BUFFER = 1 << 20
+"""Bytes asked of the kernel: a second of a team of fifty."""
+ECHO_S = 5.0
+"""Silence of our own messages after which the group is joined anew."""
+DATAGRAMS_AT_ONCE = 64
+"""Read in one go; then other readers have their turn."""
+
+
+class Multicast:
+    """The native transport."""
+
+    def __init__(
+        self, section: GossipSection, clock: Clock, deliver: Callable[[Event], None]
+    ) -> None:
+        self._section = section
+        self._clock = clock
+        self._deliver = deliver
+        self._socket: socket.socket | None = None
+        self._sequence = itertools.count()
+        self._recent: deque[bytes] = deque(maxlen=32)
+        self._unheard_since: float | None = None
+        self._failed = asyncio.Event()
+        self._last_state: tuple[bool, str] | None = None
+
+    async def run(self) -> None:
+        backoff = Backoff()
+        try:
+            while True:
+                if self._open():
+                    backoff.reset()
+                    await self._until_it_fails()
+                    self._close()
+                await backoff.wait()
+        finally:
+            self._close()
+
+    def send(self, channel: str, payload: bytes) -> None:
+        if self._socket is None:
+            return
+        datagram = lc02.encode(next(self._sequence), channel, payload)
+        try:
+            self._socket.sendto(datagram, (self._section.group, self._section.port))
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self._fail(f"cannot send on {self._where}: {error.strerror}")
+            return
+        self._recent.append(datagram)
+        if self._unheard_since is None:
+            self._unheard_since = asyncio.get_running_loop().time()
+
+    @property
+    def _where(self) -> str:
+        return self._section.interface or "the default interface"
+
+    def _open(self) -> bool:
+        try:
+            self._socket = open_group(self._section)
+        except OSError as error:
+            hint = "" if self._section.interface else "; name one as gossip.interface"
+            self._state(
+                False, f"cannot join {self._section.group} on {self._where}: {error.strerror}{hint}"
+            )
+            return False
+        self._failed.clear()
+        self._unheard_since = None
+        asyncio.get_running_loop().add_reader(self._socket.fileno(), self._read)
+        self._state(True, f"{self._section.group}:{self._section.port} on {self._where}")
+        return True
+
+    async def _until_it_fails(self) -> None:
+        """Watch for our own messages, which the kernel hands back as long as the group works."""
+        loop = asyncio.get_running_loop()
+        while not self._failed.is_set():
+            try:
+                await asyncio.wait_for(self._failed.wait(), 1.0)
+            except (asyncio.TimeoutError, TimeoutError):
+                since = self._unheard_since
+                if since is not None and loop.time() - since > ECHO_S:
+                    self._fail(f"own messages no longer come back on {self._where}; joining again")
+
+    def _read(self) -> None:
+        for _ in range(DATAGRAMS_AT_ONCE):
+            if self._socket is None:
+                return
+            try:
+                data, sender = self._socket.recvfrom(65_536)
+            except BlockingIOError:
+                return
+            except OSError as error:
+                self._fail(f"cannot receive on {self._where}: {error.strerror}")
+                return
+            if data in self._recent:
+                self._unheard_since = None
+            self._deliver(Datagram(self._clock.now(), data, sender[0]))
+
+    def _fail(self, why: str) -> None:
+        self._state(False, why)
+        self._failed.set()
+
+    def _close(self) -> None:
+        if self._socket is not None:
+            asyncio.get_running_loop().remove_reader(self._socket.fileno())
+            self._socket.close()
+            self._socket = None
+
+    def _state(self, up: bool, detail: str) -> None:
+        if (up, detail) != self._last_state:
+            self._last_state = (up, detail)
+            self._deliver(NetworkState(self._clock.now(), up, detail))
+
+
+def open_group(section: GossipSection) -> socket.socket:
+    """A non-blocking socket that is in the group, on the interface that is named.
+
+    Raises:
+        OSError: no such interface, no route, port taken.
+    """
+    address, index = "0.0.0.0", 0
+    if section.interface:
+        try:
+            address = str(ipaddress.IPv4Address(section.interface))
+        except ValueError:
+            index = socket.if_nametoindex(section.interface)
+    member = struct.pack("4s4si", *map(socket.inet_aton, (section.group, address)), index)
+    udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
+    try:
+        udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+        udp.setsockopt(socket.IPPROTO_IP, IP_MULTICAST_ALL, 0)
+        udp.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
+        udp.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, section.ttl)
+        if section.interface:
+            udp.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, member)
+        udp.bind((section.group, section.port))
+        udp.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
+    except OSError:
+        udp.close()
+        raise
+    return udp

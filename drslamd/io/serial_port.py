@@ -1,0 +1,116 @@
+"""A serial port that is opened exclusively, read as it speaks, and reopened for ever."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import os
+from collections.abc import Callable
+
+import serial
+
+from drslamd.events import Event, Port, PortCondition, PortState, SerialData
+from drslamd.io.backoff import Backoff
+from drslamd.io.clock import Clock
+
+READ_BYTES = 65_536
+
+_CONDITIONS = {
+    errno.ENOENT: PortCondition.MISSING,
+    errno.ENODEV: PortCondition.MISSING,
+    errno.ENXIO: PortCondition.MISSING,
+    errno.EACCES: PortCondition.DENIED,
+    errno.EPERM: PortCondition.DENIED,
+    errno.EBUSY: PortCondition.BUSY,
+    errno.EAGAIN: PortCondition.BUSY,
+}
+
+
+class SerialPort:
+    """Feeds what it reads, and each change of its state, into `deliver`."""
+
+    def __init__(
+        self, port: Port, path: str, baud: int, clock: Clock, deliver: Callable[[Event], None]
+    ) -> None:
+        self._port = port
+        self._path = path
+        self._baud = baud
+        self._clock = clock
+        self._deliver = deliver
+        self._line: serial.Serial | None = None
+        self._lost = asyncio.Event()
+        self._last_state: tuple[PortCondition, str] | None = None
+
+    async def run(self) -> None:
+        """Open, read until lost, wait, again; ends only by cancellation."""
+        backoff = Backoff()
+        try:
+            while True:
+                if self._open():
+                    backoff.reset()
+                    await self._lost.wait()
+                    self._close()
+                await backoff.wait()
+        finally:
+            self._close()
+
+    def write(self, data: bytes) -> None:
+        """Send without waiting; what a full or dead line does not take is dropped."""
+        if self._line is None:
+            return
+        try:
+            os.write(self._line.fileno(), data)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self._lose(error)
+
+    def _open(self) -> bool:
+        try:
+            self._line = serial.Serial(
+                self._path, self._baud, timeout=0, write_timeout=0, exclusive=True
+            )
+        except (serial.SerialException, OSError) as error:
+            code = error.errno or errno.EIO
+            condition = _CONDITIONS.get(code, PortCondition.LOST)
+            self._state(condition, f"{self._path}: {os.strerror(code)}")
+            return False
+        except ValueError as error:
+            self._state(PortCondition.LOST, f"{self._path}: {error}")
+            return False
+        self._lost.clear()
+        self._state(PortCondition.OPEN, self._path)
+        asyncio.get_running_loop().add_reader(self._line.fileno(), self._read)
+        return True
+
+    def _read(self) -> None:
+        assert self._line is not None
+        try:
+            data = os.read(self._line.fileno(), READ_BYTES)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self._lose(error)
+            return
+        if data:
+            self._deliver(SerialData(self._clock.now(), self._port, data))
+        else:
+            self._lose(OSError(errno.EIO, os.strerror(errno.EIO)))
+
+    def _lose(self, error: OSError) -> None:
+        # the descriptor stays readable after a hang-up; unhook it before anything else
+        if self._line is not None:
+            asyncio.get_running_loop().remove_reader(self._line.fileno())
+        self._state(PortCondition.LOST, f"{self._path}: {error.strerror or error}")
+        self._lost.set()
+
+    def _close(self) -> None:
+        if self._line is not None:
+            asyncio.get_running_loop().remove_reader(self._line.fileno())
+            self._line.close()
+            self._line = None
+
+    def _state(self, condition: PortCondition, detail: str) -> None:
+        if (condition, detail) != self._last_state:
+            self._last_state = (condition, detail)
+            self._deliver(PortState(self._clock.now(), self._port, condition, detail))

@@ -1,0 +1,15 @@
+"""What the daemon wants of a network, whoever provides it."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+
+class Transport(Protocol):
+    """Publishes LCM messages, and delivers those of others as events."""
+
+    async def run(self) -> None:
+        """Join, receive, join again after a fault; ends only by cancellation."""
+
+    def send(self, channel: str, payload: bytes) -> None:
+        """Publish without waiting; what the network does not take is dropped and counted."""

@@ -1,0 +1,189 @@
+"""What a robot says of itself when it is asked: plain dictionaries, ready for JSON.
+
+Every age is in seconds, every silent stage has its reasons counted.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from drslamd.conventions import GRID_US, SECOND_US
+from drslamd.events import PortCondition
+from drslamd.gossip.peer import Peer
+from drslamd.robot import Robot
+from drslamd.slam.pair import Pair
+from drslamd.slam.trajectory import bent
+
+
+def age_s(utime: int, then: int | None) -> float | None:
+    return None if then is None else round((utime - then) / SECOND_US, 3)
+
+
+def status(robot: Robot, utime: int) -> dict[str, Any]:
+    """The whole picture: problems first, then sensors, peers, pairs, graph and pose."""
+    return {
+        "robot": robot.own.robot,
+        "epoch": robot.own.epoch,
+        "insecure": robot.config.team.insecure,
+        "problems": list(robot.health.sentences().values()),
+        "pose": _pose(robot, utime),
+        "uwb": _uwb(robot, utime),
+        "wheels": _wheels(robot, utime),
+        "network": _network(robot, utime),
+        "peers": {str(k): _peer(robot, p, utime) for k, p in sorted(robot.team.peers.items())},
+        "pairs": {str(k): _pair(pair) for k, pair in sorted(robot.front.pairs.items())},
+        "graph": _graph(robot),
+    }
+
+
+def _pose(robot: Robot, utime: int) -> dict[str, Any]:
+    estimate, found = robot.back.estimate, robot.pose()
+    if estimate is None or found is None:
+        return {"state": "not localised"}
+    pose_utime, pose, covariance = found
+    spread = np.linalg.eigvalsh(covariance[:2, :2])[-1]
+    return {
+        "state": "localised",
+        "frame": estimate.frame.robot,
+        "age_s": age_s(utime, pose_utime),
+        "x_m": round(float(pose[0]), 4),
+        "y_m": round(float(pose[1]), 4),
+        "theta_deg": round(math.degrees(float(pose[2])), 3),
+        "sigma_m": round(math.sqrt(float(spread)), 4),
+        "sigma_deg": round(math.degrees(math.sqrt(float(covariance[2, 2]))), 3),
+    }
+
+
+def _port(robot: Robot, name: str) -> dict[str, Any]:
+    state = robot.ports.get(name)
+    if state is None:
+        return {"port": "not tried yet"}
+    detail = "" if state.condition is PortCondition.OPEN else state.detail
+    return {"port": state.condition.value, "detail": detail}
+
+
+def _uwb(robot: Robot, utime: int) -> dict[str, Any]:
+    fresh = {
+        str(uwb_id): {
+            "robot": robot.team.robot_of_uwb(uwb_id),
+            "count": buffer.count,
+            "age_s": age_s(utime, buffer.newest),
+        }
+        for uwb_id, buffer in sorted(robot.front.ranges.items())
+    }
+    return {
+        **_port(robot, "uwb"),
+        "age_s": age_s(utime, robot.uwb.last_good_utime),
+        "voltage_v": robot.uwb.voltage_v,
+        "counters": robot.uwb.counters(),
+        "ranges": fresh,
+    }
+
+
+def _wheels(robot: Robot, utime: int) -> dict[str, Any]:
+    return {
+        **_port(robot, "wheels"),
+        "age_s": age_s(utime, robot.wheels.last_motion_utime),
+        "path_m": round(robot.front.reckoning.path_m, 3),
+        "counters": robot.wheels.counters(),
+    }
+
+
+def _network(robot: Robot, utime: int) -> dict[str, Any]:
+    team, state = robot.team, robot.network
+    return {
+        "up": bool(state and state.up),
+        "detail": state.detail if state else "not tried yet",
+        "messages_sent": team.messages_sent,
+        "bytes_sent": team.bytes_sent,
+        "accepted": team.accepted,
+        "refused": dict(team.refused),
+        "own_echo_age_s": age_s(utime, team.last_echo),
+        "log_entries_repeated": team.logs.repeated,
+    }
+
+
+def _peer(robot: Robot, peer: Peer, utime: int) -> dict[str, Any]:
+    offset = peer.clock.offset(utime)
+    return {
+        "epoch": peer.chain.epoch,
+        "alive": peer.is_alive(utime),
+        "hears_us": peer.hears(robot.own),
+        "age_s": age_s(utime, peer.last_heard),
+        "received": peer.received,
+        "loss": round(peer.loss, 3),
+        "clock_offset_ms": None if offset is None else round(offset.us / 1e3, 3),
+        "clock_uncertainty_ms": None if offset is None else round(offset.uncertainty_us / 1e3, 3),
+        "clock_source": None if offset is None else offset.source,
+        "uwb_id": peer.status.uwb_id if peer.status else None,
+        "localised": bool(peer.status and peer.status.state),
+        "frame": peer.status.frame if peer.status and peer.status.state else None,
+        "same_graph": bool(peer.status and peer.status.graph_hash == robot.back.digest()),
+        "log_entries_lacking": robot.team.logs.lacking(peer.chain.robot),
+    }
+
+
+def _pair(pair: Pair) -> dict[str, Any]:
+    return {
+        "connected": pair.established,
+        "windows": dict(pair.verdicts),
+        "closures_seen": pair.closures_seen,
+        "closures_kept": len(pair.kept()),
+    }
+
+
+def _graph(robot: Robot) -> dict[str, Any]:
+    estimate = robot.back.estimate
+    out: dict[str, Any] = {
+        "group": sorted({segment.robot for segment in robot.back.group}),
+        "keyframes": {str(k): len(c.rows) for k, c in sorted(robot.back.graph.chains.items())},
+    }
+    if estimate is not None:
+        out |= {
+            "frame": estimate.frame.robot,
+            "iterations": estimate.iterations,
+            "converged": estimate.converged,
+            "range_bias_m": {f"{a}-{b}": round(v, 4) for (a, b), v in estimate.bias_m.items()},
+            "wheel_scale": {str(k): round(v, 5) for k, v in estimate.scale.items()},
+        }
+    return out
+
+
+def trajectories(robot: Robot) -> dict[str, Any]:
+    """Everybody's path in the frame of the team: ours at 10 Hz, the others' keyframes.
+
+    Times are microseconds on the clock of the robot that drove the path.
+    """
+    estimate = robot.back.estimate
+    if estimate is None:
+        return {"frame": None, "robots": {}}
+    out = {}
+    for number, solved in sorted(estimate.trajectories.items()):
+        n, poses = solved.n, solved.poses
+        if number == robot.own.robot:
+            n, poses = bent(robot.front.reckoning.track, solved)
+        out[str(number)] = {
+            "epoch": solved.chain.epoch,
+            "utime": (n * GRID_US).astype(int).tolist(),
+            "poses": np.round(poses, 6).tolist(),
+        }
+    return {"frame": estimate.frame.robot, "robots": out}
+
+
+def closures(robot: Robot) -> dict[str, Any]:
+    """What module 1 answered and what module 2 made of it, window by window."""
+    out = []
+    for peer, pair in sorted(robot.front.pairs.items()):
+        kept = {item.number for item in pair.kept()}
+        for answer in pair.history:
+            poses = [h.a_T_b.tolist() for h in answer.estimate.hypotheses]
+            out.append({
+                "a": robot.own.robot, "b": peer, "utime": answer.utime,
+                "verdict": answer.estimate.verdict.value, "poses": poses,
+                "covariances": [h.covariance.tolist() for h in answer.estimate.hypotheses],
+                "kept": bool(poses) and answer.number in kept,
+            })  # fmt: skip
+    return {"closures": out}

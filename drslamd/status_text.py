@@ -1,0 +1,74 @@
+"""The answer to ``status`` for people: what is wrong first, then everything else in a glance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def lines(s: dict[str, Any]) -> list[str]:
+    """Text lines of one status answer."""
+    pose = s["pose"]
+    out = [f"robot {s['robot']}, epoch {s['epoch']}"]
+    if s["insecure"]:
+        out.append("INSECURE: no team key, anybody on the network can forge messages")
+    out += [f"! {sentence}" for sentence in s["problems"]]
+    if pose["state"] == "localised":
+        out.append(
+            f"localised in the frame of robot {pose['frame']}: x {pose['x_m']:.2f} m, "
+            f"y {pose['y_m']:.2f} m, {pose['theta_deg']:.1f} deg "
+            f"(sigma {pose['sigma_m']:.2f} m, {pose['sigma_deg']:.1f} deg)"
+        )
+    else:
+        out.append("not localised: no peer is connected to this robot by consistent closures yet")
+    out += _sensor("uwb", s["uwb"]) + _ranges(s["uwb"]) + _sensor("wheels", s["wheels"])
+    network = s["network"]
+    out.append(
+        f"network {'up' if network['up'] else 'DOWN'} ({network['detail']}), "
+        f"{network['bytes_sent']} bytes sent, {network['accepted']} messages accepted"
+    )
+    out += [f"  refused {count}: {reason}" for reason, count in network["refused"].items()]
+    for robot, peer in s["peers"].items():
+        out.append(_peer(robot, peer))
+    for robot, pair in s["pairs"].items():
+        windows = ", ".join(f"{count} {verdict}" for verdict, count in pair["windows"].items())
+        state = "connected" if pair["connected"] else "not connected yet"
+        out.append(
+            f"pair with {robot}: {state}, closures {pair['closures_kept']} kept "
+            f"of {pair['closures_seen']} ({windows})"
+        )
+    out.append(f"group {s['graph']['group'] or 'none'}")
+    return out
+
+
+def _sensor(name: str, sensor: dict[str, Any]) -> list[str]:
+    age = "never" if sensor["age_s"] is None else f"{sensor['age_s']:.2f} s ago"
+    out = [f"{name} port {sensor['port']} {sensor.get('detail', '')}".rstrip() + f", good {age}"]
+    refused = {k: v for k, v in sensor["counters"].items() if ".refused." in k and v}
+    return out + [f"  {count} {reason}" for reason, count in refused.items()]
+
+
+def _ranges(uwb: dict[str, Any]) -> list[str]:
+    return [
+        f"  ranges to module {uwb_id} "
+        + (f"(robot {r['robot']})" if r["robot"] is not None else "(no robot says it is its)")
+        + f": {r['count']}, {r['age_s']:.2f} s ago"
+        for uwb_id, r in uwb["ranges"].items()
+    ]
+
+
+def _peer(robot: str, peer: dict[str, Any]) -> str:
+    clock = "clock unknown"
+    if peer["clock_offset_ms"] is not None:
+        clock = (
+            f"clock {peer['clock_offset_ms']:+.1f} ms "
+            f"+- {peer['clock_uncertainty_ms']:.1f} ({peer['clock_source']})"
+        )
+    words = [
+        "alive" if peer["alive"] else "SILENT",
+        "" if peer["hears_us"] else "does not hear us",
+        f"heard {peer['age_s']:.1f} s ago",
+        f"loss {100 * peer['loss']:.0f} %",
+        clock,
+        "same graph" if peer["same_graph"] else f"lacking {peer['log_entries_lacking']} entries",
+    ]
+    return f"peer {robot}: " + ", ".join(word for word in words if word)

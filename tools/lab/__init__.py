@@ -1,0 +1,1 @@
+"""The laptop's side of drslamd: recordings, simulated worlds, emulated sensors, scores."""

@@ -1,0 +1,106 @@
+"""A recording played to a team in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from drslamd import report
+from drslamd.gossip import messages
+from lab.outcome import Closure, Outcome, Path
+from lab.playback import Hardware, equip, robot_config
+from lab.recording import Recording
+from lab.simulator import Clock, Member, Network, Simulator
+
+SETTLE_S = 3.0
+"""Time after the last measurement in which the team agrees on the end of its paths."""
+
+
+def skewed_clock(rng: np.random.Generator) -> Clock:
+    """Hours from the others and up to 50 ppm wrong."""
+    return Clock(int(rng.uniform(1, 10) * 3600e6), float(rng.uniform(-50, 50)))
+
+
+def run(
+    recording: Recording,
+    seed: int = 0,
+    network: Network | None = None,
+    extra: str = "",
+    hardware: dict[int, Hardware] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Outcome:
+    """Play the whole recording.
+
+    Args:
+        extra: TOML sections that every robot's configuration gets.
+        progress: told the seconds that have passed.
+    """
+    rng = np.random.default_rng(seed)
+    simulator = Simulator(seed, network)
+    for device in (hardware or equip(recording)).values():
+        member = simulator.add(robot_config(device, extra), skewed_clock(rng), device)
+        simulator.play(member, [(c.t, c.port, c.data) for c in device.chunks()])
+    end = recording.duration + SETTLE_S
+    for second in range(1, int(end) + 1):
+        simulator.run(min(second, end))
+        if progress:
+            progress(second)
+    simulator.run(end)
+    return outcome(simulator)
+
+
+def outcome(simulator: Simulator) -> Outcome:
+    """Ask every robot of a simulation what a daemon would be asked."""
+    out = Outcome()
+    for robot, member in simulator.members.items():
+        add_answers(
+            out,
+            robot,
+            member.clock,
+            report.trajectories(member.robot),
+            report.closures(member.robot),
+            report.status(member.robot, member.clock.local(simulator.now)),
+        )
+        out.live[robot] = _live(member)
+        for name, ms in member.traces.solve_ms.items():
+            out.ms[name] += ms
+    return out
+
+
+def add_answers(
+    out: Outcome, robot: int, clock: Clock, trajectory: Any, closures: Any, status: Any
+) -> None:
+    """Sort one robot's answers into an outcome, its clock taken out."""
+    own = trajectory["robots"].get(str(robot))
+    if own:
+        t = np.array([clock.world(u) / 1e6 for u in own["utime"]])
+        out.final[robot] = Path(t, np.array(own["poses"]))
+    for c in closures["closures"]:
+        out.closures.append(
+            Closure(
+                clock.world(c["utime"]) / 1e6,
+                c["a"],
+                c["b"],
+                c["verdict"],
+                np.array(c["poses"]),
+                np.array(c["covariances"]),
+                c["kept"],
+            )
+        )
+    out.frames[robot] = status["pose"].get("frame")
+    out.groups[robot] = status["graph"]["group"]
+    out.bytes_sent[robot] = status["network"]["bytes_sent"]
+
+
+def _live(member: Member) -> Path:
+    """The poses that a robot published."""
+    rows = []
+    for _, channel, payload in member.traces.sent:
+        if messages.kind_of_channel(channel) == "POSE":
+            message = messages.decode("POSE", payload)
+            if isinstance(message, messages.Pose) and message.state:
+                rows.append([member.clock.world(message.pose_utime) / 1e6, *message.pose])
+    table = np.array(rows).reshape(-1, 4)
+    return Path(table[:, 0], table[:, 1:])
