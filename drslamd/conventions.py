@@ -52,18 +52,6 @@ class Segment(NamedTuple):
         return Chain(self.robot, self.epoch)
 
 
-class Key(NamedTuple):
-    """One pose of a team: sample ``n`` of the 10 Hz grid of one chain."""
-
-    robot: int
-    epoch: int
-    n: int
-
-    @property
-    def chain(self) -> Chain:
-        return Chain(self.robot, self.epoch)
-
-
 def grid_index(utime: int) -> int:
     """Index of the last grid sample at or before `utime`."""
     return utime // GRID_US

@@ -50,7 +50,6 @@ from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.pair_window import Request
-from drslamd.slam.pose_graph import packed
 from drslamd.slam.se2 import Array
 
 POLL_US = 10 * MILLISECOND_US
@@ -253,7 +252,8 @@ class Robot:
     def _module3(self, utime: int) -> list[Effect]:
         if any(job.module == "optimizer" for job in self._jobs.values()):
             return []
-        run = self.back.job(self.team.present(utime), self.team.shifts(utime))
+        public = {k: peer.public for k, peer in self.team.peers.items() if peer.public}
+        run = self.back.job(self.team.present(utime), self.team.shifts(utime), public)
         return [self._solve(_Job("optimizer", self.own.robot), run)] if run else []
 
     def _solve(self, job: _Job, run: Callable[[], object]) -> Solve:
@@ -266,7 +266,8 @@ class Robot:
         pair = self.front.pairs.get(job.peer)
         if job.module == "optimizer":
             self.back.solved(event.result)
-            return self._publish(event.utime)
+            public = [self.team.send(m, event.utime) for m in self.back.public_poses()]
+            return [*self._publish(event.utime), *public]
         if pair is not None and job.module == "relative_pose":
             pair.estimated(cast(Request, job.request), event.result)
         elif pair is not None:
@@ -298,7 +299,9 @@ class Robot:
         pose_utime, pose, covariance = found
         x, y, theta = pose.tolist()
         frame = estimate.frame
-        message = Pose(1, frame.robot, frame.epoch, pose_utime, (x, y, theta), packed(covariance))
+        message = Pose(
+            1, frame.robot, frame.epoch, pose_utime, (x, y, theta), se2.packed(covariance)
+        )
         return [self.team.send(message, utime)]
 
     def _check_health(self, utime: int) -> list[Effect]:

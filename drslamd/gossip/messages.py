@@ -27,6 +27,8 @@ MILLIMETRE = 1e-3
 MAX_HEARD = 32
 """Peers named in one status: with `MAX_LOGS` it still fits one datagram."""
 MAX_LOGS = 32
+MAX_PUBLIC = 4_000
+"""Lifted poses remembered of one peer, 1.3 MB at rank 5; as many as keyframes of a chain."""
 MAX_BATCH = 150
 """Odometry samples in one message: 15 s, 900 bytes."""
 
@@ -133,13 +135,32 @@ class Pose:
 
 @dataclass(frozen=True)
 class PublicPoses:
-    """Lifted poses of `rbcd`: values (n, 2 * rank) complex, rotation then translation."""
+    """Lifted poses of `rbcd`: values (n + 1, 2 * rank) complex, rotation then translation.
+
+    The first row is the pose that anchors the frame; the others belong to the keyframes.
+    """
 
     frame: int
     frame_epoch: int
     rank: int
-    keyframes: tuple[int, ...] = ()
-    values: Any = field(default=None, compare=False)
+    keyframes: tuple[int, ...]
+    values: Array = field(compare=False)
+
+    def table(self) -> dict[int, Array]:
+        """(2 * rank,) lifted pose of each keyframe."""
+        return dict(zip(self.keyframes, self.values[1:], strict=True))
+
+    def after(self, before: PublicPoses | None) -> PublicPoses:
+        """These poses, and those of an earlier message that they do not replace."""
+        same = before is not None and (before.frame, before.frame_epoch, before.rank) == (
+            self.frame, self.frame_epoch, self.rank,
+        )  # fmt: skip
+        if before is None or not same:
+            return self
+        table = {**before.table(), **self.table()}
+        keyframes = tuple(sorted(table)[-MAX_PUBLIC:])
+        values = np.array([self.values[0], *(table[n] for n in keyframes)])
+        return PublicPoses(self.frame, self.frame_epoch, self.rank, keyframes, values)
 
 
 Message = Union[Status, OdometryBatch, GraphEntry, Pose, PublicPoses]
@@ -322,12 +343,12 @@ def _encode_public(out: Any, m: PublicPoses) -> None:
 
 
 def _decode_public(raw: Any) -> PublicPoses:
-    if raw.n < 0 or raw.rank < 1 or raw.n_values != 4 * raw.rank * raw.n:
+    if raw.n < 0 or raw.rank < 1 or raw.n_values != 4 * raw.rank * (raw.n + 1):
         raise ValueError("sizes that do not fit each other")
     values = np.array(raw.values, dtype=float)
     if not np.isfinite(values).all():
         raise ValueError("lifted pose that is not finite")
-    values = values.view(complex).reshape(raw.n, 2 * raw.rank)
+    values = values.view(complex).reshape(raw.n + 1, 2 * raw.rank)
     return PublicPoses(raw.frame, raw.frame_epoch, raw.rank, tuple(raw.keyframes), values)
 
 

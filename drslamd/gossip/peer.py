@@ -43,6 +43,10 @@ class Peer:
         expected = self.newest_counter - self.first_counter + 1
         return max(0.0, 1 - self.received / expected)
 
+    def take_public(self, message: PublicPoses) -> None:
+        """Keep what the peer said last of each of its public poses."""
+        self.public = message.after(self.public)
+
     def is_alive(self, utime: int) -> bool:
         """Heard of late, and not on its way out."""
         leaving = self.status is not None and self.status.leaving
@@ -55,9 +59,6 @@ class Peer:
     def extend_track(self, batch: OdometryBatch) -> None:
         """Append what is new in a batch; batches overlap, so nothing is lost with one."""
         track = self.track
-        if len(track) and batch.segment_start > track.segment_start and batch.n0 >= track.end:
-            # a hole tells the track that a new segment begins
-            pass
         for n, steps in enumerate(batch.steps, start=batch.n0):
             if not len(track) or n >= track.end:
                 track.append(n, steps)

@@ -176,7 +176,7 @@ class Team:
         elif isinstance(message, Pose):
             peer.pose = message
         elif isinstance(message, PublicPoses):
-            peer.public = message
+            peer.take_public(message)
         return Received(origin, message)
 
     def _status(self, peer: Peer, status: Status, utime: int) -> None:

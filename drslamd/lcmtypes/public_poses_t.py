@@ -11,8 +11,9 @@ import drslamd.lcmtypes
 
 class public_poses_t(object):
     """
-    Lifted public poses for optimizer = "rbcd": pose k is row k of a complex n x (rank + rank)
-    array, rotation first, real and imaginary parts alternating.
+    Lifted public poses for optimizer = "rbcd": values are the rows of a complex (n + 1) x (2 rank)
+    array, real and imaginary parts alternating, rotation before translation. The first row is the
+    pose that anchors the frame, row k + 1 belongs to keyframe k.
     """
 
     __slots__ = ["header", "frame", "frame_epoch", "rank", "n", "keyframes", "n_values", "values"]

@@ -2,34 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Mapping
+
+import numpy as np
 
 from drslamd.config import Config
 from drslamd.conventions import Chain, Segment
-from drslamd.gossip.messages import GraphEntry
-from drslamd.slam import banded, team_frame
+from drslamd.gossip.lc02 import MAX_PAYLOAD
+from drslamd.gossip.messages import GraphEntry, PublicPoses
+from drslamd.slam import team_frame
+from drslamd.slam.banded_optimizer import Banded
+from drslamd.slam.estimate import TeamEstimate, Trajectory
+from drslamd.slam.optimizer import Job, Optimizer
 from drslamd.slam.pose_graph import TeamGraph
-from drslamd.slam.problem import Calibration, Problem
-from drslamd.slam.team_frame import TeamEstimate, Trajectory
+from drslamd.slam.rbcd_optimizer import Rbcd
+from drslamd.slam.team_frame import Group
+
+OPTIMIZERS: dict[str, Callable[[Config, Chain], Optimizer]] = {"banded": Banded, "rbcd": Rbcd}
+"""By `optimizer.algorithm`."""
+ENVELOPE_BYTES = 120
+"""What a public_poses_t needs besides its poses, with some air."""
 
 
 class BackEnd:
     """Graph and estimate."""
 
     def __init__(self, config: Config, own: Chain) -> None:
-        self._config = config
         self._own = own
+        self._optimizer = OPTIMIZERS[config.optimizer.algorithm](config, own)
         self.graph = TeamGraph()
         self.group: set[Segment] = set()
         self.estimate: TeamEstimate | None = None
         """Of the group that our current segment is in; None while it is in none."""
-        self._changed = True
-        self._present: set[int] = set()
+        self._news: object = None
+        self._inserted = 0
 
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
         self.graph.insert(origin, entry)
-        self._changed = True
+        self._inserted += 1
 
     def digest(self) -> int:
         """Equal on two robots of a group when both hold the same graph of it."""
@@ -39,16 +49,20 @@ class BackEnd:
         """The solved keyframes of a robot, in the frame of the team."""
         return self.estimate.trajectories.get(robot) if self.estimate else None
 
-    def job(self, present: set[int], shift_us: dict[int, int]) -> Callable[[], TeamEstimate] | None:
+    def job(
+        self, present: set[int], shift_us: dict[int, int], public: Mapping[int, PublicPoses]
+    ) -> Job | None:
         """The computation that renews the estimate; None when nothing is new or connected.
 
         Args:
             present: robots that live.
             shift_us: clock of each robot minus ours, us.
+            public: lifted public poses of the peers.
         """
-        if not self._changed and present == self._present:
+        news = (self._inserted, present, dict(public))
+        if news == self._news:
             return None
-        self._changed, self._present = False, present
+        self._news = news
         items = self.graph.chains.get(self._own.robot)
         if items is None or not len(items.rows):
             return None
@@ -59,24 +73,25 @@ class BackEnd:
         if frame is None:
             self.estimate = None
             return None
-        bias_sigma = self._config.relative_pose.range_bias_sigma_m
-        problem, start, robots, pairs = team_frame.build(
-            self.graph, self.group, frame, shift_us, bias_sigma, self.estimate, with_ranges=True
-        )
-        return partial(solve, problem, start, frame, robots, pairs)
+        same = {r: p for r, p in public.items() if (p.frame, p.frame_epoch) == frame.chain}
+        group = Group(self.group, frame, shift_us)
+        return self._optimizer.job(self.graph, group, self.estimate, same)
 
     def solved(self, result: TeamEstimate) -> None:
         self.estimate = result
 
-
-def solve(
-    problem: Problem,
-    start: Calibration,
-    frame: Segment,
-    robots: list[int],
-    pairs: list[tuple[int, int]],
-) -> TeamEstimate:
-    """The exact solution, with the uncertainty of everybody's latest pose."""
-    last = team_frame.last_poses(problem)
-    solution = banded.solve(problem, start, tuple(last.values()))
-    return team_frame.estimate(problem, solution, frame, robots, pairs)
+    def public_poses(self) -> list[PublicPoses]:
+        """What neighbours must know of a relaxation: our poses that carry closures."""
+        lifted = self.estimate.lifted if self.estimate else None
+        if self.estimate is None or lifted is None:
+            return []
+        rank, frame = len(lifted.anchor) // 2, self.estimate.frame
+        at_once = (MAX_PAYLOAD - ENVELOPE_BYTES) // (16 * rank + 4) - 1
+        out = []
+        for first in range(0, len(lifted.carriers), at_once):
+            n = lifted.carriers[first : first + at_once]
+            rows = lifted.rows[np.searchsorted(lifted.n, n)]
+            values = np.concatenate([lifted.anchor[None], rows])
+            keyframes = tuple(int(k) for k in n)
+            out.append(PublicPoses(frame.robot, frame.epoch, rank, keyframes, values))
+        return out

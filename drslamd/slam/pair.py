@@ -16,10 +16,11 @@ import numpy as np
 from drslamd.config import Config
 from drslamd.conventions import Chain, Segment
 from drslamd.gossip.messages import ClosureItem
+from drslamd.slam import se2
 from drslamd.slam.consistency import Candidate, PairConsistency
 from drslamd.slam.odometry import OdometryNoise
 from drslamd.slam.pair_window import RangeItems, Request, at_keyframes
-from drslamd.slam.pose_graph import ChainItems, packed
+from drslamd.slam.pose_graph import ChainItems
 from drslamd.slam.range_buffer import RangeBuffer
 from drslamd.slam.relative_pose import Estimate
 
@@ -124,7 +125,7 @@ class Pair:
             x, y, theta = pose.tolist()
             item = ClosureItem(
                 number, True, request.a.n, self.peer, request.b.n,
-                (x, y, theta), packed(covariance),
+                (x, y, theta), se2.packed(covariance),
             )  # fmt: skip
             out.append((Candidate(number, pose, covariance, *ends), item))
         return out

@@ -1,4 +1,4 @@
-"""The team's pose graph: what all robots said, kept as arrays, and the problem that it poses.
+"""The team's pose graph: what all robots said, kept as arrays.
 
 Items are keyed by who made them and when, so inserting is idempotent and the order of arrival does
 not matter. An item may name a keyframe that has not arrived yet; it waits and counts once both
@@ -13,11 +13,10 @@ from hashlib import blake2b
 import numpy as np
 from numpy.typing import NDArray
 
-from drslamd.conventions import ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain, Key, Segment
+from drslamd.conventions import ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain, Segment
 from drslamd.gossip.messages import ClosureItem, GraphEntry
-from drslamd.slam import se2
-from drslamd.slam.odometry import OdometryNoise, covariance_between, growth, turned_back
-from drslamd.slam.problem import Index, Links, PoseEdges, Ranges
+from drslamd.slam.odometry import OdometryNoise, growth
+from drslamd.slam.problem import Index
 from drslamd.slam.se2 import Array
 
 MAX_KEYFRAMES = 4_000
@@ -27,8 +26,6 @@ MAX_RANGES = 20_000
 MAX_CLOSURES = 4_000
 """Of one pair."""
 
-LINK_FLOOR_M, LINK_FLOOR_RAD = 5e-4, 5e-4
-"""No wheel is better than this over one link, and a robot that stands may still be pushed."""
 DEFAULT_NOISE = OdometryNoise(0.03, 0.0026, 0.01, 0.0087)
 """Until a robot has said how good its odometry is (config defaults)."""
 
@@ -184,13 +181,14 @@ class TeamGraph:
                    for c in (pair.a, pair.b))
         ]  # fmt: skip
 
-    def segment_of(self, robot: int, n: int) -> Segment | None:
-        """The segment of keyframe n, None when it is not held."""
-        items = self.chains[robot]
-        at, there = items.find(np.array([float(n)]))
-        if not there[0]:
-            return None
-        return Segment(*items.chain, int(items.rows[at[0], 1]))
+    def rows_of(self, segment: Segment) -> slice:
+        """Which rows of its chain a segment is."""
+        first, last = self.chains[segment.robot].segments()[segment.segment]
+        return slice(first, last + 1)
+
+    def segment_rows(self, segment: Segment) -> Array:
+        """(k, 5) keyframes of a segment."""
+        return np.asarray(self.chains[segment.robot].rows[self.rows_of(segment)])
 
     def digest(self, robots: set[int]) -> int:
         """A number that two robots share when they hold the same items of these robots."""
@@ -204,152 +202,3 @@ class TeamGraph:
                 order = np.lexsort((rows[:, 1], rows[:, 0]))
                 h.update(rows[order].tobytes() + repr([c.number for c in pair.kept()]).encode())
         return int.from_bytes(h.digest(), "big", signed=True)
-
-
-@dataclass(frozen=True)
-class Numbering:
-    """Positions of the poses of some segments in one list, ordered by time.
-
-    Attributes:
-        keys: names of the poses.
-        odometry: (n, 3) their poses in the odometry frame of their own chain.
-        number: for each robot, the number of each row of its chain, -1 where it is left out.
-    """
-
-    keys: tuple[Key, ...]
-    odometry: Array
-    number: dict[int, Index]
-
-
-def numbering(graph: TeamGraph, members: set[Segment], shift_us: dict[int, int]) -> Numbering:
-    """Number all keyframes of `members` by time.
-
-    Args:
-        shift_us: clock of each robot minus ours, us; only the order depends on it.
-    """
-    rows, number = [], {}
-    for robot in sorted({s.robot for s in members}):
-        items = graph.chains[robot]
-        wanted = [s.segment for s in members if s.chain == items.chain]
-        at = np.flatnonzero(np.isin(items.rows[:, 1], wanted))
-        number[robot] = np.full(len(items.rows), -1)
-        when = items.rows[at, 0] - shift_us.get(robot, 0) / 1e5
-        rows.append(
-            np.column_stack([when, np.full(len(at), robot), at, items.rows[at][:, [0, 2, 3, 4]]])
-        )
-    table = np.concatenate(rows)
-    table = table[np.lexsort((table[:, 1], table[:, 0]))]
-    for robot, numbers in number.items():
-        mine = np.flatnonzero(table[:, 1] == robot)
-        numbers[table[mine, 2].astype(int)] = mine
-    epochs = {s.robot: s.epoch for s in members}
-    keys = tuple(
-        Key(int(robot), epochs[int(robot)], int(n)) for robot, n in table[:, [1, 3]].tolist()
-    )
-    return Numbering(keys, table[:, 4:], number)
-
-
-def links(graph: TeamGraph, numbers: Numbering, robots: list[int]) -> Links:
-    """Odometry between neighbouring keyframes of each segment."""
-    parts: list[tuple[Array, ...]] = []
-    for index, robot in enumerate(robots):
-        items = graph.chains[robot]
-        number = numbers.number[robot]
-        for first, last in items.segments().values():
-            if number[first] < 0 or first == last:
-                continue
-            poses = items.poses[first : last + 1]
-            sums = growth(poses)
-            i, k = np.arange(len(poses) - 1), np.arange(1, len(poses))
-            measured = se2.between(poses[i], poses[k])
-            parts.append((
-                number[first:last], number[first + 1 : last + 1], measured,
-                link_covariance(items.noise, poses, sums, i, k, measured),
-                np.full(len(i), index), sums[k, 0] - sums[i, 0],
-            ))  # fmt: skip
-    if not parts:
-        empty = np.zeros(0, dtype=np.int64)
-        return Links(empty, empty, np.zeros((0, 3)), np.zeros((0, 3, 3)), empty, np.zeros(0))
-    return Links(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-
-def link_covariance(
-    noise: OdometryNoise, poses: Array, sums: Array, i: Index, k: Index, measured: Array
-) -> Array:
-    """(m, 3, 3): random noise of links as errors of x, y, theta in the frame of pose i.
-
-    Scale and constant yaw rate are unknowns of the optimiser and not part of it.
-    """
-    random = OdometryNoise(0.0, 0.0, noise.translation_per_sqrt_m, noise.yaw_rad_per_sqrt_m)
-    twist = turned_back(poses[i], covariance_between(random, poses, sums, i, k))
-    # a left twist at pose i moves the end of the link by its turn times the lever
-    lever = np.tile(np.eye(3), (len(i), 1, 1))
-    lever[:, 0, 2], lever[:, 1, 2] = -measured[:, 1], measured[:, 0]
-    floor = np.diag([LINK_FLOOR_M**2, LINK_FLOOR_M**2, LINK_FLOOR_RAD**2])
-    return np.asarray(lever @ twist @ np.swapaxes(lever, 1, 2) + floor)
-
-
-def closures(graph: TeamGraph, numbers: Numbering) -> PoseEdges:
-    """All kept closures between numbered poses."""
-    i, j, measured, covariance = [], [], [], []
-    for pair in graph.usable():
-        ends = _both_ends(graph, numbers, pair, np.array([(c.a_n, c.b_n) for c in pair.kept()]))
-        for closure, a, b in zip(pair.kept(), *ends, strict=True):
-            if a >= 0 and b >= 0:
-                i.append(a)
-                j.append(b)
-                measured.append(closure.a_T_b)
-                covariance.append(unpacked(closure.covariance))
-    return PoseEdges(
-        np.array(i, dtype=np.int64), np.array(j, dtype=np.int64),
-        np.array(measured, dtype=float).reshape(-1, 3),
-        np.array(covariance, dtype=float).reshape(-1, 3, 3),
-    )  # fmt: skip
-
-
-def ranges(graph: TeamGraph, numbers: Numbering) -> tuple[Ranges, list[tuple[int, int]]]:
-    """All ranges between numbered poses, and the pairs of robots that `pair` numbers."""
-    parts: list[tuple[Array, ...]] = []
-    names: list[tuple[int, int]] = []
-    for pair in graph.usable():
-        rows = pair.ranges.data
-        a, b = _both_ends(graph, numbers, pair, rows[:, :2])
-        good = (a >= 0) & (b >= 0)
-        if not good.any():
-            continue
-        low, high = sorted((pair.a.robot, pair.b.robot))
-        if (low, high) not in names:
-            names.append((low, high))
-        index = np.full(int(good.sum()), names.index((low, high)))
-        rows = rows[good]
-        parts.append((a[good], b[good], rows[:, 2:4], rows[:, 4:6], rows[:, 6], rows[:, 7], index))
-    if not parts:
-        none, empty = np.zeros((0, 2)), np.zeros(0, dtype=np.int64)
-        return Ranges(empty, empty, none, none, np.zeros(0), np.zeros(0), empty), []
-    return Ranges(*(np.concatenate(column) for column in zip(*parts, strict=True))), names
-
-
-def _both_ends(
-    graph: TeamGraph, numbers: Numbering, pair: PairItems, n: Array
-) -> tuple[Index, Index]:
-    """Numbers of the poses at keyframes n (m, 2) of a pair, -1 where one is not there."""
-    out = []
-    for column, chain in enumerate((pair.a, pair.b)):
-        if chain.robot not in numbers.number or not len(n):
-            out.append(np.full(len(n), -1))
-            continue
-        at, there = graph.chains[chain.robot].find(n[:, column])
-        out.append(np.where(there, numbers.number[chain.robot][at], -1))
-    return out[0], out[1]
-
-
-def packed(covariance: Array) -> tuple[float, ...]:
-    """xx xy xt yy yt tt of a (3, 3) covariance."""
-    return tuple(float(v) for v in covariance[np.triu_indices(3)])
-
-
-def unpacked(upper: tuple[float, ...]) -> Array:
-    """The (3, 3) covariance of `packed`."""
-    full = np.zeros((3, 3))
-    full[np.triu_indices(3)] = upper
-    return np.asarray(full + np.triu(full, 1).T)

@@ -16,7 +16,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from drslamd.conventions import Key
 from drslamd.slam import se2
 from drslamd.slam.se2 import Array
 
@@ -83,12 +82,13 @@ class Problem:
     """One connected group of robots.
 
     Attributes:
-        keys: name of each of the n poses.
-        initial: (n, 3) w_T_k.
+        robot, n: (k,) whose keyframe each pose is, and which.
+        initial: (k, 3) w_T_k.
         gauge: the pose that is held where `initial` has it.
     """
 
-    keys: tuple[Key, ...]
+    robot: Index
+    n: Index
     initial: Array
     gauge: int
     links: Links
@@ -112,7 +112,7 @@ class Calibration:
 
 @dataclass(frozen=True)
 class Solution:
-    """Poses (n, 3) in the order of `Problem.keys`, and how they were reached."""
+    """Poses (k, 3) in the order of the problem, and how they were reached."""
 
     poses: Array
     calibration: Calibration

@@ -81,6 +81,18 @@ def adjoint(a_T_b: Array) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def packed(covariance: Array) -> tuple[float, ...]:
+    """xx xy xt yy yt tt of a (3, 3) covariance."""
+    return tuple(float(v) for v in covariance[np.triu_indices(3)])
+
+
+def unpacked(upper: tuple[float, ...]) -> Array:
+    """The (3, 3) covariance of `packed`."""
+    full = np.zeros((3, 3))
+    full[np.triu_indices(3)] = upper
+    return np.asarray(full + np.triu(full, 1).T)
+
+
 def turned(covariance: Array, theta: Array | float) -> Array:
     """Covariance (..., 3, 3) of (x, y, theta), its axes turned by theta (...)."""
     cos, sin = np.cos(theta), np.sin(theta)

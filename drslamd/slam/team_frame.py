@@ -8,67 +8,39 @@ and a trajectory that was never placed is placed by its closures.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from drslamd.conventions import Chain, Key, Segment
+from drslamd.conventions import Segment
+from drslamd.gossip.messages import ClosureItem
 from drslamd.slam import se2
-from drslamd.slam.odometry import OdometryNoise
-from drslamd.slam.pose_graph import (
-    ChainItems,
-    Numbering,
-    PairItems,
-    TeamGraph,
-    closures,
-    links,
-    numbering,
-    ranges,
-)
-from drslamd.slam.problem import Calibration, Priors, Problem, Solution
+from drslamd.slam.estimate import TeamEstimate, Trajectory
+from drslamd.slam.pose_graph import PairItems, TeamGraph
 from drslamd.slam.se2 import Array
 
-YAW_PRIOR_FLOOR = 1e-4
-"""rad/m; a prior of zero width would make the system singular."""
-
 
 @dataclass(frozen=True)
-class Trajectory:
-    """Solved keyframes of one chain: n (k,) ascending, w_T_k (k, 3)."""
+class Group:
+    """A connected group.
 
-    chain: Chain
-    n: Array
-    poses: Array
+    Attributes:
+        members: its segments; frame: the one whose odometry frame is the team's.
+        shift_us: clock of each robot minus ours, us.
+    """
 
-
-@dataclass(frozen=True)
-class TeamEstimate:
-    """The last solution, in the frame of segment `frame`."""
-
+    members: set[Segment]
     frame: Segment
-    trajectories: dict[int, Trajectory]
-    covariances: dict[int, Array] = field(default_factory=dict)
-    """(3, 3) of each robot's last pose."""
-    bias_m: dict[tuple[int, int], float] = field(default_factory=dict)
-    scale: dict[int, float] = field(default_factory=dict)
-    yaw_rad_per_m: dict[int, float] = field(default_factory=dict)
-    cost: float = 0.0
-    iterations: int = 0
-    converged: bool = True
+    shift_us: dict[int, int]
 
 
 def groups(graph: TeamGraph) -> list[set[Segment]]:
     """Sets of segments that closures join; a segment without closure is in none."""
     group_of: dict[Segment, set[Segment]] = {}
-    for pair in graph.usable():
-        for closure in pair.kept():
-            a = graph.segment_of(pair.a.robot, closure.a_n)
-            b = graph.segment_of(pair.b.robot, closure.b_n)
-            if a is None or b is None:
-                continue
-            joined = group_of.get(a, {a}) | group_of.get(b, {b})
-            for segment in joined:
-                group_of[segment] = joined
+    for _, a, b in joints(graph):
+        joined = group_of.get(a, {a}) | group_of.get(b, {b})
+        for segment in joined:
+            group_of[segment] = joined
     distinct: list[set[Segment]] = []
     for group in group_of.values():
         if group not in distinct:
@@ -76,122 +48,83 @@ def groups(graph: TeamGraph) -> list[set[Segment]]:
     return distinct
 
 
+def joints(graph: TeamGraph) -> list[tuple[ClosureItem, Segment, Segment]]:
+    """Kept closures whose both keyframes are held, with the segments that they join."""
+    out = []
+    for pair in graph.usable():
+        kept = pair.kept()
+        a = _segments(graph, pair, 0, [c.a_n for c in kept])
+        b = _segments(graph, pair, 1, [c.b_n for c in kept])
+        for closure, one, other in zip(kept, a, b, strict=True):
+            if one is not None and other is not None:
+                out.append((closure, one, other))
+    return out
+
+
+def _segments(graph: TeamGraph, pair: PairItems, end: int, n: list[int]) -> list[Segment | None]:
+    chain = (pair.a, pair.b)[end]
+    items = graph.chains[chain.robot]
+    at, there = items.find(np.array(n, dtype=float))
+    numbers = items.rows[at, 1] if len(items.rows) else np.zeros(len(n))
+    return [
+        Segment(*chain, int(number)) if held else None
+        for number, held in zip(numbers, there, strict=True)
+    ]
+
+
 def gauge_segment(group: set[Segment], living: set[int]) -> Segment | None:
     """The first segment of the lowest living robot in the group."""
     return min((s for s in group if s.robot in living), default=None)
 
 
-def build(
-    graph: TeamGraph,
-    group: set[Segment],
-    frame: Segment,
-    shift_us: dict[int, int],
-    bias_sigma: float,
-    previous: TeamEstimate | None,
-    with_ranges: bool,
-) -> tuple[Problem, Calibration, list[int], list[tuple[int, int]]]:
-    """The problem of one group.
-
-    Args:
-        shift_us: clock of each robot minus ours, us.
-        bias_sigma: prior of the range bias of a pair, m.
-        previous: where to start from.
-        with_ranges: use the ranges as edges; otherwise the closures.
-
-    Returns:
-        The problem, the calibration to start from, and the robots and pairs that it numbers.
-    """
-    numbers = numbering(graph, group, shift_us)
-    robots = sorted({s.robot for s in group})
-    odometry = links(graph, numbers, robots)
-    nothing = TeamGraph()
-    range_edges, pairs = ranges(graph if with_ranges else nothing, numbers)
-    closure_edges = closures(nothing if with_ranges else graph, numbers)
-    noises = [graph.chains[robot].noise for robot in robots]
-    priors = Priors(
-        np.full(len(pairs), bias_sigma),
-        np.array([noise.scale for noise in noises]),
-        np.array([max(noise.yaw_rad_per_m, YAW_PRIOR_FLOOR) for noise in noises]),
-    )
-    start = Calibration.zero(priors)
-    if previous:
-        start = Calibration(
-            np.array([previous.bias_m.get(pair, 0.0) for pair in pairs]),
-            np.array([previous.scale.get(robot, 0.0) for robot in robots]),
-            np.array([previous.yaw_rad_per_m.get(robot, 0.0) for robot in robots]),
-        )
-    initial = _initial(graph, group, frame, numbers, previous)
-    first = next(n for n, s in _rows(graph, frame.robot) if s == frame.segment)
-    gauge = numbers.keys.index(Key(frame.robot, frame.epoch, first))
-    problem = Problem(numbers.keys, initial, gauge, odometry, closure_edges, range_edges, priors)
-    return problem, start, robots, pairs
+# ---- where the optimiser starts ----------------------------------------------------------------
 
 
-def _rows(graph: TeamGraph, robot: int) -> list[tuple[int, int]]:
-    return [(int(n), int(s)) for n, s in graph.chains[robot].rows[:, :2]]
-
-
-def _initial(
-    graph: TeamGraph,
-    group: set[Segment],
-    frame: Segment,
-    numbers: Numbering,
-    previous: TeamEstimate | None,
-) -> Array:
-    """(n, 3) w_T_k of all numbered poses."""
-    placed: dict[Segment, Array] = {}
-    known = _in_frame(graph, frame, previous)
-    for segment in sorted(group):
-        rows = _segment_rows(graph, segment)
+def placed(graph: TeamGraph, group: Group, previous: TeamEstimate | None) -> dict[Segment, Array]:
+    """w_T_k (k, 3) of all keyframes of each member."""
+    out: dict[Segment, Array] = {}
+    known = _in_frame(graph, group.frame, previous)
+    for segment in sorted(group.members):
+        rows = graph.segment_rows(segment)
         trajectory = known.get(segment.robot)
-        if trajectory and trajectory.chain == segment.chain:
+        if trajectory is not None and trajectory.chain == segment.chain:
             there = np.isin(rows[:, 0], trajectory.n)
             if there.any():
                 at = np.searchsorted(trajectory.n, rows[there, 0])
-                placed[segment] = _carried(rows, rows[there], trajectory.poses[at])
-    if frame not in placed:
-        placed = {frame: _segment_rows(graph, frame)[:, 2:]}
-    while len(placed) < len(group):
-        segment, anchors, poses = _next_to_place(graph, group, placed)
-        placed[segment] = _carried(_segment_rows(graph, segment), anchors, poses)
-    initial = np.zeros_like(numbers.odometry)
-    for segment, poses in placed.items():
-        first, last = graph.chains[segment.robot].segments()[segment.segment]
-        initial[numbers.number[segment.robot][first : last + 1]] = poses
-    return initial
-
-
-def _segment_rows(graph: TeamGraph, segment: Segment) -> Array:
-    items = graph.chains[segment.robot]
-    first, last = items.segments()[segment.segment]
-    return items.rows[first : last + 1]
+                out[segment] = carried(rows, rows[there], trajectory.poses[at])
+    if group.frame not in out:
+        out = {group.frame: graph.segment_rows(group.frame)[:, 2:]}
+    while len(out) < len(group.members):
+        segment, anchors, poses = _next_to_place(graph, group.members, out)
+        out[segment] = carried(graph.segment_rows(segment), anchors, poses)
+    return out
 
 
 def _in_frame(
     graph: TeamGraph, frame: Segment, previous: TeamEstimate | None
 ) -> dict[int, Trajectory]:
-    """The previous trajectories, carried into `frame`."""
+    """The previous trajectories, carried into `frame`; nothing when they do not know it."""
     if previous is None:
         return {}
     if previous.frame == frame:
         return previous.trajectories
-    origin = previous.trajectories.get(frame.robot)
-    if origin is None or origin.chain != frame.chain:
+    old = previous.trajectories.get(frame.robot)
+    if old is None or old.chain != frame.chain:
         return {}
-    rows = _segment_rows(graph, frame)
-    there = np.isin(rows[:, 0], origin.n)
+    rows = graph.segment_rows(frame)
+    there = np.isin(rows[:, 0], old.n)
     if not there.any():
         return {}
-    new = rows[there][0]
-    old = origin.poses[np.searchsorted(origin.n, new[0])]
-    w_T_old = se2.compose(new[2:], se2.inverse(old))
+    first = rows[there][0]
+    before = old.poses[np.searchsorted(old.n, first[0])]
+    w_T_old = se2.compose(first[2:], se2.inverse(before))
     return {
         robot: Trajectory(t.chain, t.n, se2.compose(w_T_old[None], t.poses))
         for robot, t in previous.trajectories.items()
     }
 
 
-def _carried(rows: Array, anchors: Array, w_T_anchor: Array) -> Array:
+def carried(rows: Array, anchors: Array, w_T_anchor: Array) -> Array:
     """Poses of all keyframes by odometry from the nearest anchor.
 
     Args:
@@ -206,74 +139,25 @@ def _carried(rows: Array, anchors: Array, w_T_anchor: Array) -> Array:
 
 
 def _next_to_place(
-    graph: TeamGraph, group: set[Segment], placed: dict[Segment, Array]
+    graph: TeamGraph, members: set[Segment], done: dict[Segment, Array]
 ) -> tuple[Segment, Array, Array]:
-    """A segment that closures join to a placed one: its anchor rows and their poses."""
+    """The segment that most closures join to what is placed: its anchor rows and their poses."""
+
+    def pose(segment: Segment, n: int) -> Array:
+        rows = graph.segment_rows(segment)
+        return np.asarray(done[segment][np.searchsorted(rows[:, 0], n)])
+
     found: dict[Segment, dict[int, Array]] = {}
-    for pair in graph.usable():
-        for closure in pair.kept():
-            a = graph.segment_of(pair.a.robot, closure.a_n)
-            b = graph.segment_of(pair.b.robot, closure.b_n)
-            if a is None or b is None or (a in placed) == (b in placed):
-                continue
-            a_T_b = np.array(closure.a_T_b)
-            if a in placed:
-                w_T_b = se2.compose(_pose_at(graph, placed, a, closure.a_n), a_T_b)
-                found.setdefault(b, {})[closure.b_n] = w_T_b
-            else:
-                w_T_b = _pose_at(graph, placed, b, closure.b_n)
-                found.setdefault(a, {})[closure.a_n] = se2.compose(w_T_b, se2.inverse(a_T_b))
-    candidates = {s: anchors for s, anchors in found.items() if s in group}
-    segment = max(candidates, key=lambda s: (len(candidates[s]), s))
-    rows = _segment_rows(graph, segment)
-    anchors = candidates[segment]
+    for closure, a, b in joints(graph):
+        a_T_b = np.array(closure.a_T_b)
+        if a in done and b in members and b not in done:
+            w_T_b = se2.compose(pose(a, closure.a_n), a_T_b)
+            found.setdefault(b, {})[closure.b_n] = w_T_b
+        elif b in done and a in members and a not in done:
+            w_T_a = se2.compose(pose(b, closure.b_n), se2.inverse(a_T_b))
+            found.setdefault(a, {})[closure.a_n] = w_T_a
+    segment = max(found, key=lambda s: (len(found[s]), s))
+    rows, anchors = graph.segment_rows(segment), found[segment]
     n = np.array(sorted(anchors))
     at = np.searchsorted(rows[:, 0], n)
     return segment, rows[at], np.array([anchors[int(k)] for k in n])
-
-
-def _pose_at(graph: TeamGraph, placed: dict[Segment, Array], segment: Segment, n: int) -> Array:
-    rows = _segment_rows(graph, segment)
-    return np.asarray(placed[segment][np.searchsorted(rows[:, 0], n)])
-
-
-def last_poses(problem: Problem) -> dict[int, int]:
-    """Number of the latest pose of each robot."""
-    return {key.robot: k for k, key in enumerate(problem.keys)}
-
-
-def estimate(
-    problem: Problem,
-    solution: Solution,
-    frame: Segment,
-    robots: list[int],
-    pairs: list[tuple[int, int]],
-) -> TeamEstimate:
-    """Sort a solution by robot."""
-    trajectories = {}
-    robot_of = np.array([key.robot for key in problem.keys])
-    n_of = np.array([key.n for key in problem.keys])
-    epochs = {key.robot: key.epoch for key in problem.keys}
-    for robot in robots:
-        mine = np.flatnonzero(robot_of == robot)
-        mine = mine[np.argsort(n_of[mine], kind="stable")]
-        chain = Chain(robot, epochs[robot])
-        trajectories[robot] = Trajectory(chain, n_of[mine], solution.poses[mine])
-    c = solution.calibration
-    return TeamEstimate(
-        frame,
-        trajectories,
-        {problem.keys[k].robot: v for k, v in solution.covariances.items()},
-        dict(zip(pairs, c.bias.tolist(), strict=True)) if len(c.bias) else {},
-        dict(zip(robots, c.scale.tolist(), strict=True)),
-        dict(zip(robots, c.yaw.tolist(), strict=True)),
-        solution.cost,
-        solution.iterations,
-        solution.converged,
-    )
-
-
-__all__ = [
-    "ChainItems", "OdometryNoise", "PairItems", "TeamEstimate", "Trajectory",
-    "build", "estimate", "gauge_segment", "groups", "last_poses",
-]  # fmt: skip

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from drslamd.slam import se2
+from drslamd.slam.estimate import Trajectory
 from drslamd.slam.odometry import Track
 from drslamd.slam.se2 import Array
-from drslamd.slam.team_frame import Trajectory
 
 
 def bent(track: Track, solved: Trajectory) -> tuple[Array, Array]:

@@ -1,0 +1,124 @@
+"""`optimizer.algorithm = "banded"`: every robot solves its whole group exactly.
+
+What is replicated is small: keyframes condense the odometry to one pose a second, a range is one
+number. Robots that hold the same items reach the same answer without exchanging any iterate, so a
+lost message delays the answer and does not change it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from drslamd.config import Config
+from drslamd.conventions import Chain
+from drslamd.gossip.messages import PublicPoses
+from drslamd.slam import banded, graph_edges, team_frame
+from drslamd.slam.estimate import TeamEstimate, Trajectory
+from drslamd.slam.optimizer import Job
+from drslamd.slam.pose_graph import TeamGraph
+from drslamd.slam.problem import Calibration, Priors, Problem
+from drslamd.slam.se2 import Array
+from drslamd.slam.team_frame import Group
+
+YAW_PRIOR_FLOOR = 1e-4
+"""rad/m; a prior of zero width would make the system singular."""
+
+
+class Banded:
+    """Ranges and condensed odometry of the whole group, one banded solve."""
+
+    def __init__(self, config: Config, own: Chain) -> None:
+        self._bias_sigma = config.relative_pose.range_bias_sigma_m
+
+    def job(
+        self,
+        graph: TeamGraph,
+        group: Group,
+        previous: TeamEstimate | None,
+        public: Mapping[int, PublicPoses],
+    ) -> Job:
+        """See `Optimizer.job`; public poses are not needed."""
+        return partial(_solve, stated(graph, group, previous, self._bias_sigma), group)
+
+
+@dataclass(frozen=True)
+class Stated:
+    """A group as a problem, with the names behind its numbers.
+
+    Attributes:
+        start: calibration to start from.
+        chains: of the robots that calibration numbers; pairs: that its biases number.
+    """
+
+    problem: Problem
+    start: Calibration
+    chains: list[Chain]
+    pairs: list[tuple[int, int]]
+
+
+def stated(
+    graph: TeamGraph, group: Group, previous: TeamEstimate | None, bias_sigma: float
+) -> Stated:
+    """Number the group's poses by time and collect its edges.
+
+    Args:
+        bias_sigma: prior of the range bias of a pair, m.
+    """
+    numbers = graph_edges.numbering(graph, group.members, group.shift_us)
+    robots = sorted({s.robot for s in group.members})
+    ranges, pairs = graph_edges.ranges(graph, numbers)
+    chains = [graph.chains[robot] for robot in robots]
+    priors = Priors(
+        np.full(len(pairs), bias_sigma),
+        np.array([items.noise.scale for items in chains]),
+        np.array([max(items.noise.yaw_rad_per_m, YAW_PRIOR_FLOOR) for items in chains]),
+    )
+    start = Calibration.zero(priors)
+    if previous:
+        start = Calibration(
+            np.array([previous.bias_m.get(pair, 0.0) for pair in pairs]),
+            np.array([previous.scale.get(robot, 0.0) for robot in robots]),
+            np.array([previous.yaw_rad_per_m.get(robot, 0.0) for robot in robots]),
+        )
+    initial = np.zeros((len(numbers.n), 3))
+    for segment, poses in team_frame.placed(graph, group, previous).items():
+        initial[numbers.place[segment.robot][graph.rows_of(segment)]] = poses
+    first = graph.segment_rows(group.frame)[0, 0]
+    gauge = int(numbers.of(graph.chains[group.frame.robot], np.array([first]))[0])
+    problem = Problem(
+        numbers.robot, numbers.n, initial, gauge,
+        graph_edges.links(graph, numbers, robots), graph_edges.pose_edges([]), ranges, priors,
+    )  # fmt: skip
+    return Stated(problem, start, [items.chain for items in chains], pairs)
+
+
+def _solve(team: Stated, group: Group) -> TeamEstimate:
+    """Solve, with the uncertainty of everybody's latest pose, and sort the answer by robot."""
+    problem = team.problem
+    mine: dict[int, Array] = {}
+    for chain in team.chains:
+        at = np.flatnonzero(problem.robot == chain.robot)
+        mine[chain.robot] = at[np.argsort(problem.n[at], kind="stable")]
+    last = {robot: int(at[-1]) for robot, at in mine.items()}
+    solution = banded.solve(problem, team.start, tuple(last.values()))
+    robots, learned = [chain.robot for chain in team.chains], solution.calibration
+    return TeamEstimate(
+        group.frame,
+        {
+            chain.robot: Trajectory(
+                chain, problem.n[mine[chain.robot]], solution.poses[mine[chain.robot]]
+            )
+            for chain in team.chains
+        },
+        {robot: solution.covariances[at] for robot, at in last.items()},
+        dict(zip(team.pairs, learned.bias.tolist(), strict=True)),
+        dict(zip(robots, learned.scale.tolist(), strict=True)),
+        dict(zip(robots, learned.yaw.tolist(), strict=True)),
+        solution.cost,
+        solution.iterations,
+        solution.converged,
+    )

@@ -1,0 +1,50 @@
+"""What module 3 says: where everybody was, in the frame of the team."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from drslamd.conventions import Chain, Segment
+from drslamd.slam.se2 import Array
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Solved keyframes of one chain: n (k,) ascending, w_T_k (k, 3)."""
+
+    chain: Chain
+    n: Array
+    poses: Array
+
+
+@dataclass(frozen=True)
+class Lifted:
+    """State of the relaxation on one robot.
+
+    Attributes:
+        n: (k,) its keyframes; rows: (k, 2 r) their lifted poses.
+        anchor: (2 r,) lifted pose that is the origin of the team's frame.
+        carriers: (m,) keyframes that carry closures and are therefore public.
+    """
+
+    n: Array
+    rows: Array
+    anchor: Array
+    carriers: Array
+
+
+@dataclass(frozen=True)
+class TeamEstimate:
+    """The last solution, in the frame of segment `frame`."""
+
+    frame: Segment
+    trajectories: dict[int, Trajectory]
+    covariances: dict[int, Array] = field(default_factory=dict)
+    """(3, 3) of each robot's last pose."""
+    bias_m: dict[tuple[int, int], float] = field(default_factory=dict)
+    scale: dict[int, float] = field(default_factory=dict)
+    yaw_rad_per_m: dict[int, float] = field(default_factory=dict)
+    cost: float = 0.0
+    iterations: int = 0
+    converged: bool = True
+    lifted: Lifted | None = None
