@@ -39,8 +39,7 @@ from drslamd.events import (
     Write,
 )
 from drslamd.gossip import messages
-from drslamd.gossip.messages import UNKNOWN_CLOCK, GraphEntry, OdometryBatch, Pose, Status
-from drslamd.gossip.peer import Peer
+from drslamd.gossip.messages import UNKNOWN_CLOCK, OdometryBatch, Pose, Status
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
 from drslamd.health import Health
@@ -49,6 +48,8 @@ from drslamd.sensors.wheel_input import WheelInput
 from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.front_end import FrontEnd
+from drslamd.slam.items import GraphEntry
+from drslamd.slam.neighbour import Neighbour
 from drslamd.slam.pair_window import Request
 from drslamd.slam.se2 import Array
 
@@ -205,14 +206,11 @@ class Robot:
         batch = OdometryBatch(track.segment_start, n0, track.steps(n0, track.end - n0))
         return [self.team.send(batch, utime)]
 
-    def _neighbours(self, utime: int) -> dict[int, Peer]:
+    def _neighbours(self, utime: int) -> list[Neighbour]:
         """Living peers within UWB range of us, as either side measures it."""
         mine = set(self.front.ranged(utime))
-        return {
-            robot: peer
-            for robot, peer in self.team.living(utime).items()
-            if peer.status and (peer.status.uwb_id in mine or self.own.robot in peer.status.ranged)
-        }
+        peers = (peer.neighbour(self.own, utime) for peer in self.team.living(utime).values())
+        return [peer for peer in peers if peer.ranges_to_us or peer.uwb_id in mine]
 
     def _extend_log(self, utime: int) -> list[Effect]:
         """One entry of our log: where our wheels went, what we ranged, what module 2 kept."""
@@ -266,8 +264,9 @@ class Robot:
         pair = self.front.pairs.get(job.peer)
         if job.module == "optimizer":
             self.back.solved(event.result)
-            public = [self.team.send(m, event.utime) for m in self.back.public_poses()]
-            return [*self._publish(event.utime), *public]
+            public = self.back.public_poses()
+            sends = self.team.send_public(public, event.utime) if public else []
+            return [*self._publish(event.utime), *sends]
         if pair is not None and job.module == "relative_pose":
             pair.estimated(cast(Request, job.request), event.result)
         elif pair is not None:

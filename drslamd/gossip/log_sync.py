@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from itertools import islice
 
 from drslamd.conventions import MILLISECOND_US, Chain
-from drslamd.gossip.messages import MAX_LOGS, GraphEntry, LogState
+from drslamd.gossip.messages import MAX_LOGS, LogState
+from drslamd.slam.items import GraphEntry
 
 MAX_ENTRIES = 36_000
 """Of one log: ten hours at one entry a second, about 9 MB; the oldest go first."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import struct
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from io import BytesIO
 from typing import Any, Union, cast
 
@@ -18,6 +18,7 @@ import numpy as np
 from drslamd import lcmtypes
 from drslamd.conventions import MAX_ROBOT_ID, ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain
 from drslamd.gossip.seal import Header
+from drslamd.slam.items import ClosureItem, GraphEntry, Keyframe, PublicPoses, RangeItem
 from drslamd.slam.se2 import Array
 
 CHANNEL_PREFIX = "DRSLAM_"
@@ -27,8 +28,6 @@ MILLIMETRE = 1e-3
 MAX_HEARD = 32
 """Peers named in one status: with `MAX_LOGS` it still fits one datagram."""
 MAX_LOGS = 32
-MAX_PUBLIC = 4_000
-"""Lifted poses remembered of one peer, 1.3 MB at rank 5; as many as keyframes of a chain."""
 MAX_BATCH = 150
 """Odometry samples in one message: 15 s, 900 bytes."""
 
@@ -74,56 +73,6 @@ class OdometryBatch:
 
 
 @dataclass(frozen=True)
-class Keyframe:
-    """Sample n of the odometry, whole steps."""
-
-    n: int
-    segment: int
-    x: int
-    y: int
-    theta: int
-
-
-@dataclass(frozen=True)
-class RangeItem:
-    """One distance between two keyframes; q is the antenna in their body frames, metres."""
-
-    a_n: int
-    peer: Chain
-    b_n: int
-    q_a: tuple[float, float]
-    q_b: tuple[float, float]
-    range_m: float
-    sigma_m: float
-
-
-@dataclass(frozen=True)
-class ClosureItem:
-    """One relative pose a_T_b between two keyframes, kept or withdrawn."""
-
-    number: int
-    kept: bool
-    a_n: int
-    peer: Chain
-    b_n: int
-    a_T_b: tuple[float, float, float]
-    covariance: tuple[float, ...]
-    """xx xy xt yy yt tt."""
-
-
-@dataclass(frozen=True)
-class GraphEntry:
-    """One message of a robot's log."""
-
-    seq: int
-    traits: tuple[float, ...] = ()
-    """Now and then: the four sigmas of `OdometryNoise`, antenna x and y in the body frame."""
-    keyframes: tuple[Keyframe, ...] = ()
-    ranges: tuple[RangeItem, ...] = ()
-    closures: tuple[ClosureItem, ...] = ()
-
-
-@dataclass(frozen=True)
 class Pose:
     state: int
     frame: int
@@ -131,36 +80,6 @@ class Pose:
     pose_utime: int
     pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
     covariance: tuple[float, ...] = (0.0,) * 6
-
-
-@dataclass(frozen=True)
-class PublicPoses:
-    """Lifted poses of `rbcd`: values (n + 1, 2 * rank) complex, rotation then translation.
-
-    The first row is the pose that anchors the frame; the others belong to the keyframes.
-    """
-
-    frame: int
-    frame_epoch: int
-    rank: int
-    keyframes: tuple[int, ...]
-    values: Array = field(compare=False)
-
-    def table(self) -> dict[int, Array]:
-        """(2 * rank,) lifted pose of each keyframe."""
-        return dict(zip(self.keyframes, self.values[1:], strict=True))
-
-    def after(self, before: PublicPoses | None) -> PublicPoses:
-        """These poses, and those of an earlier message that they do not replace."""
-        same = before is not None and (before.frame, before.frame_epoch, before.rank) == (
-            self.frame, self.frame_epoch, self.rank,
-        )  # fmt: skip
-        if before is None or not same:
-            return self
-        table = {**before.table(), **self.table()}
-        keyframes = tuple(sorted(table)[-MAX_PUBLIC:])
-        values = np.array([self.values[0], *(table[n] for n in keyframes)])
-        return PublicPoses(self.frame, self.frame_epoch, self.rank, keyframes, values)
 
 
 Message = Union[Status, OdometryBatch, GraphEntry, Pose, PublicPoses]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from drslamd.conventions import SECOND_US, Chain
-from drslamd.gossip.messages import OdometryBatch, Pose, PublicPoses, Status
+from drslamd.conventions import GRID_US, SECOND_US, Chain
+from drslamd.gossip.messages import OdometryBatch, Pose, Status
 from drslamd.gossip.peer_clock import PeerClock
+from drslamd.slam.items import PublicPoses
+from drslamd.slam.neighbour import Neighbour
 from drslamd.slam.odometry import PEER_TRACK_SAMPLES, Track
 
 SILENCE_US = 5 * SECOND_US
@@ -55,6 +57,19 @@ class Peer:
     def hears(self, own: Chain) -> bool:
         """Has it said that it hears this very start of ours? A replayed recording cannot."""
         return self.status is not None and any((h.id, h.epoch) == own for h in self.status.heard)
+
+    def neighbour(self, own: Chain, utime: int) -> Neighbour:
+        """What the front end must know of a living peer."""
+        assert self.status is not None
+        offset = self.clock.offset(utime)
+        known = offset is not None and offset.uncertainty_us <= GRID_US
+        return Neighbour(
+            self.chain,
+            self.status.uwb_id,
+            own.robot in self.status.ranged,
+            self.track,
+            offset.us if offset is not None and known else None,
+        )
 
     def extend_track(self, batch: OdometryBatch) -> None:
         """Append what is new in a batch; batches overlap, so nothing is lost with one."""

@@ -9,22 +9,12 @@ from dataclasses import dataclass
 from drslamd.conventions import SECOND_US, Chain
 from drslamd.events import ChannelMessage, Datagram, Send
 from drslamd.gossip import lc02, messages
+from drslamd.gossip.lc02 import MAX_PAYLOAD
 from drslamd.gossip.log_sync import LogSync
-from drslamd.gossip.messages import (
-    UNKNOWN_CLOCK,
-    ClosureItem,
-    GraphEntry,
-    Heard,
-    Keyframe,
-    Message,
-    OdometryBatch,
-    Pose,
-    PublicPoses,
-    RangeItem,
-    Status,
-)
+from drslamd.gossip.messages import UNKNOWN_CLOCK, Heard, Message, OdometryBatch, Pose, Status
 from drslamd.gossip.peer import Peer
 from drslamd.gossip.seal import Header, Seal, SealFault
+from drslamd.slam.items import ClosureItem, GraphEntry, Keyframe, PublicPoses, RangeItem
 
 FORGET_US = 600 * SECOND_US
 """A peer that was silent for ten minutes is no longer listed."""
@@ -32,6 +22,8 @@ TRAITS_EVERY = 64
 """Log entries between two that say what our sensors are like."""
 ITEMS_PER_ENTRY = 20
 """Keyframes, ranges and closures in one log entry; 20 closures are 1,020 bytes."""
+PUBLIC_ENVELOPE_BYTES = 120
+"""What a public_poses_t needs besides its poses, with some air."""
 UNVERIFIED_US = 10 * SECOND_US
 """How long after a message that does not fit the team key it is still spoken of."""
 _FINGERPRINTS = {kind: frozenset([value]) for kind, value in messages.FINGERPRINTS.items()}
@@ -75,6 +67,14 @@ class Team:
         self.messages_sent += 1
         self.bytes_sent += 8 + len(channel) + 1 + len(payload)
         return Send(channel, payload)
+
+    def send_public(self, public: PublicPoses, utime: int) -> list[Send]:
+        """Lifted poses, as many in one message as one datagram takes."""
+        at_once = (MAX_PAYLOAD - PUBLIC_ENVELOPE_BYTES) // (16 * public.rank + 4) - 1
+        return [
+            self.send(public.part(first, first + at_once), utime)
+            for first in range(0, len(public.keyframes), at_once)
+        ]
 
     def append(self, entry: GraphEntry, utime: int) -> tuple[GraphEntry, bytes]:
         """Put an entry on our own log; the caller sends it when anybody is there to hear it."""

@@ -8,11 +8,10 @@ import numpy as np
 
 from drslamd.config import Config
 from drslamd.conventions import Chain, Segment
-from drslamd.gossip.lc02 import MAX_PAYLOAD
-from drslamd.gossip.messages import GraphEntry, PublicPoses
 from drslamd.slam import team_frame
 from drslamd.slam.banded_optimizer import Banded
 from drslamd.slam.estimate import TeamEstimate, Trajectory
+from drslamd.slam.items import GraphEntry, PublicPoses
 from drslamd.slam.optimizer import Job, Optimizer
 from drslamd.slam.pose_graph import TeamGraph
 from drslamd.slam.rbcd_optimizer import Rbcd
@@ -20,8 +19,6 @@ from drslamd.slam.team_frame import Group
 
 OPTIMIZERS: dict[str, Callable[[Config, Chain], Optimizer]] = {"banded": Banded, "rbcd": Rbcd}
 """By `optimizer.algorithm`."""
-ENVELOPE_BYTES = 120
-"""What a public_poses_t needs besides its poses, with some air."""
 
 
 class BackEnd:
@@ -80,18 +77,13 @@ class BackEnd:
     def solved(self, result: TeamEstimate) -> None:
         self.estimate = result
 
-    def public_poses(self) -> list[PublicPoses]:
+    def public_poses(self) -> PublicPoses | None:
         """What neighbours must know of a relaxation: our poses that carry closures."""
         lifted = self.estimate.lifted if self.estimate else None
-        if self.estimate is None or lifted is None:
-            return []
-        rank, frame = len(lifted.anchor) // 2, self.estimate.frame
-        at_once = (MAX_PAYLOAD - ENVELOPE_BYTES) // (16 * rank + 4) - 1
-        out = []
-        for first in range(0, len(lifted.carriers), at_once):
-            n = lifted.carriers[first : first + at_once]
-            rows = lifted.rows[np.searchsorted(lifted.n, n)]
-            values = np.concatenate([lifted.anchor[None], rows])
-            keyframes = tuple(int(k) for k in n)
-            out.append(PublicPoses(frame.robot, frame.epoch, rank, keyframes, values))
-        return out
+        if self.estimate is None or lifted is None or not len(lifted.carriers):
+            return None
+        rows = lifted.rows[np.searchsorted(lifted.n, lifted.carriers)]
+        values = np.concatenate([lifted.anchor[None], rows])
+        keyframes = tuple(int(n) for n in lifted.carriers)
+        frame, rank = self.estimate.frame, len(lifted.anchor) // 2
+        return PublicPoses(frame.robot, frame.epoch, rank, keyframes, values)

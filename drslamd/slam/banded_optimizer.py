@@ -15,9 +15,9 @@ import numpy as np
 
 from drslamd.config import Config
 from drslamd.conventions import Chain
-from drslamd.gossip.messages import PublicPoses
 from drslamd.slam import banded, graph_edges, team_frame
 from drslamd.slam.estimate import TeamEstimate, Trajectory
+from drslamd.slam.items import PublicPoses
 from drslamd.slam.optimizer import Job
 from drslamd.slam.pose_graph import TeamGraph
 from drslamd.slam.problem import Calibration, Priors, Problem

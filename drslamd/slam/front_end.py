@@ -8,11 +8,11 @@ from functools import partial
 import numpy as np
 
 from drslamd.config import Config
-from drslamd.conventions import GRID_US, SECOND_US, Chain
-from drslamd.gossip.messages import ClosureItem, Keyframe, RangeItem
-from drslamd.gossip.peer import Peer
+from drslamd.conventions import SECOND_US, Chain
 from drslamd.sensors.samples import Motion, RangeSample
 from drslamd.slam import relative_pose
+from drslamd.slam.items import ClosureItem, Keyframe, RangeItem
+from drslamd.slam.neighbour import Neighbour
 from drslamd.slam.odometry import STEPS, DeadReckoning, OdometryNoise
 from drslamd.slam.pair import Checked, Pair
 from drslamd.slam.pair_window import Request, Side, request
@@ -85,13 +85,12 @@ class FrontEnd:
 
     # ---- pairs ----
 
-    def _owns(self, robot: int, peer: Peer) -> bool:
+    def _owns(self, peer: Neighbour) -> bool:
         """Are we the one of the two that makes closures?"""
-        theirs = peer.status is not None and self._own.robot in peer.status.ranged
-        return self._own.robot < robot or not theirs
+        return self._own.robot < peer.chain.robot or not peer.ranges_to_us
 
     def _sides(
-        self, living: dict[int, Peer], graph: TeamGraph, utime: int
+        self, neighbours: list[Neighbour], graph: TeamGraph, utime: int
     ) -> list[tuple[int, Pair, Side, Side]]:
         """Owned pairs for which everything is at hand: ranges, both odometries, one clock."""
         own = graph.chains.get(self._own.robot)
@@ -99,28 +98,28 @@ class FrontEnd:
             return []
         a = Side(self.reckoning.track, own)
         out = []
-        for robot, peer in living.items():
-            ranges = self.ranges.get(peer.status.uwb_id) if peer.status else None
-            items, offset = graph.chains.get(robot), peer.clock.offset(utime)
+        for peer in neighbours:
+            robot, ranges = peer.chain.robot, self.ranges.get(peer.uwb_id)
+            items = graph.chains.get(robot)
             if ranges is None or not ranges.is_fresh(utime, RANGES_FRESH_US):
                 continue
-            if not self._owns(robot, peer) or items is None or items.chain != peer.chain:
+            if not self._owns(peer) or items is None or items.chain != peer.chain:
                 continue
             pair = self.pairs.get(robot)
             if pair is None or pair.peer != peer.chain:
                 pair = self.pairs[robot] = Pair(self._config, peer.chain, ranges)
-            if offset is not None and offset.uncertainty_us <= GRID_US:
-                out.append((robot, pair, a, Side(peer.track, items, offset.us)))
-            else:
+            if peer.ahead_us is None:
                 pair.verdicts["clock of the peer not known well enough"] += 1
+            else:
+                out.append((robot, pair, a, Side(peer.track, items, peer.ahead_us)))
         return out
 
     def module1(
-        self, living: dict[int, Peer], graph: TeamGraph, utime: int
+        self, neighbours: list[Neighbour], graph: TeamGraph, utime: int
     ) -> list[tuple[int, Request, Callable[[], Estimate]]]:
         """The relative poses to be computed now: peer, window, computation."""
         out = []
-        for robot, pair, a, b in self._sides(living, graph, utime):
+        for robot, pair, a, b in self._sides(neighbours, graph, utime):
             window = request(pair.ranges, a, b, self._config.relative_pose)
             if isinstance(window, str):
                 pair.verdicts[window] += 1
@@ -151,9 +150,11 @@ class FrontEnd:
                 out.append((robot, job))
         return out
 
-    def range_items(self, living: dict[int, Peer], graph: TeamGraph, utime: int) -> list[RangeItem]:
+    def range_items(
+        self, neighbours: list[Neighbour], graph: TeamGraph, utime: int
+    ) -> list[RangeItem]:
         """New distances for the graph."""
-        sides = self._sides(living, graph, utime)
+        sides = self._sides(neighbours, graph, utime)
         items = [pair.range_items.next(pair.ranges, a, b, pair.peer) for _, pair, a, b in sides]
         return [item for item in items if item is not None]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
-from drslamd.gossip.messages import PublicPoses
 from drslamd.slam.estimate import TeamEstimate
+from drslamd.slam.items import PublicPoses
 from drslamd.slam.pose_graph import TeamGraph
 from drslamd.slam.team_frame import Group
 

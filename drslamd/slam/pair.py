@@ -15,9 +15,9 @@ import numpy as np
 
 from drslamd.config import Config
 from drslamd.conventions import Chain, Segment
-from drslamd.gossip.messages import ClosureItem
 from drslamd.slam import se2
 from drslamd.slam.consistency import Candidate, PairConsistency
+from drslamd.slam.items import ClosureItem
 from drslamd.slam.odometry import OdometryNoise
 from drslamd.slam.pair_window import RangeItems, Request, at_keyframes
 from drslamd.slam.pose_graph import ChainItems

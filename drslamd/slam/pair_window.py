@@ -12,8 +12,8 @@ import numpy as np
 
 from drslamd.config import RelativePoseSection
 from drslamd.conventions import GRID_US, SECOND_US, Chain
-from drslamd.gossip.messages import RangeItem
 from drslamd.slam import se2
+from drslamd.slam.items import RangeItem
 from drslamd.slam.odometry import Track
 from drslamd.slam.pose_graph import ChainItems
 from drslamd.slam.range_buffer import RangeBuffer

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.conventions import ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain, Segment
-from drslamd.gossip.messages import ClosureItem, GraphEntry
+from drslamd.slam.items import ClosureItem, GraphEntry
 from drslamd.slam.odometry import OdometryNoise, growth
 from drslamd.slam.problem import Index
 from drslamd.slam.se2 import Array

@@ -210,14 +210,14 @@ def _factor(q: Array) -> Array:
 def tangent(x: Array, vectors: Array) -> Array:
     """Project onto the tangent space: rotations may only move across their sphere."""
     z, v = x[0::2], vectors[0::2]
-    out = vectors.copy()
+    out: Array = vectors.copy()
     out[0::2] = v - np.real(np.sum(z.conj() * v, axis=1))[:, None] * z
     return out
 
 
 def retract(x: Array) -> Array:
     """Bring rotations back onto their spheres."""
-    out = x.copy()
+    out: Array = x.copy()
     out[0::2] /= np.linalg.norm(out[0::2], axis=1)[:, None]
     return out
 

@@ -15,10 +15,10 @@ import numpy as np
 
 from drslamd.config import Config
 from drslamd.conventions import Chain
-from drslamd.gossip.messages import PublicPoses
 from drslamd.slam import rbcd, se2
 from drslamd.slam.estimate import Lifted, TeamEstimate, Trajectory
 from drslamd.slam.graph_edges import chain_links, pose_edges
+from drslamd.slam.items import PublicPoses
 from drslamd.slam.optimizer import Job
 from drslamd.slam.pose_graph import ChainItems, TeamGraph
 from drslamd.slam.problem import PoseEdges

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from drslamd.conventions import Segment
-from drslamd.gossip.messages import ClosureItem
 from drslamd.slam import se2
 from drslamd.slam.estimate import TeamEstimate, Trajectory
+from drslamd.slam.items import ClosureItem
 from drslamd.slam.pose_graph import PairItems, TeamGraph
 from drslamd.slam.se2 import Array
 
