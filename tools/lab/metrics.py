@@ -73,21 +73,27 @@ def errors(
     }
 
 
-def team_errors(
-    estimates: Mapping[int, Array], truths: Mapping[int, Array], align: bool
-) -> dict[str, Any]:
-    """``{"robots": {id: errors}, "team": errors}`` of poses (n, 3) per robot."""
-    moved = dict(estimates)
-    if align:
-        robots = sorted(estimates)
+def aligned(
+    estimates: Mapping[int, Array], truths: Mapping[int, Array], frames: Mapping[int, Array]
+) -> dict[int, Array]:
+    """Poses (n, 3) per robot, moved onto the truth by one SE(2) for each frame they are in."""
+    out = {robot: poses.copy() for robot, poses in estimates.items()}
+    for frame in np.unique(np.concatenate(list(frames.values()))):
+        where = {robot: frames[robot] == frame for robot in estimates}
         shift = alignment(
-            np.concatenate([estimates[r][:, :2] for r in robots]),
-            np.concatenate([truths[r][:, :2] for r in robots]),
+            np.concatenate([estimates[r][w][:, :2] for r, w in where.items()]),
+            np.concatenate([truths[r][w][:, :2] for r, w in where.items()]),
         )
-        moved = {r: compose(shift[None], estimates[r]) for r in robots}
+        for robot, inside in where.items():
+            out[robot][inside] = compose(shift[None], estimates[robot][inside])
+    return out
+
+
+def team_errors(estimates: Mapping[int, Array], truths: Mapping[int, Array]) -> dict[str, Any]:
+    """``{"robots": {id: errors}, "team": errors}`` of poses (n, 3) per robot, as they are."""
     return {
-        "robots": {str(r): errors(moved, truths, r) for r in sorted(moved)},
-        "team": errors(moved, truths, None),
+        "robots": {str(r): errors(estimates, truths, r) for r in sorted(estimates)},
+        "team": errors(estimates, truths, None),
     }
 
 

@@ -18,10 +18,11 @@ from lab.recording import Array, Recording
 
 @dataclass(frozen=True)
 class Path:
-    """A trajectory: t (k,) s ascending, poses (k, 3) in the frame of the team."""
+    """A trajectory: t (k,) s ascending, poses (k, 3), frame (k,) robot in whose frame each is."""
 
     t: Array
     poses: Array
+    frame: Array
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ def score(recording: Recording, outcome: Outcome) -> dict[str, Any]:
         "recording": recording.name,
         **_scored(recording, outcome.final),
         "live": _scored(recording, outcome.live),
-        "odometry": metrics.team_errors(dead_reckoning(recording), truth, align=False),
+        "odometry": metrics.team_errors(dead_reckoning(recording), truth),
         "pairs": _pairs(recording, outcome),
         "closures": {"seen": len(closures), "kept": sum(c.kept for c in closures)},
         "bytes_sent": {str(robot): n for robot, n in sorted(outcome.bytes_sent.items())},
@@ -89,23 +90,29 @@ def score(recording: Recording, outcome: Outcome) -> dict[str, Any]:
 
 
 def _scored(recording: Recording, paths: dict[int, Path]) -> dict[str, Any]:
-    """Errors at every true pose for which an estimate exists (or at every estimate, if rarer)."""
-    estimates, truths = {}, {}
+    """Errors at every true pose that an estimate covers, or at every estimate if those are rarer.
+
+    One SE(2) is fitted for all robots together; poses that were published in another frame, before
+    two groups met, are fitted for themselves.
+    """
+    estimates, truths, frames = {}, {}, {}
     for robot, path in paths.items():
         trail = recording.trails[robot]
         if len(path.t) < 2:
             continue
         if len(path.t) < len(trail.t) // 4:
             inside = (path.t >= trail.t[0]) & (path.t <= trail.t[-1])
-            estimates[robot] = path.poses[inside]
+            estimates[robot], frames[robot] = path.poses[inside], path.frame[inside]
             truths[robot] = metrics.at_times(trail.t, trail.truth, path.t[inside])
         else:
             inside = (trail.t >= path.t[0]) & (trail.t <= path.t[-1])
-            estimates[robot] = metrics.at_times(path.t, path.poses, trail.t[inside])
+            when = trail.t[inside]
+            estimates[robot] = metrics.at_times(path.t, path.poses, when)
+            frames[robot] = path.frame[np.searchsorted(path.t, when)]
             truths[robot] = trail.truth[inside]
     if not estimates:
         return {"robots": {}, "team": None}
-    return metrics.team_errors(estimates, truths, align=True)
+    return metrics.team_errors(metrics.aligned(estimates, truths, frames), truths)
 
 
 def _pairs(recording: Recording, outcome: Outcome) -> dict[str, Any]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -22,11 +23,11 @@ BASES: tuple[type, ...] = (KobukiEmulator, RoboteqEmulator, AsciiEmulator)
 
 @dataclass(frozen=True)
 class Chunk:
-    """Bytes that leave a device at time t (s)."""
+    """What a device prints at time t (s); asked only then, because printing changes it."""
 
     t: float
     port: str
-    data: bytes
+    printed: Callable[[], bytes]
 
 
 class Hardware:
@@ -45,14 +46,14 @@ class Hardware:
         moments, first = np.unique(rows[:, 0], return_index=True)
         for t, block in zip(moments.tolist(), np.split(rows, first[1:]), strict=True):
             ranges = [(int(peer), float(metres)) for _, _, peer, metres in block]
-            yield Chunk(t, "uwb", self.uwb.frame(t, ranges))
+            yield Chunk(t, "uwb", partial(self.uwb.frame, t, ranges))
 
     def wheel_chunks(self) -> Iterator[Chunk]:
         """One message for each stamp of the odometry (empty where the base has to be asked)."""
         trail = self._recording.trails[self.robot]
         left, right = wheel_paths(trail, self.base.track_m)
         for t, one, other in zip(trail.t.tolist(), left.tolist(), right.tolist(), strict=True):
-            yield Chunk(t, "wheels", self.base.stream(t, one, other))
+            yield Chunk(t, "wheels", partial(self.base.stream, t, one, other))
 
     def chunks(self) -> list[Chunk]:
         """Everything in the order of time."""

@@ -12,11 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lab.recording import Array, Recording, Trail
-
-
-class BadRecording(Exception):
-    """The file cannot be used; the text says where and why."""
+from lab.recording import Array, BadRecording, Recording, Trail
 
 
 def read(path: Path) -> Recording:

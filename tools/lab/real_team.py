@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import os
 import random
 import socket
@@ -14,7 +13,6 @@ import tty
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
-from typing import Any
 
 import numpy as np
 
@@ -22,11 +20,11 @@ from drslamd.config import GossipSection
 from drslamd.gossip import lc02, messages
 from drslamd.io.multicast import open_group
 from drslamd.io.status_socket import ask
-from lab.outcome import Outcome, Path
+from lab.outcome import Outcome
 from lab.playback import Chunk, Hardware, equip, robot_toml
 from lab.recording import Recording
 from lab.simulator import Clock
-from lab.virtual_team import SETTLE_S, add_answers, skewed_clock
+from lab.virtual_team import SETTLE_S, add_answers, live_path, skewed_clock
 
 START_S = 20.0
 """Longest wait for a daemon to answer; a loaded machine imports numpy slowly."""
@@ -168,7 +166,7 @@ class RealTeam:
             robot: self._robot(device, skewed_clock(rng), extra)
             for robot, device in (hardware or equip(recording)).items()
         }
-        self._live: dict[int, list[tuple[int, Any]]] = {robot: [] for robot in self.robots}
+        self._live: dict[int, list[messages.Pose]] = {robot: [] for robot in self.robots}
 
     def _robot(self, hardware: Hardware, clock: Clock, extra: str) -> RealRobot:
         place = self.folder / str(hardware.robot)
@@ -213,9 +211,7 @@ class RealTeam:
         if messages.kind_of_channel(channel) == "POSE":
             message = messages.decode("POSE", payload)
             if isinstance(message, messages.Pose) and message.state:
-                self._live[int(channel.rpartition("_")[2])].append(
-                    (message.pose_utime, message.pose)
-                )
+                self._live[int(channel.rpartition("_")[2])].append(message)
 
     async def play(self, progress: Callable[[float], None] | None = None) -> None:
         """Play the recording in real time, then let the team settle."""
@@ -242,7 +238,7 @@ class RealTeam:
             wait = self._began + chunk.t - time.monotonic()
             if wait > 0:
                 await asyncio.sleep(wait)
-            ports[chunk.port].write(chunk.data)
+            ports[chunk.port].write(chunk.printed())
 
     def clock(self, robot: RealRobot) -> Clock:
         """From the robot's own clock to seconds of the recording (as us)."""
@@ -257,9 +253,9 @@ class RealTeam:
             clock = self.clock(robot)
             answers = [await ask(robot.socket, q) for q in ("trajectory", "closures", "status")]
             add_answers(out, number, clock, *answers)
-            rows = [[clock.world(utime) / 1e6, *pose] for utime, pose in self._live[number]]
-            table = np.array(rows).reshape(-1, 4)
-            out.live[number] = Path(table[:, 0], table[:, 1:])
+            out.live[number] = live_path([
+                [clock.world(m.pose_utime) / 1e6, *m.pose, m.frame] for m in self._live[number]
+            ])  # fmt: skip
             for name, ms in answers[2]["ms"].items():
                 out.ms[name] += ms["all"]
         return out
@@ -289,7 +285,3 @@ async def run(
     async with RealTeam(recording, hardware, extra, seed) as team:
         await team.play(progress)
         return await team.outcome()
-
-
-if __name__ == "__main__":
-    print(json.dumps({"port": free_port()}))

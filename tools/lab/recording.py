@@ -15,6 +15,10 @@ from numpy.typing import NDArray
 Array = NDArray[Any]
 
 
+class BadRecording(Exception):
+    """The file cannot be used; the text says where and why."""
+
+
 @dataclass(frozen=True)
 class Trail:
     """One robot.

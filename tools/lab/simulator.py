@@ -35,7 +35,7 @@ from drslamd.events import (
 from drslamd.gossip import lc02
 from drslamd.gossip.seal import team_key
 from drslamd.robot import Robot
-from lab.playback import Hardware
+from lab.playback import Chunk, Hardware
 
 
 @dataclass(frozen=True)
@@ -129,22 +129,20 @@ class Simulator:
         self._tick(member)
         return member
 
-    def play(self, member: Member, chunks: Sequence[tuple[float, str, bytes]]) -> None:
-        """Deliver chunks (t in s, port, bytes) to a robot."""
+    def play(self, member: Member, chunks: Sequence[Chunk]) -> None:
+        """Let a robot's devices print."""
         iterator = iter(chunks)
 
         def step() -> None:
             chunk = next(iterator, None)
             if chunk is None or not member.running:
                 return
-            t, port, data = chunk
-            t_us = round(t * 1e6)
 
             def deliver() -> None:
-                self.feed(member, port, data)
+                self.feed(member, chunk.port, chunk.printed())
                 step()
 
-            self.at(t_us, deliver)
+            self.at(round(chunk.t * 1e6), deliver)
 
         step()
 

@@ -41,7 +41,7 @@ def run(
     simulator = Simulator(seed, network)
     for device in (hardware or equip(recording)).values():
         member = simulator.add(robot_config(device, extra), skewed_clock(rng), device)
-        simulator.play(member, [(c.t, c.port, c.data) for c in device.chunks()])
+        simulator.play(member, device.chunks())
     end = recording.duration + SETTLE_S
     for second in range(1, int(end) + 1):
         simulator.run(min(second, end))
@@ -76,7 +76,7 @@ def add_answers(
     own = trajectory["robots"].get(str(robot))
     if own:
         t = np.array([clock.world(u) / 1e6 for u in own["utime"]])
-        out.final[robot] = Path(t, np.array(own["poses"]))
+        out.final[robot] = Path(t, np.array(own["poses"]), np.full(len(t), trajectory["frame"]))
     for c in closures["closures"]:
         out.closures.append(
             Closure(
@@ -101,6 +101,12 @@ def _live(member: Member) -> Path:
         if messages.kind_of_channel(channel) == "POSE":
             message = messages.decode("POSE", payload)
             if isinstance(message, messages.Pose) and message.state:
-                rows.append([member.clock.world(message.pose_utime) / 1e6, *message.pose])
-    table = np.array(rows).reshape(-1, 4)
-    return Path(table[:, 0], table[:, 1:])
+                t = member.clock.world(message.pose_utime) / 1e6
+                rows.append([t, *message.pose, message.frame])
+    return live_path(rows)
+
+
+def live_path(rows: list[list[float]]) -> Path:
+    """Published poses as rows of time, pose and frame."""
+    table = np.array(rows).reshape(-1, 5)
+    return Path(table[:, 0], table[:, 1:4], table[:, 4])

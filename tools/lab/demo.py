@@ -1,0 +1,112 @@
+"""tools/demo: a team of real daemons, from nothing to knowing where everybody is.
+
+Each robot is a process of its own with two pseudo-terminals, on which an emulated LinkTrack module
+and an emulated wheel controller speak their true bytes; the processes gossip over multicast on
+this host only. Exit codes: 0 the team is one group and at most 1.2 times as far off as dead
+reckoning that was given the true start poses, 1 it is not, 2 wrong usage, 66 unusable recording,
+70 a daemon failed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from lab import outcome, picture, real_team, table, world
+from lab.outcome import Outcome
+from lab.playback import equip
+from lab.progress import Progress
+from lab.readers import read
+from lab.recording import BadRecording, Recording
+from lab.virtual_team import SETTLE_S
+
+AT_MOST = 1.2
+NO_INPUT, FAILED = 66, 70
+
+EXAMPLES = """\
+examples:
+  tools/demo                             three robots, 75 s in a room of 10 m x 12 m
+  tools/demo --seed 7 --robots 4         another world
+  tools/demo --dataset run.pyfg          the same with a recording
+  tools/demo --json out/demo.json        the figures for a program
+"""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run it; the exit code."""
+    options = _parser().parse_args(arguments)
+    try:
+        recording = _recording(options)
+    except BadRecording as error:
+        print(error, file=sys.stderr)
+        return NO_INPUT
+    progress = Progress(f"{len(recording.trails)} daemons driving", recording.duration + SETTLE_S)
+    hardware = equip(recording, varied=options.dataset is None)
+    try:
+        result = asyncio.run(real_team.run(recording, hardware, progress=progress))
+    except real_team.TeamFailed as error:
+        print(f"\n{error}", file=sys.stderr)
+        return FAILED
+    progress.end()
+    return _report(recording, result, options)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="tools/demo",
+        description="Start a team of real daemons on emulated hardware and score what they find.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--dataset", type=Path, metavar="FILE", help="play this recording")
+    parser.add_argument("--seed", type=int, default=1, help="of the simulated world (default 1)")
+    parser.add_argument("--robots", type=int, default=3, help="in the simulated world (default 3)")
+    parser.add_argument("--seconds", type=float, default=75.0, help="of driving (default 75)")
+    parser.add_argument("--png", type=Path, default=Path("out/demo.png"), metavar="FILE")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
+    return parser
+
+
+def _recording(options: argparse.Namespace) -> Recording:
+    if options.dataset is not None:
+        return read(options.dataset)
+    return world.simulate(world.Scene(options.robots, options.seconds), options.seed)
+
+
+def _report(recording: Recording, result: Outcome, options: argparse.Namespace) -> int:
+    scores = outcome.score(recording, result)
+    picture.draw(recording, result, options.png)
+    print(f"\n{recording.name}, {recording.duration:.0f} s")
+    print("\n".join(table.lines(scores)))
+    print(f"picture: {options.png}")
+    if options.json:
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        options.json.write_text(json.dumps(scores, indent=1) + "\n")
+    faults = shortcomings(result, scores)
+    for fault in faults:
+        print(f"FAILED: {fault}")
+    return 1 if faults else 0
+
+
+def shortcomings(result: Outcome, scores: dict[str, Any]) -> list[str]:
+    """What was promised and not reached, in sentences."""
+    if not result.is_one_team:
+        frames = dict(sorted(result.frames.items()))
+        return [f"the team is not one group at the end; frame of each robot: {frames}"]
+    faults = []
+    for key, unit in (("ate_rmse_m", "m"), ("rot_mean_deg", "degrees")):
+        found, given = scores["team"][key], scores["odometry"]["team"][key]
+        if found > AT_MOST * given:
+            faults.append(
+                f"off by {found:.3f} {unit}, more than {AT_MOST} times the {given:.3f} {unit} "
+                "of dead reckoning"
+            )
+    return faults
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

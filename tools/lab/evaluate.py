@@ -1,0 +1,78 @@
+"""tools/evaluate: run the team on a recording and write its scores.
+
+Exit codes: 0 done, 2 wrong usage, 66 unusable recording, 70 a daemon failed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import sys
+from pathlib import Path
+
+from lab import outcome, real_team, table, virtual_team
+from lab.outcome import Outcome
+from lab.progress import Progress
+from lab.readers import READERS, read
+from lab.recording import BadRecording, Recording
+from lab.virtual_team import SETTLE_S
+
+NO_INPUT, FAILED = 66, 70
+
+EXAMPLES = """\
+examples:
+  tools/evaluate run.pyfg                         in virtual time, scores as a table
+  tools/evaluate run.pyfg --json scores.json      and as JSON (schema: tools/README.md)
+  tools/evaluate run.pyfg --speed real            real processes, pseudo-terminals, multicast
+  tools/evaluate run.pyfg --config rbcd.toml      with sections added to every robot's TOML
+"""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run it; the exit code."""
+    options = _parser().parse_args(arguments)
+    try:
+        recording = read(options.recording)
+        extra = options.config.read_text() if options.config else ""
+        result = _run(recording, options.speed, extra)
+    except (BadRecording, OSError) as error:
+        print(error, file=sys.stderr)
+        return NO_INPUT
+    except real_team.TeamFailed as error:
+        print(error, file=sys.stderr)
+        return FAILED
+    scores = outcome.score(recording, result)
+    print("\n".join(table.lines(scores)))
+    if options.json:
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        options.json.write_text(json.dumps(scores, indent=1) + "\n")
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="tools/evaluate",
+        description=f"Run the team on a recording ({', '.join(READERS)}) and score it.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("recording", type=Path, metavar="RECORDING")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
+    parser.add_argument("--speed", choices=("real", "virtual"), default="virtual")
+    parser.add_argument("--config", type=Path, metavar="TOML", help="sections for every robot")
+    return parser
+
+
+def _run(recording: Recording, speed: str, extra: str) -> Outcome:
+    progress = Progress(f"{len(recording.trails)} robots", recording.duration + SETTLE_S)
+    if speed == "real":
+        result = asyncio.run(real_team.run(recording, extra=extra, progress=progress))
+    else:
+        result = virtual_team.run(recording, extra=extra, progress=progress)
+    progress.end()
+    return result
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
