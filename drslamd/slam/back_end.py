@@ -31,8 +31,9 @@ class BackEnd:
         self.group: set[Segment] = set()
         self.estimate: TeamEstimate | None = None
         """Of the group that our current segment is in; None while it is in none."""
-        self._news: object = None
         self._inserted = 0
+        self._known: tuple[int, set[int], Mapping[int, PublicPoses]] = (-1, set(), {})
+        """What the last job knew: items inserted, robots that live, public poses of the peers."""
 
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
         self.graph.insert(origin, entry)
@@ -51,15 +52,16 @@ class BackEnd:
     ) -> Job | None:
         """The computation that renews the estimate; None when nothing is new or connected.
 
+        An estimate that has not converged is renewed without any news.
+
         Args:
             present: robots that live.
             shift_us: clock of each robot minus ours, us.
             public: lifted public poses of the peers.
         """
-        news = (self._inserted, present, dict(public))
-        if news == self._news:
+        if not self._is_news(present, public) and (not self.estimate or self.estimate.converged):
             return None
-        self._news = news
+        self._known = (self._inserted, present, dict(public))
         items = self.graph.chains.get(self._own.robot)
         if items is None or not len(items.rows):
             return None
@@ -71,8 +73,16 @@ class BackEnd:
             self.estimate = None
             return None
         same = {r: p for r, p in public.items() if (p.frame, p.frame_epoch) == frame.chain}
-        group = Group(self.group, frame, shift_us)
+        group = Group(self.group, frame, {**shift_us, self._own.robot: 0})
         return self._optimizer.job(self.graph, group, self.estimate, same)
+
+    def _is_news(self, present: set[int], public: Mapping[int, PublicPoses]) -> bool:
+        inserted, lived, heard = self._known
+        return (
+            (inserted, lived, heard.keys()) != (self._inserted, present, public.keys())
+            # poses of the same keyframes compare equal, whatever they are
+            or any(heard[robot] is not poses for robot, poses in public.items())
+        )
 
     def solved(self, result: TeamEstimate) -> None:
         self.estimate = result

@@ -8,7 +8,7 @@ lost message delays the answer and does not change it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -26,6 +26,9 @@ from drslamd.slam.team_frame import Group
 
 YAW_PRIOR_FLOOR = 1e-4
 """rad/m; a prior of zero width would make the system singular."""
+HINT = 10.0**2
+"""Variance, m^2 and rad^2, that closures get here. What they say is said better by the ranges that
+they came from; but where those are missing nothing else holds the group together."""
 
 
 class Banded:
@@ -86,12 +89,16 @@ def stated(
         )
     initial = np.zeros((len(numbers.n), 3))
     for segment, poses in team_frame.placed(graph, group, previous).items():
-        initial[numbers.place[segment.robot][graph.rows_of(segment)]] = poses
+        rows = graph.chains[segment.robot].rows_of(segment.segment)
+        initial[numbers.place[segment.robot][rows]] = poses
     first = graph.segment_rows(group.frame)[0, 0]
     gauge = int(numbers.of(graph.chains[group.frame.robot], np.array([first]))[0])
+    closures = graph_edges.closures(graph, numbers)
+    hints = replace(closures, covariance=closures.covariance + HINT * np.eye(3))
     problem = Problem(
-        numbers.robot, numbers.n, initial, gauge,
-        graph_edges.links(graph, numbers, robots), graph_edges.pose_edges([]), ranges, priors,
+        numbers.robot, numbers.n, initial, gauge, graph_edges.links(graph, numbers, robots),
+        hints.chosen(graph_edges.sensible(hints.i, hints.j)),
+        ranges.chosen(graph_edges.sensible(ranges.i, ranges.j)), priors,
     )  # fmt: skip
     return Stated(problem, start, [items.chain for items in chains], pairs)
 

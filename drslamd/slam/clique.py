@@ -90,3 +90,7 @@ class IncrementalClique:
         """Forget vertices 0 .. count - 1; the others move down."""
         self.adjacency = [mask >> count for mask in self.adjacency[count:]]
         self.clique >>= count
+        # what is left of the largest may have become the smaller one
+        rival = self.runner_up()
+        if rival.bit_count() > self.clique.bit_count():
+            self.clique = rival

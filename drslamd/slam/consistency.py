@@ -112,14 +112,22 @@ class PairConsistency:
 
     def distances(self, k: int) -> Array:
         """(k,) squared Mahalanobis length of the loops of candidate k with all before it."""
+        return self._lengths(np.full(k, k), np.arange(k))
+
+    def _lengths(self, k: Array, i: Array) -> Array:
+        """(m,) squared Mahalanobis lengths of the loops of candidates k with i, each i before k."""
         c = self._columns
-        loop = se2.log(se2.compose(c.offset[k], se2.inverse(c.offset[:k])))
-        index = np.arange(k)
-        moved_a = covariance_between(self.noise_a, c.a_pose, c.a_sums, index, k)
-        moved_b = covariance_between(self.noise_b, c.b_pose, c.b_sums, index, k)
+        loop = se2.log(se2.compose(c.offset[k], se2.inverse(c.offset[i])))
+        moved_a = covariance_between(self.noise_a, c.a_pose, c.a_sums, i, k)
+        moved_b = covariance_between(self.noise_b, c.b_pose, c.b_sums, i, k)
         carry = se2.adjoint(c.offset[k])
-        total = c.covariance[:k] + c.covariance[k] + moved_a + carry @ moved_b @ carry.T
-        return squared_length(loop, total)
+        carried_b = carry @ moved_b @ np.swapaxes(carry, -1, -2)
+        return squared_length(loop, c.covariance[i] + c.covariance[k] + moved_a + carried_b)
+
+    def renew_sums(self, vertices: Array, a_sums: Array, b_sums: Array) -> None:
+        """What `odometry.growth` says now of the ends of some candidates: keyframes that came
+        late make the way to those behind them longer."""
+        self._columns.a_sums[vertices], self._columns.b_sums[vertices] = a_sums, b_sums
 
     def kept(self) -> list[int]:
         """Closures of the largest consistent set, as the numbers that they were given."""
@@ -133,13 +141,19 @@ class PairConsistency:
         return self.graph.runner_up().bit_count()
 
     def why_not(self, vertex: int) -> tuple[int, float] | None:
-        """The kept closure that candidate `vertex` disagrees with most, and its squared length."""
-        others = [v for v in bits(self.graph.clique) if v != vertex]
-        if not others or vertex in bits(self.graph.clique):
+        """The kept closure that candidate `vertex` disagrees with most, and its squared length.
+
+        None when it is kept itself. Hypotheses of its own window are no reason: those exclude
+        each other whatever their distance.
+        """
+        closure = self._columns.closure
+        kept = np.array(bits(self.graph.clique), dtype=np.int64)
+        others = kept[closure[kept] != closure[vertex]]
+        if vertex in kept or not len(others):
             return None
-        lengths = [float(self.distances(max(v, vertex))[min(v, vertex)]) for v in others]
+        lengths = self._lengths(np.maximum(others, vertex), np.minimum(others, vertex))
         worst = int(np.argmax(lengths))
-        return int(self._columns.closure[others[worst]]), lengths[worst]
+        return int(closure[others[worst]]), float(lengths[worst])
 
     def _forget(self) -> None:
         keep = MAX_VERTICES - FORGET
@@ -150,15 +164,20 @@ class PairConsistency:
 
 
 def squared_length(error: Array, covariance: Array) -> Array:
-    """error' covariance^-1 error for (n, 3) and (n, 3, 3), by elimination."""
+    """error' covariance^-1 error for (n, 3) and (n, 3, 3), by elimination.
+
+    Infinite where the covariance is none, as sums over an absurd trajectory may make it.
+    """
     c = covariance
     e0, e1, e2 = error[:, 0], error[:, 1], error[:, 2]
-    d0 = c[:, 0, 0]
-    l10, l20 = c[:, 1, 0] / d0, c[:, 2, 0] / d0
-    d1 = c[:, 1, 1] - l10 * c[:, 1, 0]
-    c21 = c[:, 2, 1] - l20 * c[:, 1, 0]
-    l21 = c21 / d1
-    d2 = c[:, 2, 2] - l20 * c[:, 2, 0] - l21 * c21
-    y1 = e1 - l10 * e0
-    y2 = e2 - l20 * e0 - l21 * y1
-    return np.asarray(e0 * e0 / d0 + y1 * y1 / d1 + y2 * y2 / d2)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        d0 = c[:, 0, 0]
+        l10, l20 = c[:, 1, 0] / d0, c[:, 2, 0] / d0
+        d1 = c[:, 1, 1] - l10 * c[:, 1, 0]
+        c21 = c[:, 2, 1] - l20 * c[:, 1, 0]
+        l21 = c21 / d1
+        d2 = c[:, 2, 2] - l20 * c[:, 2, 0] - l21 * c21
+        y1 = e1 - l10 * e0
+        y2 = e2 - l20 * e0 - l21 * y1
+        length = e0 * e0 / d0 + y1 * y1 / d1 + y2 * y2 / d2
+    return np.where((d0 > 0) & (d1 > 0) & (d2 > 0), length, np.inf)

@@ -46,12 +46,19 @@ class FrontEnd:
         self.reckoning.add(motion)
 
     def on_range(self, sample: RangeSample) -> None:
-        buffer = self.ranges.get(sample.peer_uwb_id)
-        if buffer is None:
-            if len(self.ranges) >= MAX_UWB_IDS:
+        if sample.peer_uwb_id not in self.ranges:
+            if len(self.ranges) >= MAX_UWB_IDS and not self._forget_silent(sample.utime):
                 return
-            buffer = self.ranges[sample.peer_uwb_id] = RangeBuffer()
-        buffer.add(sample.utime, sample.range_m)
+            self.ranges[sample.peer_uwb_id] = RangeBuffer()
+        self.ranges[sample.peer_uwb_id].add(sample.utime, sample.range_m)
+
+    def _forget_silent(self, utime: int) -> bool:
+        """Make room: forget the module that was silent longest, unless all are heard."""
+        oldest = min(self.ranges, key=lambda uwb_id: self.ranges[uwb_id].newest or 0)
+        if self.ranges[oldest].is_fresh(utime, RANGES_FRESH_US):
+            return False
+        del self.ranges[oldest]
+        return True
 
     def ranged(self, utime: int) -> list[int]:
         """UWB ids to which ranges came in of late."""
@@ -91,7 +98,7 @@ class FrontEnd:
 
     def _sides(
         self, neighbours: list[Neighbour], graph: TeamGraph, utime: int
-    ) -> list[tuple[int, Pair, Side, Side]]:
+    ) -> list[tuple[Pair, Side, Side]]:
         """Owned pairs for which everything is at hand: ranges, both odometries, one clock."""
         own = graph.chains.get(self._own.robot)
         if own is None:
@@ -108,23 +115,24 @@ class FrontEnd:
             pair = self.pairs.get(robot)
             if pair is None or pair.peer != peer.chain:
                 pair = self.pairs[robot] = Pair(self._config, peer.chain, ranges)
+            pair.ranges = ranges
             if peer.ahead_us is None:
-                pair.verdicts["clock of the peer not known well enough"] += 1
+                pair.count("clock of the peer not known well enough")
             else:
-                out.append((robot, pair, a, Side(peer.track, items, peer.ahead_us)))
+                out.append((pair, a, Side(peer.track, items, peer.ahead_us)))
         return out
 
     def module1(
         self, neighbours: list[Neighbour], graph: TeamGraph, utime: int
-    ) -> list[tuple[int, Request, Callable[[], Estimate]]]:
-        """The relative poses to be computed now: peer, window, computation."""
+    ) -> list[tuple[Pair, Request, Callable[[], Estimate]]]:
+        """The relative poses to be computed now: pair, window, computation."""
         out = []
-        for robot, pair, a, b in self._sides(neighbours, graph, utime):
+        for pair, a, b in self._sides(neighbours, graph, utime):
             window = request(pair.ranges, a, b, self._config.relative_pose)
             if isinstance(window, str):
-                pair.verdicts[window] += 1
+                pair.count(window)
             else:
-                out.append((robot, window, self._computation(window, b.items.noise)))
+                out.append((pair, window, self._computation(window, b.items.noise)))
         return out
 
     def _computation(self, what: Request, peer_noise: OdometryNoise) -> Callable[[], Estimate]:
@@ -137,8 +145,8 @@ class FrontEnd:
         noise = relative_pose.Noise(ranges, self.noise, peer_noise)
         return partial(relative_pose.solve, what.window, noise, section.delta)
 
-    def module2(self, graph: TeamGraph) -> list[tuple[int, Callable[[], Checked]]]:
-        """The consistency checks to be computed now: peer, computation."""
+    def module2(self, graph: TeamGraph) -> list[tuple[Pair, Callable[[], Checked]]]:
+        """The consistency checks to be computed now: pair, computation."""
         out = []
         own = graph.chains.get(self._own.robot)
         for robot, pair in self.pairs.items():
@@ -147,7 +155,7 @@ class FrontEnd:
                 continue
             job = pair.check(own, items, self.noise)
             if job is not None:
-                out.append((robot, job))
+                out.append((pair, job))
         return out
 
     def range_items(
@@ -155,7 +163,7 @@ class FrontEnd:
     ) -> list[RangeItem]:
         """New distances for the graph."""
         sides = self._sides(neighbours, graph, utime)
-        items = [pair.range_items.next(pair.ranges, a, b, pair.peer) for _, pair, a, b in sides]
+        items = [pair.range_items.next(pair.ranges, a, b, pair.peer) for pair, a, b in sides]
         return [item for item in items if item is not None]
 
     def closure_items(self) -> list[ClosureItem]:

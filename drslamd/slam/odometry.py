@@ -22,7 +22,6 @@ from drslamd.conventions import (
     grid_utime,
 )
 from drslamd.sensors.samples import Motion
-from drslamd.slam import se2
 from drslamd.slam.se2 import Array
 
 STEPS = np.array([TRANSLATION_STEP_M, TRANSLATION_STEP_M, ROTATION_STEP_RAD])
@@ -41,6 +40,13 @@ class OdometryNoise:
     yaw_rad_per_m: float
     translation_per_sqrt_m: float
     yaw_rad_per_sqrt_m: float
+
+    def is_plausible(self) -> bool:
+        """Could a configuration say this? (A thousandth is left for rounding on the way.)"""
+        most = (0.5, math.radians(20), 1.0, math.radians(20))
+        sigmas = (self.scale, self.yaw_rad_per_m,
+                  self.translation_per_sqrt_m, self.yaw_rad_per_sqrt_m)  # fmt: skip
+        return all(0 < value <= 1.001 * limit for value, limit in zip(sigmas, most, strict=True))
 
     @staticmethod
     def from_config(section: OdometrySection) -> OdometryNoise:
@@ -90,10 +96,11 @@ class Track:
 
     def at_time(self, n: Array) -> Array:
         """o_T_a at fractional samples n (k,), linear between neighbours, (k, 3)."""
-        whole = np.clip(np.floor(n).astype(int), self.n0, self.end - 2)
-        left = self._poses[whole - self.n0]
-        right = self._poses[whole + 1 - self.n0]
-        return np.asarray((left + (right - left) * (n - whole)[:, None]) * STEPS)
+        n = np.clip(n, self.n0, self.end - 1)
+        left = np.floor(n).astype(int)
+        right = np.minimum(left + 1, self.end - 1)
+        before, after = self._poses[left - self.n0], self._poses[right - self.n0]
+        return np.asarray((before + (after - before) * (n - left)[:, None]) * STEPS)
 
     def append(self, n: int, steps: Array) -> None:
         """Add sample n; what lies between it and the last one is a hole.
@@ -133,37 +140,37 @@ class DeadReckoning:
 
     def __init__(self) -> None:
         self.track = Track(OWN_TRACK_SAMPLES)
+        self.path_m = 0.0
         self._utime: int | None = None
         self._pose = np.zeros(3)
-        self.path_m = 0.0
+        self._not_before = 0
 
     def add(self, motion: Motion) -> None:
         """Take one motion; motions must come in the order of their time."""
-        previous_utime, previous = self._utime, self._pose
-        if previous_utime is not None and motion.utime <= previous_utime:
+        since, before = self._utime, self._pose
+        if since is not None and motion.utime <= since:
             return
         turn, distance = motion.turn_rad, motion.distance_m
         # the chord of the arc that both wheels drew, seen from half the turn
         chord = distance * float(np.sinc(turn / (2 * np.pi)))
-        middle = previous[2] + turn / 2
-        step = [chord * math.cos(middle), chord * math.sin(middle), turn]
-        self._pose = previous + step
+        middle = before[2] + turn / 2
+        self._pose = before + [chord * math.cos(middle), chord * math.sin(middle), turn]
         self._utime = motion.utime
         self.path_m += abs(distance)
-        first = grid_index(motion.utime)
-        if previous_utime is not None and not motion.gap:
-            first = grid_index(previous_utime) + 1
-        for n in range(first, grid_index(motion.utime) + 1):
-            if previous_utime is None or motion.gap:
-                share = 1.0
-            else:
-                share = (grid_utime(n) - previous_utime) / (motion.utime - previous_utime)
-            if n >= self.track.end or not len(self.track):
-                self.track.append(n, np.round((previous + share * (self._pose - previous)) / STEPS))
+        if since is None or motion.gap:
+            # nothing is known of the time before; one sample at least stays empty, however short
+            # the silence was, because the way across it is lost
+            self._not_before = self.track.end + 1 if len(self.track) else grid_index(motion.utime)
+            since = motion.utime - 1
+        self._sample(since, before)
 
-    def segment_breaks(self) -> bool:
-        """Has the track a hole since its start?"""
-        return self.track.segment_start > self.track.n0
+    def _sample(self, since: int, before: Array) -> None:
+        """Put on the track what lies on the grid after `since`, where we were at `before`."""
+        assert self._utime is not None
+        step = self._pose - before
+        for n in range(max(grid_index(since) + 1, self._not_before), grid_index(self._utime) + 1):
+            share = (grid_utime(n) - since) / (self._utime - since)
+            self.track.append(n, np.round((before + share * step) / STEPS))
 
 
 # ---- how the uncertainty of a track grows ------------------------------------------------------
@@ -178,11 +185,16 @@ def growth(poses: Array) -> Array:
     Returns:
         (k, 6): path length s, then the integrals over s of y, -x, y*y, -x*y and x*x.
     """
-    step = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-    middle = (poses[1:, :2] + poses[:-1, :2]) / 2
-    x, y = middle[:, 0], middle[:, 1]
-    terms = np.stack([np.ones_like(x), y, -x, y * y, -x * y, x * x], axis=-1) * step[:, None]
+    place = poses[:, :2]
+    terms = _integrals(np.diff(place, axis=0), (place[1:] + place[:-1]) / 2)
     return np.concatenate([np.zeros((1, 6)), np.cumsum(terms, axis=0)])
+
+
+def _integrals(way: Array, middle: Array) -> Array:
+    """(m, 6) the terms of `growth` over straight steps `way` (m, 2) about `middle` (m, 2)."""
+    x, y = middle[:, 0], middle[:, 1]
+    length = np.hypot(way[:, 0], way[:, 1])
+    return np.stack([np.ones_like(x), y, -x, y * y, -x * y, x * x], axis=-1) * length[:, None]
 
 
 def covariance_between(
@@ -202,9 +214,23 @@ def covariance_between(
     Returns:
         (..., 3, 3).
     """
-    d = sums[k] - sums[i]
-    d = d * np.where(d[..., :1] < 0, -1.0, 1.0)
-    s, y, x_neg, yy, xy_neg, xx = np.moveaxis(d, -1, 0)
+    way, sum_ = poses[k, :2] - poses[i, :2], sums[k] - sums[i]
+    # the noise between two places is the same in both directions
+    return _twist_covariance(noise, way, sum_ * np.where(sum_[..., :1] < 0, -1.0, 1.0))
+
+
+def link_covariance(noise: OdometryNoise, i_T_j: Array) -> Array:
+    """The same for straight links (m, 3) by themselves, in their frames i: (m, 3, 3).
+
+    Sums over a whole trajectory would lose the last digits of a short link far from the origin.
+    """
+    way = i_T_j[:, :2]
+    return _twist_covariance(noise, way, _integrals(way, way / 2))
+
+
+def _twist_covariance(noise: OdometryNoise, way: Array, sums: Array) -> Array:
+    """(..., 3, 3) for ways (..., 2) with the differences (..., 6) of `growth` along them."""
+    s, y, x_neg, yy, xy_neg, xx = np.moveaxis(sums, -1, 0)
     turn = noise.yaw_rad_per_sqrt_m**2
     shift = noise.translation_per_sqrt_m**2
     rows = [
@@ -213,14 +239,10 @@ def covariance_between(
         [turn * y, turn * x_neg, turn * s],
     ]
     random = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-    way = (poses[k] - poses[i]) * [1.0, 1.0, 0.0] * noise.scale
+    stretch = np.concatenate([way, np.zeros_like(way[..., :1])], axis=-1) * noise.scale
     bend = np.stack([y, x_neg, s], axis=-1) * noise.yaw_rad_per_m
     return np.asarray(
-        random + way[..., :, None] * way[..., None, :] + bend[..., :, None] * bend[..., None, :]
+        random
+        + stretch[..., :, None] * stretch[..., None, :]
+        + bend[..., :, None] * bend[..., None, :]
     )
-
-
-def turned_back(o_T_a: Array, covariance: Array) -> Array:
-    """A covariance of left twists in o, as left twists of the body at o_T_a."""
-    a = se2.adjoint(se2.inverse(o_T_a))
-    return np.asarray(a @ covariance @ np.swapaxes(a, -1, -2))

@@ -23,6 +23,7 @@ from drslamd.slam.pair_window import RangeItems, Request, at_keyframes
 from drslamd.slam.pose_graph import ChainItems
 from drslamd.slam.range_buffer import RangeBuffer
 from drslamd.slam.relative_pose import Estimate
+from drslamd.slam.se2 import Array
 
 AGREEING = 5
 """Closures that must agree before the pair counts as connected."""
@@ -34,6 +35,8 @@ HISTORY = 2_000
 """Answers of module 1 that can be asked for: half an hour at one a second, 1 MB."""
 TELL_EVERY = 100
 """Grid samples between closures that are sent when the graph's edges are the ranges."""
+SHRINK = 1e-4
+"""Of correlations, before rounding: far above a rounding of 6e-8, far below what anyone knows."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,13 @@ class Checked:
     consistency: PairConsistency
     items: list[ClosureItem]
 
+    def renew_sums(self, own: ChainItems, peer: ChainItems) -> None:
+        """Keyframes that came late may lie between those of the candidates."""
+        a, a_there = own.find(np.array([item.a_n for item in self.items]))
+        b, b_there = peer.find(np.array([item.b_n for item in self.items]))
+        both = a_there & b_there
+        self.consistency.renew_sums(np.flatnonzero(both), own.sums[a[both]], peer.sums[b[both]])
+
 
 class Pair:
     """The state of one owned pair."""
@@ -63,6 +73,7 @@ class Pair:
         self.ranges = ranges
         self.range_items = RangeItems(config.relative_pose.range_sigma_m)
         self.verdicts: Counter[str] = Counter()
+        self.last_verdict = ""
         self.history: deque[Answer] = deque(maxlen=HISTORY)
         self.closures_seen = 0
         self.established = False
@@ -73,9 +84,14 @@ class Pair:
         self._said: dict[int, ClosureItem] = {}
         self._number = 0
 
+    def count(self, verdict: str) -> None:
+        """Remember what became of a window."""
+        self.verdicts[verdict] += 1
+        self.last_verdict = verdict
+
     def estimated(self, request: Request, estimate: Estimate) -> None:
         """Module 1 has answered."""
-        self.verdicts[estimate.verdict.value] += 1
+        self.count(estimate.verdict.value)
         self.history.append(Answer(self._number, request.utime, estimate))
         if estimate.hypotheses:
             self.closures_seen += 1
@@ -105,6 +121,8 @@ class Pair:
         if checked is None:
             epsilon = self._config.consistency.epsilon
             checked = Checked(self._segments, PairConsistency(noise, peer.noise, epsilon), [])
+        else:
+            checked.renew_sums(own, peer)
         self._busy, self.checked = True, None
         return partial(extended, checked, work)
 
@@ -125,7 +143,7 @@ class Pair:
             x, y, theta = pose.tolist()
             item = ClosureItem(
                 number, True, request.a.n, self.peer, request.b.n,
-                (x, y, theta), se2.packed(covariance),
+                (x, y, theta), se2.packed(sendable(covariance)),
             )  # fmt: skip
             out.append((Candidate(number, pose, covariance, *ends), item))
         return out
@@ -138,8 +156,8 @@ class Pair:
         if self._config.relative_pose.algorithm == "paper":
             self.established = kept >= 2
         elif not self.established or kept < AGREEING:
-            rivals = checked.consistency.rivals()
-            self.established = kept >= AGREEING and kept >= OUTNUMBER * rivals
+            # the rivals are searched last: that takes a while
+            self.established = kept >= AGREEING and kept >= OUTNUMBER * checked.consistency.rivals()
 
     def kept(self) -> list[ClosureItem]:
         """Closures of the consistent set."""
@@ -163,20 +181,29 @@ class Pair:
             for number, item in self._said.items()
             if number >= remembered and kept.get(number) != item
         ]
-        newest = max((said.a_n for said in self._said.values()), default=-TELL_EVERY)
+        recent = max((said.a_n for said in self._said.values()), default=-TELL_EVERY)
         withdrawn = {item.number for item in gone}
         self._said = {
             number: item
             for number, item in self._said.items()
-            if number not in withdrawn and (number >= remembered or item.a_n == newest)
+            if number not in withdrawn and (number >= remembered or item.a_n == recent)
         }
         new: list[ClosureItem] = []
+        recent = max((said.a_n for said in self._said.values()), default=-TELL_EVERY)
         for number, item in kept.items():
-            recent = max((said.a_n for said in self._said.values()), default=-TELL_EVERY)
             if number not in self._said and (every or item.a_n - recent >= TELL_EVERY):
                 new.append(item)
                 self._said[number] = item
+                recent = max(recent, item.a_n)
         return gone + new
+
+
+def sendable(covariance: Array) -> Array:
+    """A covariance that is still one when its six numbers are rounded to 32 bits.
+
+    Directions that a window hardly fixes beside others that it fixes well would make it singular.
+    """
+    return np.asarray(covariance * (1 - SHRINK) + np.diag(np.diag(covariance)) * SHRINK)
 
 
 def extended(checked: Checked, work: list[tuple[Candidate, ClosureItem]]) -> Checked:

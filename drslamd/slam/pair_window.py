@@ -23,6 +23,11 @@ from drslamd.slam.window import Window, binned
 NEAR_US = 1_500_000
 """A keyframe stands for times so near; farther, only while its robot stands still."""
 STILL_M, STILL_RAD = 0.05, 0.05
+MAX_LEVER_M = 25.0
+"""A body farther from its keyframe than any robot gets in `NEAR_US` follows absurd odometry; with
+an antenna at the rim of a large robot it still fits the 16 bits of millimetres of a message."""
+MIN_SIGMA_M = 1e-3
+"""The resolution in which the sigma of a range is sent."""
 POINTS = 60
 """Measurements of one window after binning; more would only repeat the slow range bias."""
 FEWEST = 6
@@ -119,7 +124,7 @@ def anchored(side: Side, utime: int) -> Anchored | None:
     near = abs(rows[at, 0] - n) * GRID_US <= NEAR_US
     still = np.hypot(step[0], step[1]) < STILL_M and abs(step[2]) < STILL_RAD
     unbroken = rows[at, 0] >= side.track.segment_start and np.isfinite(step).all()
-    if not unbroken or not (near or still):
+    if not unbroken or not (near or still) or np.hypot(step[0], step[1]) > MAX_LEVER_M:
         return None
     return Anchored(int(rows[at, 0]), int(rows[at, 1]), step)
 
@@ -139,7 +144,7 @@ class RangeItems:
     """Distances for the graph: the median of each second, if somebody moved since the last."""
 
     def __init__(self, sigma_m: float) -> None:
-        self._sigma_m = sigma_m
+        self._sigma_m = max(sigma_m, MIN_SIGMA_M)
         self._utime = 0
         self._place: Array | None = None
 

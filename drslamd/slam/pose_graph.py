@@ -3,6 +3,9 @@
 Items are keyed by who made them and when, so inserting is idempotent and the order of arrival does
 not matter. An item may name a keyframe that has not arrived yet; it waits and counts once both
 ends are there. A robot that starts again begins a new chain and its old one is forgotten.
+
+Items come from other robots, so nothing is believed that would harm what is made of them: a robot
+may send nonsense, and then only its own trajectory is nonsense.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.conventions import ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain, Segment
-from drslamd.slam.items import ClosureItem, GraphEntry
+from drslamd.slam.items import ClosureItem, GraphEntry, Keyframe, RangeItem
 from drslamd.slam.odometry import OdometryNoise, growth
 from drslamd.slam.problem import Index
 from drslamd.slam.se2 import Array
@@ -26,67 +29,107 @@ MAX_RANGES = 20_000
 MAX_CLOSURES = 4_000
 """Of one pair."""
 
+WAITING = 1_024
+"""Rows that came in and are not yet sorted into their table."""
+PER_ENTRY = 4_096
+"""Above the number of ranges that any one entry of a log can hold."""
+
+FARTHEST_M = 10_000.0
+"""No radio of this kind reaches so far."""
+CLOSURE_SIGMAS = (1e-4, 300.0)
+"""m and rad; a better or a worse closure than this was not measured."""
+ANTENNA_M = 5.001
+"""As the configuration has it, and a millimetre for rounding."""
+
 DEFAULT_NOISE = OdometryNoise(0.03, 0.0026, 0.01, 0.0087)
 """Until a robot has said how good its odometry is (config defaults)."""
 
 
 class Rows:
-    """Rows of one width in one growing array, the oldest dropped beyond `most`."""
+    """Rows in the order of their first column, each value of it once, the last `most` of them."""
 
     def __init__(self, width: int, most: int) -> None:
-        self._data = np.empty((64, width))
-        self._count = 0
+        self._sorted = np.empty((0, width))
+        self._new: list[list[float]] = []
         self._most = most
+
+    def add(self, row: list[float]) -> None:
+        self._new.append(row)
+        if len(self._new) >= WAITING:
+            self._merge()
 
     @property
     def data(self) -> Array:
-        return self._data[: self._count]
+        """(k, width); the same array until something was added."""
+        if self._new:
+            self._merge()
+        return self._sorted
 
-    def append(self, row: Array | list[float]) -> None:
-        if self._count == len(self._data):
-            keep = self._data[max(0, self._count - self._most + self._most // 8) :]
-            if len(keep) == self._count:
-                keep = self._data
-            self._data = np.empty((2 * len(keep), self._data.shape[1]))
-            self._count = len(keep)
-            self._data[: self._count] = keep
-        self._data[self._count] = row
-        self._count += 1
+    def _merge(self) -> None:
+        rows = np.concatenate([self._sorted, np.array(self._new)])
+        self._new = []
+        if (np.diff(rows[:, 0]) <= 0).any():
+            # of rows with one key the smallest counts, whichever came first
+            rows = rows[np.lexsort(rows.T[::-1])]
+            rows = rows[np.unique(rows[:, 0], return_index=True)[1]]
+        self._sorted = rows[-self._most :]
 
 
-@dataclass
 class ChainItems:
-    """Keyframes of one chain in the order of n, columns n, segment, x, y, theta (m, rad)."""
+    """Keyframes of one chain, and what its robot says of its own sensors.
 
-    chain: Chain
-    noise: OdometryNoise = DEFAULT_NOISE
-    antenna: Array = field(default_factory=lambda: np.zeros(2))
-    """(2,) in the body frame, m."""
-    _rows: Array = field(default_factory=lambda: np.empty((0, 5)))
-    _sums: Array = field(default_factory=lambda: np.empty((0, 6)))
-    _new: list[list[float]] = field(default_factory=list)
+    Attributes:
+        noise: of its odometry.
+        antenna: (2,) in the body frame, m.
+    """
 
-    def add(self, n: int, segment: int, x: int, y: int, theta: int) -> None:
-        self._new.append(
-            [n, segment, x * TRANSLATION_STEP_M, y * TRANSLATION_STEP_M, theta * ROTATION_STEP_RAD]
-        )
+    def __init__(self, chain: Chain) -> None:
+        self.chain = chain
+        self.noise = DEFAULT_NOISE
+        self.antenna: Array = np.zeros(2)
+        self._traits_seq = -1
+        self._table = Rows(5, MAX_KEYFRAMES)
+        self._rows = self._table.data
+        self._sums = np.empty((0, 6))
+        self._source = self._rows
+
+    def add(self, k: Keyframe) -> None:
+        metres, radians = TRANSLATION_STEP_M, ROTATION_STEP_RAD
+        self._table.add([k.n, k.segment, k.x * metres, k.y * metres, k.theta * radians])
+
+    def take_traits(self, seq: int, traits: tuple[float, ...]) -> None:
+        """The sigmas of `OdometryNoise` and the antenna's place; the latest entry counts."""
+        noise = OdometryNoise(*traits[:4])
+        near = all(abs(value) <= ANTENNA_M for value in traits[4:])
+        if seq > self._traits_seq and noise.is_plausible() and near:
+            self._traits_seq, self.noise, self.antenna = seq, noise, np.array(traits[4:])
 
     @property
     def rows(self) -> Array:
-        if self._new:
-            rows = np.concatenate([self._rows, np.array(self._new)])
-            _, first = np.unique(rows[:, 0], return_index=True)
-            rows = rows[first]
-            # what came late shifts the sums of the rows behind it by a fraction of a link
-            base = self._sums[0] if len(self._sums) and rows[0, 0] == self._rows[0, 0] else 0.0
-            self._sums = (growth(rows[:, 2:]) + base)[-MAX_KEYFRAMES:]
-            self._rows, self._new = rows[-MAX_KEYFRAMES:], []
+        """(k, 5) in the order of n; columns n, segment, x, y, theta (m, rad)."""
+        table = self._table.data
+        if table is not self._source:
+            self._renew(table)
         return self._rows
+
+    def _renew(self, table: Array) -> None:
+        rows, known = table.copy(), self._rows
+        # a segment never comes back, so each is one block of rows whatever its robot says
+        rows[:, 1] = np.maximum.accumulate(rows[:, 1])
+        sums = growth(rows[:, 2:])
+        if len(known):
+            # what came late in front of the known rows, or was dropped there, moves no sum
+            at, there = _found(rows[:, 0], known[:, 0])
+            if there.any():
+                first = int(np.argmax(there))
+                sums += self._sums[first] - sums[at[first]]
+        self._rows, self._sums, self._source = rows, sums, table
 
     @property
     def sums(self) -> Array:
         """(k, 6) `odometry.growth` along the chain; only differences within a segment count."""
-        return self._sums[: len(self.rows)]
+        rows = self.rows  # renews the sums
+        return self._sums[: len(rows)]
 
     @property
     def n(self) -> Index:
@@ -98,16 +141,17 @@ class ChainItems:
 
     def find(self, n: Array) -> tuple[Index, NDArray[np.bool_]]:
         """Positions of keyframes n (k,), and which of them are there."""
-        own = self.rows[:, 0]
-        at = np.minimum(np.searchsorted(own, n), max(len(own) - 1, 0))
-        return at, (own[at] == n if len(own) else np.zeros(len(n), bool))
+        return _found(self.rows[:, 0], n)
 
-    def segments(self) -> dict[int, tuple[int, int]]:
-        """Rows first .. last of each segment."""
-        numbers, first, count = np.unique(self.rows[:, 1], return_index=True, return_counts=True)
-        return {
-            int(s): (int(f), int(f + c - 1)) for s, f, c in zip(numbers, first, count, strict=True)
-        }
+    def rows_of(self, segment: int) -> slice:
+        """Which rows a segment is; empty when it is not there."""
+        return slice(*np.searchsorted(self.rows[:, 1], [segment, segment + 1]).tolist())
+
+
+def _found(ascending: Array, wanted: Array) -> tuple[Index, NDArray[np.bool_]]:
+    at = np.minimum(np.searchsorted(ascending, wanted), max(len(ascending) - 1, 0))
+    there = ascending[at] == wanted if len(ascending) else np.zeros(len(wanted), bool)
+    return at, there
 
 
 @dataclass
@@ -116,13 +160,38 @@ class PairItems:
 
     a: Chain
     b: Chain
-    ranges: Rows = field(default_factory=lambda: Rows(8, MAX_RANGES))
-    """a_n b_n qa_x qa_y qb_x qb_y range sigma"""
     closures: dict[int, tuple[int, ClosureItem]] = field(default_factory=dict)
     """By number: (seq of the log entry that said so, closure)."""
+    _ranges: Rows = field(default_factory=lambda: Rows(9, MAX_RANGES))
+
+    def add_range(self, seq: int, place: int, r: RangeItem) -> None:
+        """A range at some place in the log of its owner."""
+        if abs(r.range_m) < FARTHEST_M and r.sigma_m > 0:
+            key = seq * PER_ENTRY + place
+            self._ranges.add([key, r.a_n, r.b_n, *r.q_a, *r.q_b, r.range_m, r.sigma_m])
+
+    def add_closure(self, seq: int, c: ClosureItem) -> None:
+        """A closure, or its withdrawal; of one number the latest word counts."""
+        if self.closures.get(c.number, (-1, c))[0] <= seq and _believable(c):
+            self.closures[c.number] = (seq, c)
+            while len(self.closures) > MAX_CLOSURES:
+                del self.closures[min(self.closures)]
+
+    @property
+    def ranges(self) -> Array:
+        """(k, 8) a_n b_n qa_x qa_y qb_x qb_y range sigma, in the order of the owner's log."""
+        return self._ranges.data[:, 1:]
 
     def kept(self) -> list[ClosureItem]:
         return [c for _, (_, c) in sorted(self.closures.items()) if c.kept]
+
+
+def _believable(c: ClosureItem) -> bool:
+    best, worst = CLOSURE_SIGMAS
+    variances = (c.covariance[k] for k in (0, 3, 5))
+    return all(best**2 < v < worst**2 for v in variances) and all(
+        abs(v) < FARTHEST_M for v in c.a_T_b
+    )
 
 
 class TeamGraph:
@@ -141,27 +210,24 @@ class TeamGraph:
             self.forget(origin.robot)
             items = self.chains[origin.robot] = ChainItems(origin)
         if entry.traits:
-            items.noise = OdometryNoise(*entry.traits[:4])
-            items.antenna = np.array(entry.traits[4:])
+            items.take_traits(entry.seq, entry.traits)
         for k in entry.keyframes:
-            items.add(k.n, k.segment, k.x, k.y, k.theta)
-        for r in entry.ranges:
+            items.add(k)
+        for place, r in enumerate(entry.ranges):
             pair = self._pair(origin, r.peer)
             if pair:
-                pair.ranges.append([r.a_n, r.b_n, *r.q_a, *r.q_b, r.range_m, r.sigma_m])
+                pair.add_range(entry.seq, place, r)
         for c in entry.closures:
             pair = self._pair(origin, c.peer)
-            if pair and pair.closures.get(c.number, (-1, c))[0] <= entry.seq:
-                pair.closures[c.number] = (entry.seq, c)
-                while len(pair.closures) > MAX_CLOSURES:
-                    del pair.closures[min(pair.closures)]
+            if pair:
+                pair.add_closure(entry.seq, c)
 
     def _pair(self, a: Chain, b: Chain) -> PairItems | None:
-        """The pair's items; None when they belong to a start of b that is already past."""
+        """The pair's items; None for a start of b that is already past, and for a pair of one."""
         pair = self.pairs.get((a.robot, b.robot))
         if pair and pair.a == a and pair.b == b:
             return pair
-        if pair and (pair.a.epoch > a.epoch or pair.b.epoch > b.epoch):
+        if a.robot == b.robot or (pair and pair.b.epoch > b.epoch):
             return None
         self.pairs[a.robot, b.robot] = PairItems(a, b)
         return self.pairs[a.robot, b.robot]
@@ -181,14 +247,10 @@ class TeamGraph:
                    for c in (pair.a, pair.b))
         ]  # fmt: skip
 
-    def rows_of(self, segment: Segment) -> slice:
-        """Which rows of its chain a segment is."""
-        first, last = self.chains[segment.robot].segments()[segment.segment]
-        return slice(first, last + 1)
-
     def segment_rows(self, segment: Segment) -> Array:
         """(k, 5) keyframes of a segment."""
-        return np.asarray(self.chains[segment.robot].rows[self.rows_of(segment)])
+        items = self.chains[segment.robot]
+        return np.asarray(items.rows[items.rows_of(segment.segment)])
 
     def digest(self, robots: set[int]) -> int:
         """A number that two robots share when they hold the same items of these robots."""
@@ -198,7 +260,6 @@ class TeamGraph:
             h.update(repr(items.chain).encode() + np.ascontiguousarray(items.rows).tobytes())
         for pair in self.usable():
             if {pair.a.robot, pair.b.robot} <= robots:
-                rows = pair.ranges.data
-                order = np.lexsort((rows[:, 1], rows[:, 0]))
-                h.update(rows[order].tobytes() + repr([c.number for c in pair.kept()]).encode())
+                h.update(np.ascontiguousarray(pair.ranges).tobytes())
+                h.update(repr([c.number for c in pair.kept()]).encode())
         return int.from_bytes(h.digest(), "big", signed=True)

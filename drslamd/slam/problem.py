@@ -21,6 +21,9 @@ from drslamd.slam.se2 import Array
 
 Index = NDArray[np.int64]
 
+RIDGE = 1e-10
+"""Added to correlations before they are inverted; nobody knows his correlations so well."""
+
 
 @dataclass(frozen=True)
 class PoseEdges:
@@ -34,10 +37,17 @@ class PoseEdges:
     def __len__(self) -> int:
         return len(self.i)
 
+    def chosen(self, which: NDArray[np.bool_]) -> PoseEdges:
+        columns = (self.i, self.j, self.measured, self.covariance)
+        return PoseEdges(*(column[which] for column in columns))
+
     @cached_property
     def information(self) -> Array:
-        """(m, 3, 3) inverse covariances."""
-        return np.linalg.inv(self.covariance)
+        """(m, 3, 3) inverse covariances, positive definite whatever rounding did to them."""
+        sigma = np.sqrt(np.einsum("kii->ki", self.covariance))
+        scale = sigma[:, :, None] * sigma[:, None, :]
+        inverse = np.linalg.inv(self.covariance / scale + RIDGE * np.eye(3)) / scale
+        return np.asarray((inverse + np.swapaxes(inverse, 1, 2)) / 2)
 
 
 @dataclass(frozen=True)
@@ -63,6 +73,10 @@ class Ranges:
 
     def __len__(self) -> int:
         return len(self.i)
+
+    def chosen(self, which: NDArray[np.bool_]) -> Ranges:
+        columns = (self.i, self.j, self.q_i, self.q_j, self.measured, self.sigma, self.pair)
+        return Ranges(*(column[which] for column in columns))
 
 
 @dataclass(frozen=True)
@@ -108,6 +122,9 @@ class Calibration:
     @staticmethod
     def zero(priors: Priors) -> Calibration:
         return Calibration(*(np.zeros(len(p)) for p in (priors.bias, priors.scale, priors.yaw)))
+
+    def plus(self, step: Calibration) -> Calibration:
+        return Calibration(self.bias + step.bias, self.scale + step.scale, self.yaw + step.yaw)
 
 
 @dataclass(frozen=True)

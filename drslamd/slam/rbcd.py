@@ -116,48 +116,36 @@ def block(
         neighbours: (m, 2 r) lifted poses that are held.
         size: number of its poses.
     """
-    rank = neighbours.shape[1] // 2
+    held = stacked(neighbours)
     width = 2 * int(np.abs(own.i - own.j).max(initial=0)) + 2
     q = np.zeros((width, 2 * size), dtype=complex)
-    g = np.zeros((2 * size, rank), dtype=complex)
+    g = np.zeros((2 * size, held.shape[1]), dtype=complex)
     constant = 0.0
-
-    def add(row: Array, column: Array, value: Array) -> None:
-        np.add.at(q, (row - column, column), value)
-
-    zi, pi, zj, pj = 2 * own.i, 2 * own.i + 1, 2 * own.j, 2 * own.j + 1
-    add(zi, zi, own.kappa + own.tau * np.abs(own.shift) ** 2)
-    add(zj, zj, own.kappa)
-    add(pi, pi, own.tau)
-    add(pj, pj, own.tau)
-    add(pi, zi, own.tau * own.shift)
-    for row, column, value in (
-        (zj, zi, -own.kappa * own.turn), (pj, pi, -own.tau), (pj, zi, -own.tau * own.shift),
-    ):  # fmt: skip
-        forward = row > column
-        add(row[forward], column[forward], value[forward])
-        add(column[~forward], row[~forward], value[~forward].conj())
-
-    z, p = neighbours[:, :rank], neighbours[:, rank:]
-    zi, pi = 2 * leaving.i, 2 * leaving.i + 1
-    kappa, tau, turn, shift = leaving.kappa, leaving.tau, leaving.turn, leaving.shift
-    add(zi, zi, kappa + tau * np.abs(shift) ** 2)
-    add(pi, pi, tau)
-    add(pi, zi, tau * shift)
-    np.add.at(g, zi, -(kappa * turn.conj())[:, None] * z[leaving.j])
-    np.add.at(g, zi, -(tau * shift.conj())[:, None] * p[leaving.j])
-    np.add.at(g, pi, -tau[:, None] * p[leaving.j])
-    constant += float(kappa.sum() + np.sum(tau[:, None] * np.abs(p[leaving.j]) ** 2))
-
-    zj, pj = 2 * arriving.j, 2 * arriving.j + 1
-    kappa, tau, turn, shift = arriving.kappa, arriving.tau, arriving.turn, arriving.shift
-    reached = p[arriving.i] + shift[:, None] * z[arriving.i]
-    add(zj, zj, kappa)
-    add(pj, pj, tau)
-    np.add.at(g, zj, -(kappa * turn)[:, None] * z[arriving.i])
-    np.add.at(g, pj, -tau[:, None] * reached)
-    constant += float(kappa.sum() + np.sum(tau[:, None] * np.abs(reached) ** 2))
+    for edges, ours in ((own, (0, 1, 2, 3)), (leaving, (0, 1)), (arriving, (2, 3))):
+        ends = np.stack([2 * edges.i, 2 * edges.i + 1, 2 * edges.j, 2 * edges.j + 1])
+        theirs = [k for k in range(4) if k not in ours]
+        for weight, factor in _residuals(edges):
+            # |sum_k factor_k x_k|^2 with x_k ours or held: its square, its mixed term, its rest
+            pull = sum((factor[k][:, None] * held[ends[k]] for k in theirs), np.zeros(1))
+            for k in ours:
+                np.add.at(g, ends[k], (weight * factor[k].conj())[:, None] * pull)
+                for m in ours:
+                    lower = ends[k] >= ends[m]
+                    row, column = ends[k][lower], ends[m][lower]
+                    value = (weight * factor[k].conj() * factor[m])[lower]
+                    np.add.at(q, (row - column, column), value)
+            constant += float(np.sum(weight * np.sum(np.abs(pull) ** 2, axis=-1)))
     return Block(q, g, constant)
+
+
+def _residuals(edges: ComplexEdges) -> list[tuple[Array, Array]]:
+    """Both terms of the cost, each as its weight (m,) and its factors (4, m) of the rows
+    z_i, p_i, z_j, p_j."""
+    one, none = np.ones_like(edges.turn), np.zeros_like(edges.turn)
+    return [
+        (edges.kappa, np.stack([-edges.turn, none, one, none])),
+        (edges.tau, np.stack([-edges.shift, -one, none, one])),
+    ]
 
 
 def descend(problem: Block, x: Array, steps: int = STEPS_PER_ROUND) -> Array:
@@ -249,9 +237,9 @@ def rounded(lifted: Array, anchor: Array) -> Array:
 
 def stacked(lifted: Array) -> Array:
     """Rows of C^(2 r) (n, 2 r) as the X (2n, r) of a block."""
-    return np.asarray(lifted.reshape(2 * len(lifted), -1))
+    return np.asarray(lifted.reshape(2 * len(lifted), lifted.shape[1] // 2))
 
 
 def rows(x: Array) -> Array:
     """Inverse of `stacked`."""
-    return np.asarray(x.reshape(len(x) // 2, -1))
+    return np.asarray(x.reshape(len(x) // 2, 2 * x.shape[1]))

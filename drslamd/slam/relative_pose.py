@@ -30,12 +30,21 @@ EXCLUDED_CHI2 = 20.0
 """A minimum this much worse than the best (2 log-likelihood) is no longer carried."""
 REFINED = 1e-3
 """Steps (m, rad) below which the refinement leaves the rest to the generalised least squares."""
+JUDGED = 8
+"""Steps of the generalised least squares at most; mostly two or three are enough."""
 HOPELESS, HOPELESS_CHI2 = 5.0, 60.0
 """A minimum that is worse by this factor and sum cannot come back under correlated noise."""
 POOR_FIT = 4.0
 """Chi-squared per degree of freedom beyond which the model does not explain the window."""
 MAX_SIGMA_M, MAX_SIGMA_RAD = 1.5, 0.5
 """A pose known worse than this helps nobody."""
+LEAST_DAMPING = 1e-12
+"""Relative to the diagonal: above rounding, so that no step meets a singular matrix however
+little a window says."""
+PRIOR = 1e-9
+"""Information, 1/m^2 and 1/rad^2, of directions of which a window says nothing at all."""
+PAPER_PRIOR = 1e-4
+"""The same where no verdict keeps such windows back: a covariance of 100 m can still be sent."""
 ROBUST_SIGMAS = 2.5
 """Huber's threshold: beyond it a range loses weight (bursts are 0.3 m and more)."""
 
@@ -90,8 +99,10 @@ def solve(window: Window, noise: Noise, delta: float) -> Estimate:
     rho = max(0.1, float(np.median(window.ranges[-3:])))
     candidates = coarse_search.seeds(a, b, window.ranges, rho, delta, SEEDS)
     candidates = refine(a, b, window.ranges, candidates, noise.ranges)
-    judged = [_judge(window, noise, pose) for pose in _distinct(candidates)]
+    judged = [_judge(window, noise, candidates[k]) for k in _distinct(candidates)]
     judged.sort(key=lambda hypothesis: hypothesis.chi2)
+    # under the full noise two candidates may have come to the same minimum
+    judged = [judged[k] for k in _distinct(np.array([h.a_T_b for h in judged]))]
     best = judged[0]
     if best.chi2 > POOR_FIT * (len(window) - 3):
         return Estimate(Verdict.POOR_FIT)
@@ -131,7 +142,7 @@ def refine(a: Array, b: Array, ranges: Array, seeds: Array, noise: RangeNoise) -
     damping = np.full(len(x), 1e-3)
     cost, gradient, hessian = _normal_equations(x, a, b, ranges, noise)
     for _ in range(25):
-        lift = damping[:, None] * np.einsum("kii->ki", hessian)
+        lift = np.maximum(damping, LEAST_DAMPING)[:, None] * np.einsum("kii->ki", hessian)
         step = -np.linalg.solve(hessian + lift[..., None] * np.eye(4), gradient[..., None])[..., 0]
         trial = x + step
         new = _normal_equations(trial, a, b, ranges, noise)
@@ -165,26 +176,27 @@ def _normal_equations(
     prior = 1 / noise.bias_sigma**2
     gradient[:, 3] += x[:, 3] * prior
     hessian[:, 3, 3] += prior
-    hessian[:, np.arange(4), np.arange(4)] += 1e-9
+    hessian[:, np.arange(4), np.arange(4)] += PRIOR
     return cost.sum(axis=1) + x[:, 3] ** 2 * prior, gradient, hessian
 
 
-def _distinct(poses: Array) -> list[Array]:
-    kept: list[Array] = []
-    for pose in poses:
-        near = [
-            np.hypot(*(pose - k)[:2]) < MERGE_M and abs(se2.wrap(pose[2] - k[2])) < MERGE_RAD
-            for k in kept
-        ]
-        if not any(near):
-            kept.append(pose)
+def _distinct(poses: Array) -> list[int]:
+    """Which of the poses (k, 3), best first, are not near a better one."""
+    kept: list[int] = []
+    for k, pose in enumerate(poses):
+        off = poses[kept] - pose
+        near = (np.hypot(off[:, 0], off[:, 1]) < MERGE_M) & (
+            np.abs(se2.wrap(off[:, 2])) < MERGE_RAD
+        )
+        if not near.any():
+            kept.append(k)
     return kept
 
 
 def _judge(window: Window, noise: Noise, pose: Array) -> Hypothesis:
-    """Two steps of generalised least squares under the noise of the whole window."""
+    """Generalised least squares from one pose, under the noise of the whole window."""
     a, b = window.a_points, window.b_points
-    for _ in range(3):
+    for _ in range(JUDGED):
         e, u, j = (value[0] for value in residuals(pose[None], a, b, window.ranges))
         level = np.median(e)
         size = np.abs(e - level) / noise.ranges.sigma
@@ -193,9 +205,11 @@ def _judge(window: Window, noise: Noise, pose: Array) -> Hypothesis:
         covariance += odometry_covariance(a, window.a_poses[:, :2], u, noise.a)
         u_in_b = se2.rotate(-pose[2], u)
         covariance += odometry_covariance(b, window.b_poses[:, :2], u_in_b, noise.b)
+        # absurd odometry of a peer could round the smallest eigenvalue below zero
+        covariance[np.diag_indices(len(e))] *= 1 + 1e-12
         factor = cho_factor(covariance, lower=True, check_finite=False)
         weighted = cho_solve(factor, np.column_stack([j, e]), check_finite=False)
-        information = j.T @ weighted[:, :3] + 1e-9 * np.eye(3)
+        information = j.T @ weighted[:, :3] + PRIOR * np.eye(3)
         chi2 = float(e @ weighted[:, 3])
         step = np.linalg.solve(information, -j.T @ weighted[:, 3])
         size = float(np.abs(step).max())
@@ -220,7 +234,7 @@ def solve_paper(window: Window, range_sigma: float, delta: float) -> Estimate:
     coarse = coarse_paper(a, b, ranges, delta)
     pose = _least_squares(a, b, ranges, coarse)
     e, _, j = (value[0] for value in residuals(pose[None], a, b, ranges))
-    information = j.T @ j / range_sigma**2 + 1e-9 * np.eye(3)
+    information = j.T @ j / range_sigma**2 + PAPER_PRIOR * np.eye(3)
     chi2 = float(e @ e) / range_sigma**2
     pose = np.append(pose[:2], se2.wrap(pose[2]))
     return Estimate(Verdict.UNIQUE, (Hypothesis(pose, np.linalg.inv(information), chi2),))
@@ -254,7 +268,7 @@ def _least_squares(a: Array, b: Array, ranges: Array, pose: Array) -> Array:
     e, _, j = (value[0] for value in residuals(pose[None], a, b, ranges))
     for _ in range(100):
         hessian = j.T @ j
-        lifted = hessian + np.diag(damping * np.diag(hessian) + 1e-12)
+        lifted = hessian + np.diag(max(damping, LEAST_DAMPING) * np.diag(hessian) + 1e-12)
         step = -np.linalg.solve(lifted, j.T @ e)
         trial = pose + step
         new_e, _, new_j = (value[0] for value in residuals(trial[None], a, b, ranges))

@@ -18,7 +18,9 @@ Array = NDArray[Any]
 
 def wrap(angle: Array | float) -> Array:
     """Angles in radians, brought into (-pi, pi]."""
-    return np.asarray(np.pi - np.mod(np.pi - np.asarray(angle), 2 * np.pi))
+    wrapped = np.pi - np.mod(np.pi - np.asarray(angle), 2 * np.pi)
+    # a hair above pi the modulus rounds up to 2 pi
+    return np.where(wrapped > -np.pi, wrapped, np.pi)
 
 
 def rotate(theta: Array | float, points: Array) -> Array:

@@ -37,7 +37,7 @@ class Group:
 def groups(graph: TeamGraph) -> list[set[Segment]]:
     """Sets of segments that closures join; a segment without closure is in none."""
     group_of: dict[Segment, set[Segment]] = {}
-    for _, a, b in joints(graph):
+    for a, b in dict.fromkeys((a, b) for _, a, b in joints(graph)):
         joined = group_of.get(a, {a}) | group_of.get(b, {b})
         for segment in joined:
             group_of[segment] = joined

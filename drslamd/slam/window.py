@@ -57,6 +57,8 @@ def binned(t: Array, ranges: Array, width: float) -> tuple[Array, Array, NDArray
     Returns:
         times, ranges and counts of the bins that hold anything, in the order of time.
     """
+    if not len(t):
+        return t, ranges, np.zeros(0, dtype=np.int64)
     order = np.argsort(t, kind="stable")
     t, ranges = t[order], ranges[order]
     edges = np.flatnonzero(np.diff(np.floor(t / width))) + 1

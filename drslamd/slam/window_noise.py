@@ -61,6 +61,6 @@ def odometry_covariance(
     to_go = np.cumsum(step[::-1])[::-1]
     later = np.minimum(to_go[:, None], to_go[None, :])
     shift = later * (directions @ directions.T) * noise.translation_per_sqrt_m**2
-    stretch = np.sum(directions * points, axis=1) * noise.scale
+    stretch = np.sum(directions * path, axis=1) * noise.scale
     bend = swing @ step * noise.yaw_rad_per_m
     return np.asarray(yaw + shift + np.outer(stretch, stretch) + np.outer(bend, bend))
