@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 from drslamd.conventions import GRID_US, SECOND_US, Chain
-from drslamd.gossip.messages import OdometryBatch, Pose, Status
+from drslamd.gossip.message_types import OdometryBatch, Pose, Status
 from drslamd.gossip.peer_clock import PeerClock
 from drslamd.slam.items import PublicPoses
 from drslamd.slam.neighbour import Neighbour
@@ -11,6 +13,8 @@ from drslamd.slam.odometry import PEER_TRACK_SAMPLES, Track
 
 SILENCE_US = 5 * SECOND_US
 """Five heartbeats: at 50 % loss a living peer stays silent so long in 3 % of cases."""
+LOSS_STATUSES = 30
+"""Heartbeats over which the loss is counted: the last half minute or so."""
 
 
 class Peer:
@@ -25,29 +29,52 @@ class Peer:
         self.public: PublicPoses | None = None
         self.last_heard = utime
         self.received = 0
-        self.first_counter: int | None = None
-        self.newest_counter = 0
+        self._status_counter = self._pose_counter = 0
+        self._tallies: deque[tuple[int, int]] = deque(maxlen=LOSS_STATUSES)
+        """(messages that it had sent, those of them that had come) at each of its statuses."""
 
-    def heard(self, counter: int, sent: int, utime: int) -> None:
+    def heard(self, sent: int, utime: int) -> None:
         """Any message straight from the peer."""
-        self.last_heard = utime
+        self.last_heard = max(self.last_heard, utime)
         self.clock.heard(sent, utime)
-        if self.first_counter is None:
-            self.first_counter = counter
         self.received += 1
-        self.newest_counter = max(self.newest_counter, counter)
 
     @property
     def loss(self) -> float:
-        """Share of its messages that never came, 0 to 1."""
-        if self.first_counter is None:
+        """Share of its messages that never came of late, 0 to 1."""
+        if not self._tallies:
             return 0.0
-        expected = self.newest_counter - self.first_counter + 1
-        return max(0.0, 1 - self.received / expected)
+        (sent_before, came_before), (sent, came) = self._tallies[0], self._tallies[-1]
+        return max(0.0, 1 - (came - came_before) / max(1, sent - sent_before))
+
+    def take_status(self, status: Status, counter: int, own: Chain) -> bool:
+        """Keep the latest status; False when this one was overtaken by a later one."""
+        if counter <= self._status_counter:
+            return False
+        self._status_counter, self.status = counter, status
+        # entries of its log have counters too, but are not heard from the peer alone
+        entries = max((log.newest for log in status.logs if log.id == self.chain.robot), default=0)
+        self._tallies.append((counter - entries, self.received))
+        echoes = (heard.delay_us for heard in status.heard if (heard.id, heard.epoch) == own)
+        self.clock.echoed(next(echoes, None))
+        return True
+
+    def take_pose(self, pose: Pose, counter: int) -> None:
+        """Keep the latest pose."""
+        if counter > self._pose_counter:
+            self._pose_counter, self.pose = counter, pose
 
     def take_public(self, message: PublicPoses) -> None:
         """Keep what the peer said last of each of its public poses."""
         self.public = message.after(self.public)
+
+    def extend_track(self, batch: OdometryBatch) -> None:
+        """Append what is new in a batch; batches overlap, so nothing is lost with one."""
+        track = self.track
+        for n, steps in enumerate(batch.steps, start=batch.n0):
+            if not len(track) or n >= track.end:
+                track.append(n, steps)
+        track.segment_start = max(track.segment_start, batch.segment_start)
 
     def is_alive(self, utime: int) -> bool:
         """Heard of late, and not on its way out."""
@@ -70,11 +97,3 @@ class Peer:
             self.track,
             offset.us if offset is not None and known else None,
         )
-
-    def extend_track(self, batch: OdometryBatch) -> None:
-        """Append what is new in a batch; batches overlap, so nothing is lost with one."""
-        track = self.track
-        for n, steps in enumerate(batch.steps, start=batch.n0):
-            if not len(track) or n >= track.end:
-                track.append(n, steps)
-        track.segment_start = max(track.segment_start, batch.segment_start)

@@ -3,8 +3,9 @@
 A message that left at s on the peer's clock and arrived at r on ours shows r - s = delay - offset
 (offset: peer's clock minus ours). The smallest of many has almost no delay. The peer tells us the
 smallest that it sees of our messages, offset + delay; half the difference of both is the offset
-and half their sum is how wrong it can be. LinkTrack's `system_time` gives the same without any
-network: both robots know their own clock minus that of the radio system.
+and half their sum is how wrong it can be. LinkTrack's `system_time` gives the same without the
+network's delays: both robots know their own clock minus that of the radio system. It counts modulo
+49.7 days and only where both modules are in one radio network; the messages tell.
 """
 
 from __future__ import annotations
@@ -13,9 +14,12 @@ from collections import deque
 from dataclasses import dataclass
 
 from drslamd.conventions import MILLISECOND_US, SECOND_US
+from drslamd.sensors.linktrack_input import SYSTEM_TIME_PERIOD_US
 
-BUCKETS = 16
-"""Seconds over which the smallest delay is taken; clocks that drift apart by 200 ppm move 3 ms."""
+WINDOW_S = 16
+"""Over which the smallest delay is taken."""
+DRIFT_US = 3_200
+"""What clocks that drift apart by 200 ppm move in that time; either delay may be so old."""
 ONE_WAY_UNCERTAINTY_US = 100 * MILLISECOND_US
 """What is claimed while the peer has not yet said how it hears us."""
 RADIO_UNCERTAINTY_US = 3 * MILLISECOND_US
@@ -36,39 +40,52 @@ class PeerClock:
     """One peer's clock against ours."""
 
     def __init__(self) -> None:
-        self._buckets: deque[tuple[int, int]] = deque(maxlen=BUCKETS)
+        self._smallest: deque[tuple[int, int]] = deque()
+        """(second, smallest arrival - stamp in it), at most `WINDOW_S` of them."""
         self._echo: int | None = None
         self._radio: tuple[int, int] | None = None
 
     def heard(self, sent: int, arrived: int) -> None:
         """A message straight from the peer: its stamp, and its arrival on our clock."""
         second, value = arrived // SECOND_US, arrived - sent
-        if self._buckets and self._buckets[-1][0] == second:
-            value = min(value, self._buckets.pop()[1])
-        self._buckets.append((second, value))
+        if self._smallest and self._smallest[-1][0] == second:
+            value = min(value, self._smallest.pop()[1])
+        self._smallest.append((second, value))
+        while self._smallest[0][0] <= second - WINDOW_S:
+            self._smallest.popleft()
 
-    def echoed(self, delay_us: int) -> None:
-        """The peer's own smallest (arrival there - our stamp)."""
+    def echoed(self, delay_us: int | None) -> None:
+        """The peer's own smallest (arrival there - our stamp); None when it does not hear us."""
         self._echo = delay_us
 
     def radio(self, own_minus_system: int, peer_minus_system: int, utime: int) -> None:
-        """Both clocks against LinkTrack's system_time."""
+        """Both clocks against LinkTrack's system_time, each modulo its period."""
         self._radio = (peer_minus_system - own_minus_system, utime)
 
     @property
     def delay_us(self) -> int | None:
         """Our smallest (arrival here - stamp of the peer), to be told to the peer."""
-        return min((value for _, value in self._buckets), default=None)
+        return min((value for _, value in self._smallest), default=None)
 
     def offset(self, utime: int) -> Offset | None:
         """The best of what is known, or None before the first message."""
-        found = []
-        incoming = self.delay_us
-        if incoming is not None and self._echo is not None:
-            uncertainty = max(MILLISECOND_US, (self._echo + incoming) // 2)
-            found.append(Offset((self._echo - incoming) // 2, uncertainty, "messages"))
-        if self._radio is not None and utime - self._radio[1] < RADIO_FRESH_US:
-            found.append(Offset(self._radio[0], RADIO_UNCERTAINTY_US, "LinkTrack system_time"))
-        if not found and incoming is not None:
-            found.append(Offset(-incoming, ONE_WAY_UNCERTAINTY_US, "one way"))
-        return min(found, key=lambda o: o.uncertainty_us, default=None)
+        incoming, echo = self.delay_us, self._echo
+        if incoming is None:
+            return None
+        if echo is None:
+            return Offset(-incoming, ONE_WAY_UNCERTAINTY_US, "one way")
+        radio = self._by_radio(-incoming, echo, utime)
+        if radio is not None:
+            return Offset(radio, RADIO_UNCERTAINTY_US, "LinkTrack system_time")
+        uncertainty = max(0, (echo + incoming) // 2) + DRIFT_US
+        return Offset((echo - incoming) // 2, uncertainty, "messages")
+
+    def _by_radio(self, least: int, most: int, utime: int) -> int | None:
+        """The offset by system_time, if it lies where the messages say that it must."""
+        if self._radio is None or utime - self._radio[1] >= RADIO_FRESH_US:
+            return None
+        difference = self._radio[0]
+        periods = round(((least + most) // 2 - difference) / SYSTEM_TIME_PERIOD_US)
+        offset = difference + periods * SYSTEM_TIME_PERIOD_US
+        slack = DRIFT_US + RADIO_UNCERTAINTY_US
+        return offset if least - slack <= offset <= most + slack else None

@@ -4,7 +4,8 @@ The tag is a keyed BLAKE2b over channel and message with the tag field zero. The
 from the team key and the origin, so a relay can hand a message on but not change it. A message is
 judged in the order of cost, and nothing is remembered of it before its tag is proven:
 
-    length, type, version, own id, epoch not older than the last one, counter not seen, tag.
+    length, type, version, origin, own echo, epoch not older than the last one, counter not seen,
+    tag; and a proven message under our own id that we did not send is another robot's.
 
 Without a team key the tag is made with a key that everybody knows; it then only finds damage.
 """
@@ -30,6 +31,8 @@ _PUBLIC_KEY = b"drslamd without a team key      "
 
 WINDOW = 1_024
 """Counters that a replay window remembers: a minute at 16 messages a second."""
+FIRST_EPOCH = 0
+FIRST_COUNTER = 1
 
 
 class SealFault(Enum):
@@ -41,6 +44,7 @@ class SealFault(Enum):
     OWN = "own message"
     OWN_ID_USED = "another robot uses this id"
     OLD_EPOCH = "from before a restart of its origin"
+    OTHER_START = "of another start of this robot, repeated by a peer"
     SEEN = "already seen"
     WRONG_TAG = "tag does not fit the team key"
 
@@ -60,14 +64,16 @@ class ReplayWindow:
     def __init__(self) -> None:
         self._newest = 0
         self._seen = 0
+        """Bit k stands for the counter `_newest` - k."""
 
     def is_new(self, counter: int) -> bool:
         if counter > self._newest:
             return True
         age = self._newest - counter
-        return age < WINDOW and not self._seen >> age & 1
+        return counter >= FIRST_COUNTER and age < WINDOW and not self._seen >> age & 1
 
     def commit(self, counter: int) -> None:
+        """Remember a counter that `is_new`."""
         if counter > self._newest:
             shift = min(counter - self._newest, WINDOW)
             self._seen = (self._seen << shift | 1) & ((1 << WINDOW) - 1)
@@ -77,7 +83,11 @@ class ReplayWindow:
 
 
 def team_key(secret: bytes | None) -> bytes:
-    """The key for `Seal`: the secret of the team, or the public one when there is none."""
+    """The key for `Seal`: the secret of the team, or the public one when there is none.
+
+    Raises:
+        ValueError: the secret has another length than `KEY_BYTES`.
+    """
     if secret is None:
         return _PUBLIC_KEY
     if len(secret) != KEY_BYTES:
@@ -107,7 +117,6 @@ class Seal:
             epochs: last known epoch of each peer, as it was kept over our restart.
         """
         self._key = key
-        self._keys: dict[int, bytes] = {}
         self.robot = robot
         self.epoch = epoch
         self.epochs = dict(epochs)
@@ -121,7 +130,7 @@ class Seal:
 
     def close(self, channel: str, message: bytes) -> bytes:
         """Fill in the tag of an encoded message."""
-        tag = _tag(self._origin_key(self.robot), channel, message)
+        tag = _tag(_origin_key(self._key, self.robot), channel, message)
         return message[:_TAG_AT] + tag + message[_HEADER.size :]
 
     def open(
@@ -136,11 +145,10 @@ class Seal:
         verdict = self._judge(channel, message, fingerprints, once)
         if isinstance(verdict, SealFault):
             return verdict
-        if verdict.epoch != self.epochs.get(verdict.origin):
-            self.epochs[verdict.origin] = verdict.epoch
-            self._windows[verdict.origin] = ReplayWindow()
+        window = self._window(verdict)
+        self.epochs[verdict.origin], self._windows[verdict.origin] = verdict.epoch, window
         if once:
-            self._windows.setdefault(verdict.origin, ReplayWindow()).commit(verdict.counter)
+            window.commit(verdict.counter)
         return verdict
 
     def _judge(
@@ -158,22 +166,22 @@ class Seal:
             return SealFault.WRONG_VERSION
         if not 0 <= header.origin <= MAX_ROBOT_ID:
             return SealFault.BAD_ORIGIN
-        if header.origin == self.robot and header.epoch <= self.epoch:
+        ours = header.origin == self.robot
+        if ours and header.epoch == self.epoch and header.counter <= self._counter:
             return SealFault.OWN
-        known = self.epochs.get(header.origin, -1)
-        if header.epoch < known:
+        if ours and not once:
+            return SealFault.OTHER_START
+        if header.epoch < self.epochs.get(header.origin, FIRST_EPOCH):
             return SealFault.OLD_EPOCH
-        window = self._windows.get(header.origin)
-        if once and window and header.epoch == known and not window.is_new(header.counter):
+        if once and not self._window(header).is_new(header.counter):
             return SealFault.SEEN
-        proof = _tag(self._origin_key(header.origin), channel, message)
+        proof = _tag(_origin_key(self._key, header.origin), channel, message)
         if not hmac.compare_digest(tag, proof):
             return SealFault.WRONG_TAG
-        if header.origin == self.robot:
-            return SealFault.OWN_ID_USED
-        return header
+        return SealFault.OWN_ID_USED if ours else header
 
-    def _origin_key(self, origin: int) -> bytes:
-        if origin not in self._keys:
-            self._keys[origin] = _origin_key(self._key, origin)
-        return self._keys[origin]
+    def _window(self, header: Header) -> ReplayWindow:
+        """The window that a message belongs to; every epoch begins with an empty one."""
+        if header.epoch != self.epochs.get(header.origin):
+            return ReplayWindow()
+        return self._windows.get(header.origin, ReplayWindow())

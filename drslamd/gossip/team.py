@@ -12,7 +12,7 @@ from drslamd.gossip import lc02, messages
 from drslamd.gossip.lc02 import MAX_PAYLOAD
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.messages import UNKNOWN_CLOCK, Heard, Message, OdometryBatch, Pose, Status
-from drslamd.gossip.peer import Peer
+from drslamd.gossip.peer import SILENCE_US, Peer
 from drslamd.gossip.seal import Header, Seal, SealFault
 from drslamd.slam.items import ClosureItem, GraphEntry, Keyframe, PublicPoses, RangeItem
 
@@ -21,12 +21,22 @@ FORGET_US = 600 * SECOND_US
 TRAITS_EVERY = 64
 """Log entries between two that say what our sensors are like."""
 ITEMS_PER_ENTRY = 20
-"""Keyframes, ranges and closures in one log entry; 20 closures are 1,020 bytes."""
-PUBLIC_ENVELOPE_BYTES = 120
-"""What a public_poses_t needs besides its poses, with some air."""
+"""Keyframes, ranges and closures in one log entry; 20 closures with 20 peers are 1,288 bytes."""
+PUBLIC_ENVELOPE_BYTES = 69
+"""What a public_poses_t needs besides its poses."""
 UNVERIFIED_US = 10 * SECOND_US
 """How long after a message that does not fit the team key it is still spoken of."""
 _FINGERPRINTS = {kind: frozenset([value]) for kind, value in messages.FINGERPRINTS.items()}
+
+_REMEDIES = {
+    SealFault.WRONG_TAG: "hears messages that do not fit the team key, from {sender}; "
+    "give all robots the same team.key_file",
+    SealFault.WRONG_VERSION: "hears messages of another version of drslamd, from {sender}; "
+    "install the same version on all robots",
+    SealFault.OWN_ID_USED: "another robot uses id {robot}, at {sender}; "
+    "give every robot a robot.id of its own",
+}
+"""Refusals that somebody must do something about."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +48,14 @@ class Received:
 
 
 class Team:
-    """Peers, their logs, and the seal on everything."""
+    """Peers, their logs, and the seal on everything.
+
+    Attributes:
+        refused: messages that were turned away, by reason; accepted are those that said something
+            new, `repeats_heard` log entries that we had, `own_echoes` what we sent ourselves.
+            Together they are all that came.
+        last_echo: when we last heard ourselves, which proves that the network carries us.
+    """
 
     def __init__(self, seal: Seal) -> None:
         self.seal = seal
@@ -53,6 +70,10 @@ class Team:
         self.bytes_sent = 0
         self.messages_sent = 0
         self._next_seq = 0
+        self._utime = 0
+        """Of our last round of repeats; the present, for whoever asks without saying when."""
+        self.superseded_by: int | None = None
+        """A later epoch of ours that a peer has heard; then our messages are refused as old."""
         self._last_refused: dict[SealFault, tuple[int, str]] = {}
 
     # ---- outgoing ----
@@ -70,7 +91,9 @@ class Team:
 
     def send_public(self, public: PublicPoses, utime: int) -> list[Send]:
         """Lifted poses, as many in one message as one datagram takes."""
-        at_once = (MAX_PAYLOAD - PUBLIC_ENVELOPE_BYTES) // (16 * public.rank + 4) - 1
+        # 4 bytes of number and 4 * rank floats for each, and the anchor's floats once
+        lifted = 16 * public.rank
+        at_once = (MAX_PAYLOAD - PUBLIC_ENVELOPE_BYTES - lifted) // (4 + lifted)
         return [
             self.send(public.part(first, first + at_once), utime)
             for first in range(0, len(public.keyframes), at_once)
@@ -83,8 +106,8 @@ class Team:
         decoded = messages.decode("GRAPH", sealed)
         if not isinstance(decoded, GraphEntry):
             raise AssertionError(f"own graph entry does not decode: {decoded}")
-        self.logs.add(self.own, decoded, sealed, utime)
-        self._next_seq += 1
+        self.logs.add(self.own, decoded.seq, sealed, utime)
+        self._next_seq = decoded.seq + 1
         return decoded, sealed
 
     def entries(
@@ -96,11 +119,12 @@ class Team:
     ) -> Iterator[GraphEntry]:
         """The next entries of our log, each small enough for one datagram."""
         items = [*keyframes, *ranges, *closures]
-        for first in range(0, len(items), ITEMS_PER_ENTRY):
+        starts = range(0, len(items), ITEMS_PER_ENTRY)
+        for seq, first in enumerate(starts, start=self._next_seq):
             part = items[first : first + ITEMS_PER_ENTRY]
             yield GraphEntry(
-                self._next_seq,
-                traits if self._next_seq % TRAITS_EVERY == 0 else (),
+                seq,
+                traits if seq % TRAITS_EVERY == 0 else (),
                 tuple(i for i in part if isinstance(i, Keyframe)),
                 tuple(i for i in part if isinstance(i, RangeItem)),
                 tuple(i for i in part if isinstance(i, ClosureItem)),
@@ -111,14 +135,16 @@ class Team:
         return self._out(messages.channel("GRAPH", owner), sealed)
 
     def repeats(self, utime: int) -> list[Send]:
+        """Log entries that somebody lacks; ask several times a second."""
+        self._utime = utime
         return [self.send_sealed(owner, sealed) for owner, sealed in self.logs.due(utime)]
 
     def heard(self) -> tuple[Heard, ...]:
         """For our status: whom we hear, the most recent first."""
-        recent = sorted(self.peers.values(), key=lambda p: -p.last_heard)[: messages.MAX_HEARD]
-        return tuple(
-            Heard(*p.chain, p.clock.delay_us) for p in recent if p.clock.delay_us is not None
-        )
+        alive = [peer for peer in self.peers.values() if peer.is_alive(self._utime)]
+        recent = sorted(alive, key=lambda peer: -peer.last_heard)[: messages.MAX_HEARD]
+        delays = [(peer.chain, peer.clock.delay_us) for peer in recent]
+        return tuple(Heard(*chain, delay) for chain, delay in delays if delay is not None)
 
     # ---- incoming ----
 
@@ -159,7 +185,7 @@ class Team:
         if isinstance(message, GraphEntry):
             # may come from a relay and long after it was made: says nothing about its origin's
             # clock or whether it lives
-            if not self.logs.add(origin, message, sealed, utime):
+            if not self.logs.add(origin, message.seq, sealed, utime):
                 self.repeats_heard += 1
                 return None
             self.accepted += 1
@@ -168,23 +194,26 @@ class Team:
         peer = self.peers.get(origin.robot)
         if peer is None or peer.chain != origin:
             peer = self.peers[origin.robot] = Peer(origin, utime)
-        peer.heard(header.counter, header.utime, utime)
+            self.logs.begin(origin)
+        peer.heard(header.utime, utime)
         if isinstance(message, Status):
-            self._status(peer, message, utime)
+            self._status(peer, message, header.counter, utime)
         elif isinstance(message, OdometryBatch):
             peer.extend_track(message)
         elif isinstance(message, Pose):
-            peer.pose = message
-        elif isinstance(message, PublicPoses):
+            peer.take_pose(message, header.counter)
+        else:
             peer.take_public(message)
         return Received(origin, message)
 
-    def _status(self, peer: Peer, status: Status, utime: int) -> None:
-        peer.status = status
-        for heard in status.heard:
-            if (heard.id, heard.epoch) == self.own:
-                peer.clock.echoed(heard.delay_us)
+    def _status(self, peer: Peer, status: Status, counter: int, utime: int) -> None:
+        if not peer.take_status(status, counter, self.own):
+            return
         self.logs.peer_holds(status.logs, peer.chain.robot, utime)
+        starts = [(s.id, s.epoch) for s in status.heard] + [(s.id, s.epoch) for s in status.logs]
+        for robot, epoch in starts:
+            if robot == self.own.robot and epoch > self.own.epoch:
+                self.superseded_by = max(self.superseded_by or 0, epoch)
 
     # ---- who is there ----
 
@@ -217,34 +246,51 @@ class Team:
         """Use LinkTrack's system_time, where both sides know their clock against it."""
         for peer in self.peers.values():
             theirs = peer.status.uwb_clock_us if peer.status else UNKNOWN_CLOCK
-            if own_minus_system is not None and theirs != UNKNOWN_CLOCK:
+            known = own_minus_system is not None and theirs != UNKNOWN_CLOCK
+            if own_minus_system is not None and known and peer.is_alive(utime):
                 peer.clock.radio(own_minus_system, theirs, utime)
 
     def conditions(self, utime: int) -> list[tuple[str, str | None]]:
         """What is wrong with the conversation, by key, in sentences with a remedy."""
-        sentences = {
-            SealFault.WRONG_TAG: "hears messages that do not fit the team key, from {}; "
-            "give all robots the same team.key_file",
-            SealFault.WRONG_VERSION: "hears messages of another version of drslamd, from {}; "
-            "install the same version on all robots",
-            SealFault.OWN_ID_USED: f"another robot uses id {self.own.robot}, at {{}}; "
-            "give every robot a robot.id of its own",
-        }
         out: list[tuple[str, str | None]] = []
-        for fault, sentence in sentences.items():
-            when, sender = self._last_refused.get(fault, (-UNVERIFIED_US, ""))
-            lasts = utime - when < UNVERIFIED_US
+        for fault, sentence in _REMEDIES.items():
+            _, sender = self._last_refused.get(fault, (0, ""))
+            text = sentence.format(robot=self.own.robot, sender=sender or "an unknown sender")
             key = f"team.{fault.name.lower()}"
-            out.append((key, sentence.format(sender or "an unknown sender") if lasts else None))
-        return out
+            out.append((key, text if self._refused_of_late(fault, utime) else None))
+        return [*out, ("team.uwb_id", self._shared_uwb_id(utime))]
+
+    def is_own_id_used(self, utime: int) -> bool:
+        """Does another robot speak under our id?"""
+        return self._refused_of_late(SealFault.OWN_ID_USED, utime)
+
+    def _refused_of_late(self, fault: SealFault, utime: int) -> bool:
+        when, _ = self._last_refused.get(fault, (None, ""))
+        return when is not None and utime - when < UNVERIFIED_US
+
+    def _shared_uwb_id(self, utime: int) -> str | None:
+        claims: dict[int, list[int]] = {}
+        for robot, peer in sorted(self.peers.items()):
+            if peer.status is not None and peer.is_alive(utime):
+                claims.setdefault(peer.status.uwb_id, []).append(robot)
+        for uwb_id, robots in sorted(claims.items()):
+            if len(robots) > 1:
+                names = " and ".join(map(str, robots))
+                return (
+                    f"robots {names} all claim UWB module {uwb_id}, so its ranges cannot be "
+                    "used; give every robot the uwb.id of its own module"
+                )
+        return None
 
     def robot_of_uwb(self, uwb_id: int) -> int | None:
         """The robot that carries this UWB module, None when it is not (yet) known."""
-        for robot, peer in self.peers.items():
-            if peer.status is not None and peer.status.uwb_id == uwb_id:
-                return robot
-        return None
+        peers = [p for p in self.peers.values() if p.status and p.status.uwb_id == uwb_id]
+        latest = max((peer.last_heard for peer in peers), default=0)
+        # a module may have moved from a robot that is silent now to one that speaks
+        robots = [p.chain.robot for p in peers if latest - p.last_heard < SILENCE_US]
+        return robots[0] if len(robots) == 1 else None
 
     def forget_silent(self, utime: int) -> None:
+        """Drop the peers that were not heard for long; their logs remain."""
         for robot in [r for r, p in self.peers.items() if utime - p.last_heard > FORGET_US]:
             del self.peers[robot]

@@ -39,7 +39,11 @@ def default_url(section: GossipSection) -> str:
 
 
 class Liblcm:
-    """The transport of the lcm package."""
+    """The transport of the lcm package.
+
+    Attributes:
+        dropped: messages that liblcm did not take, since the start.
+    """
 
     def __init__(
         self, section: GossipSection, clock: Clock, deliver: Callable[[Event], None]
@@ -49,25 +53,30 @@ class Liblcm:
         self._deliver = deliver
         self._lcm: Any = None
         self._failed = asyncio.Event()
+        self._last_state: tuple[bool, str] | None = None
+        self.dropped = 0
 
     async def run(self) -> None:
+        """Join, receive, join again."""
         backoff = Backoff()
         try:
             while True:
                 if await self._open():
                     backoff.reset()
                     await self._failed.wait()
-                    self._close()
                 await backoff.wait()
         finally:
             self._close()
 
     def send(self, channel: str, payload: bytes) -> None:
+        """Publish without waiting."""
         if self._lcm is None:
+            self.dropped += 1
             return
         try:
             self._lcm.publish(channel, payload)
         except OSError as error:
+            self.dropped += 1
             self._fail(f"cannot send to {self._url}: {error}")
 
     async def _open(self) -> bool:
@@ -75,12 +84,12 @@ class Liblcm:
             # the first subscription runs a self test that may take ten seconds
             instance = await asyncio.to_thread(self._connect)
         except (RuntimeError, OSError) as error:
-            self._deliver(NetworkState(self._clock.now(), False, f"{self._url}: {error}"))
+            self._state(False, f"{self._url}: {error}")
             return False
         self._lcm = instance
         self._failed.clear()
         asyncio.get_running_loop().add_reader(instance.fileno(), self._handle)
-        self._deliver(NetworkState(self._clock.now(), True, self._url))
+        self._state(True, self._url)
         return True
 
     def _connect(self) -> Any:
@@ -104,8 +113,14 @@ class Liblcm:
         self._deliver(ChannelMessage(self._clock.now(), channel, data))
 
     def _fail(self, why: str) -> None:
-        self._deliver(NetworkState(self._clock.now(), False, why))
+        self._close()
+        self._state(False, why)
         self._failed.set()
+
+    def _state(self, up: bool, detail: str) -> None:
+        if (up, detail) != self._last_state:
+            self._last_state = (up, detail)
+            self._deliver(NetworkState(self._clock.now(), up, detail))
 
     def _close(self) -> None:
         if self._lcm is not None:

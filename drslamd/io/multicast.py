@@ -2,7 +2,8 @@
 
 liblcm needs a route to the group (an ad-hoc network has none), never receives again after its
 interface was re-created, and can be killed by one malformed datagram. This transport joins by
-interface, hears its own messages as proof that the group works, and joins again when they stop.
+interface, takes the return of its own messages as the only proof that the group works, and joins
+again when they stay away.
 """
 
 from __future__ import annotations
@@ -27,12 +28,20 @@ RECEIVE_BUFFER = 1 << 20
 """Bytes asked of the kernel: a second of a team of fifty."""
 ECHO_S = 5.0
 """Silence of our own messages after which the group is joined anew."""
+LOOK_S = 1.0
+"""How often that is looked at."""
+RECENT = 32
+"""Own datagrams that are recognised when they come back."""
 DATAGRAMS_AT_ONCE = 64
 """Read in one go; then other readers have their turn."""
 
 
 class Multicast:
-    """The native transport."""
+    """The native transport.
+
+    Attributes:
+        dropped: messages that the network did not take, since the start.
+    """
 
     def __init__(
         self, section: GossipSection, clock: Clock, deliver: Callable[[Event], None]
@@ -42,33 +51,35 @@ class Multicast:
         self._deliver = deliver
         self._socket: socket.socket | None = None
         self._sequence = itertools.count()
-        self._recent: deque[bytes] = deque(maxlen=32)
+        self._recent: deque[bytes] = deque(maxlen=RECENT)
         self._unheard_since: float | None = None
         self._failed = asyncio.Event()
+        self._backoff = Backoff()
         self._last_state: tuple[bool, str] | None = None
+        self.dropped = 0
 
     async def run(self) -> None:
-        backoff = Backoff()
+        """Join, watch, join again."""
         try:
             while True:
                 if self._open():
-                    backoff.reset()
                     await self._until_it_fails()
-                    self._close()
-                await backoff.wait()
+                await self._backoff.wait()
         finally:
             self._close()
 
     def send(self, channel: str, payload: bytes) -> None:
-        if self._socket is None:
-            return
+        """Publish without waiting."""
         datagram = lc02.encode(next(self._sequence), channel, payload)
+        if self._socket is None:
+            self.dropped += 1
+            return
         try:
             self._socket.sendto(datagram, (self._section.group, self._section.port))
-        except BlockingIOError:
-            return
         except OSError as error:
-            self._fail(f"cannot send on {self._where}: {error.strerror}")
+            self.dropped += 1
+            if not isinstance(error, BlockingIOError):
+                self._fail(f"cannot send on {self._where}: {_reason(error)}")
             return
         self._recent.append(datagram)
         if self._unheard_since is None:
@@ -83,14 +94,12 @@ class Multicast:
             self._socket = open_group(self._section)
         except OSError as error:
             hint = "" if self._section.interface else "; name one as gossip.interface"
-            self._state(
-                False, f"cannot join {self._section.group} on {self._where}: {error.strerror}{hint}"
-            )
+            why = f"cannot join {self._section.group} on {self._where}: {_reason(error)}{hint}"
+            self._state(False, why)
             return False
         self._failed.clear()
         self._unheard_since = None
         asyncio.get_running_loop().add_reader(self._socket.fileno(), self._read)
-        self._state(True, f"{self._section.group}:{self._section.port} on {self._where}")
         return True
 
     async def _until_it_fails(self) -> None:
@@ -98,11 +107,11 @@ class Multicast:
         loop = asyncio.get_running_loop()
         while not self._failed.is_set():
             try:
-                await asyncio.wait_for(self._failed.wait(), 1.0)
+                await asyncio.wait_for(self._failed.wait(), LOOK_S)
             except (asyncio.TimeoutError, TimeoutError):
                 since = self._unheard_since
                 if since is not None and loop.time() - since > ECHO_S:
-                    self._fail(f"own messages no longer come back on {self._where}; joining again")
+                    self._fail(f"own messages do not come back on {self._where}; joining again")
 
     def _read(self) -> None:
         for _ in range(DATAGRAMS_AT_ONCE):
@@ -113,13 +122,19 @@ class Multicast:
             except BlockingIOError:
                 return
             except OSError as error:
-                self._fail(f"cannot receive on {self._where}: {error.strerror}")
+                self._fail(f"cannot receive on {self._where}: {_reason(error)}")
                 return
             if data in self._recent:
-                self._unheard_since = None
+                self._heard_ourselves()
             self._deliver(Datagram(self._clock.now(), data, sender[0]))
 
+    def _heard_ourselves(self) -> None:
+        self._unheard_since = None
+        self._backoff.reset()
+        self._state(True, f"{self._section.group}:{self._section.port} on {self._where}")
+
     def _fail(self, why: str) -> None:
+        self._close()
         self._state(False, why)
         self._failed.set()
 
@@ -133,6 +148,10 @@ class Multicast:
         if (up, detail) != self._last_state:
             self._last_state = (up, detail)
             self._deliver(NetworkState(self._clock.now(), up, detail))
+
+
+def _reason(error: OSError) -> str:
+    return error.strerror or str(error)
 
 
 def open_group(section: GossipSection) -> socket.socket:
@@ -153,6 +172,7 @@ def open_group(section: GossipSection) -> socket.socket:
         udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
         udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+        # without this a socket hears the group on every interface where any program joined it
         udp.setsockopt(socket.IPPROTO_IP, IP_MULTICAST_ALL, 0)
         udp.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
         udp.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, section.ttl)

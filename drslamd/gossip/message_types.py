@@ -1,0 +1,78 @@
+"""The messages as the rest of drslamd sees them, and how much of each fits one datagram.
+
+Those that belong to the pose graph (`GraphEntry`, `PublicPoses`) are in `drslamd.slam.items`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Union
+
+from drslamd.slam.items import GraphEntry, PublicPoses
+from drslamd.slam.se2 import Array
+
+UNKNOWN_CLOCK = -(2**63)
+"""`Status.uwb_clock_us` of a robot that does not know LinkTrack's system_time."""
+
+MAX_HEARD = 31
+"""Peers named in one status, which with as many logs has 1,387 bytes. Robots that hear more than
+this many others do not all learn that they are heard."""
+MAX_LOGS = 31
+"""Logs named in one status; whoever holds more names them in turn."""
+MAX_BATCH = 150
+"""Odometry samples in one message: 15 s, 973 bytes."""
+
+
+@dataclass(frozen=True)
+class Heard:
+    """A peer that is heard, and the smallest (arrival here - utime there) of late."""
+
+    id: int
+    epoch: int
+    delay_us: int
+
+
+@dataclass(frozen=True)
+class LogState:
+    """Of one log: held from `first` to `complete`, heard of below `newest`."""
+
+    id: int
+    epoch: int
+    first: int
+    complete: int
+    newest: int
+
+
+@dataclass(frozen=True)
+class Status:
+    state: int
+    frame: int
+    leaving: bool
+    uwb_id: int
+    uwb_clock_us: int
+    graph_hash: int
+    heard: tuple[Heard, ...] = ()
+    ranged: tuple[int, ...] = ()
+    logs: tuple[LogState, ...] = ()
+
+
+@dataclass(frozen=True)
+class OdometryBatch:
+    """Samples n0 ... of the 10 Hz grid: (n, 3) whole steps in the odometry frame."""
+
+    segment_start: int
+    n0: int
+    steps: Array
+
+
+@dataclass(frozen=True)
+class Pose:
+    state: int
+    frame: int
+    frame_epoch: int
+    pose_utime: int
+    pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    covariance: tuple[float, ...] = (0.0,) * 6
+
+
+Message = Union[Status, OdometryBatch, GraphEntry, Pose, PublicPoses]

@@ -1,0 +1,30 @@
+"""The Python in drslamd/lcmtypes is what lcm-gen makes of the .lcm files beside it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from drslamd import lcmtypes
+
+FOLDER = Path(lcmtypes.__file__).parent
+LCM_GEN = Path(sys.executable).parent / "lcm-gen"
+
+
+def test_the_generated_types_are_those_of_the_lcm_files(tmp_path: Path) -> None:
+    if not LCM_GEN.exists():
+        pytest.skip(f"no {LCM_GEN}: pip install lcm")
+    sources = sorted(FOLDER.glob("*.lcm"))
+    subprocess.run([LCM_GEN, "-p", "--ppath", tmp_path, *sources], check=True, timeout=30)
+    fresh = {p.name: p.read_text() for p in (tmp_path / "drslamd" / "lcmtypes").glob("*.py")}
+    assert {p.name: p.read_text() for p in FOLDER.glob("*.py")} == fresh
+
+
+def test_every_type_is_explained_and_has_a_file_of_its_own() -> None:
+    for source in FOLDER.glob("*.lcm"):
+        text = source.read_text()
+        assert text.startswith("package drslamd.lcmtypes;\n\n// "), source.name
+        assert f"\nstruct {source.stem}\n{{" in text, source.name

@@ -1,0 +1,129 @@
+"""Whole teams on a bad channel: in the end everybody holds the same, and soon.
+
+The bounds are a few rounds above the worst of the seeds; one round is one status of each robot.
+"""
+
+from __future__ import annotations
+
+import pytest
+from airwaves import Air
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(("loss", "rounds"), [(0.0, 0), (0.1, 5), (0.3, 8), (0.5, 12), (0.7, 25)])
+def test_five_robots_that_lose_messages_hold_the_same_soon_after_the_last_word(
+    loss: float, rounds: int, seed: int
+) -> None:
+    air = Air(5, loss, seed)
+    air.seconds(20, speakers=range(5))
+    assert air.rounds_until_equal(rounds) <= rounds
+    assert len(air.held[0]) == 100
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(("loss", "rounds"), [(0.3, 12), (0.5, 15), (0.7, 35)])
+def test_two_robots_alone_hold_the_same_soon_after_the_last_word(
+    loss: float, rounds: int, seed: int
+) -> None:
+    air = Air(2, loss, seed)
+    air.seconds(20, speakers=range(2))
+    assert air.rounds_until_equal(rounds) <= rounds
+
+
+@pytest.mark.parametrize(("loss", "rounds"), [(0.0, 0), (0.1, 4), (0.3, 8), (0.5, 10), (0.7, 22)])
+def test_one_entry_reaches_a_team_of_five(loss: float, rounds: int) -> None:
+    for seed in range(30):
+        air = Air(5, loss, seed)
+        air.seconds(3)
+        air.say(0)
+        assert air.rounds_until_equal(rounds) <= rounds, f"seed {seed}"
+
+
+def test_ten_robots_at_30_percent_loss_do_not_crowd_the_channel() -> None:
+    """On the average 2.85 transmissions reach all nine others, if none is wasted."""
+    air = Air(10, 0.3, seed=1)
+    air.seconds(20, speakers=range(10))
+    assert air.rounds_until_equal(6) <= 6
+    assert air.entries_sent <= 5 * 200
+
+
+def test_a_team_that_holds_the_same_is_silent_but_for_its_statuses() -> None:
+    air = Air(5, 0.0)
+    air.seconds(10, speakers=range(5))
+    assert air.is_equal()
+    before = air.sent, air.entries_sent
+    air.seconds(60)
+    assert (air.sent - before[0], air.entries_sent - before[1]) == (5 * 60, 0)
+
+
+def test_what_was_added_in_silence_is_told_on_request() -> None:
+    air = Air(3)
+    air.seconds(5, speakers=range(3), aloud=False)
+    assert air.rounds_until_equal(3) <= 3
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.3])
+def test_a_partition_heals(loss: float) -> None:
+    air = Air(5, loss, seed=3)
+    air.seconds(5, speakers=range(5))
+    air.hears = lambda a, b: (a < 2) == (b < 2)
+    air.seconds(60, speakers=range(5))
+    assert air.rounds_until_equal(10, robots=(0, 1)) <= 10
+    assert air.rounds_until_equal(10, robots=(2, 3, 4)) <= 10
+    assert not air.is_equal()
+    air.hears = lambda a, b: True
+    assert air.rounds_until_equal(20) <= 20
+
+
+@pytest.mark.parametrize(("loss", "rounds"), [(0.0, 4), (0.3, 20)])
+def test_two_robots_that_do_not_hear_each_other_agree_through_a_third(
+    loss: float, rounds: int
+) -> None:
+    air = Air(3, loss, seed=2)
+    air.hears = lambda a, b: {a, b} != {0, 1}
+    air.seconds(20, speakers=range(3))
+    assert air.rounds_until_equal(rounds) <= rounds
+
+
+def test_a_robot_that_is_heard_but_hears_one_other_only_agrees_through_it() -> None:
+    air = Air(4, seed=2)
+    air.hears = lambda a, b: b != 0 or a == 1
+    air.seconds(20, speakers=range(4))
+    assert air.rounds_until_equal(5) <= 5
+
+
+def test_the_log_of_a_robot_that_died_reaches_a_newcomer_from_the_others() -> None:
+    air = Air(4, seed=1)
+    air.hears = lambda a, b: 3 not in (a, b)
+    air.seconds(20, speakers=(0, 1, 2))
+    air.hears = lambda a, b: 0 not in (a, b)
+    assert air.rounds_until_equal(6, robots=(1, 2, 3)) <= 6
+    assert sum(owner == 0 for owner, _ in air.held[3]) == 20
+
+
+def test_a_robot_that_lost_its_memory_gets_all_logs_of_the_others_again() -> None:
+    air = Air(3, seed=1)
+    air.seconds(30, speakers=range(3))
+    air.restart(0)
+    air.seconds(8)
+    assert sorted(air.held[0]) == [(robot, seq) for robot in (1, 2) for seq in range(30)]
+
+
+def test_nobody_repeats_the_old_log_of_a_robot_that_started_again() -> None:
+    air = Air(3, seed=1)
+    air.seconds(30, speakers=range(3))
+    air.restart(0)
+    air.seconds(8)
+    sent = air.entries_sent
+    air.restart(1)
+    air.hears = lambda a, b: 0 not in (a, b)
+    air.seconds(8)
+    assert air.teams[1].refused == {}
+    assert air.entries_sent - sent == 30
+
+
+def test_a_robot_catches_up_an_hour_in_five_minutes() -> None:
+    air = Air(2)
+    for _ in range(3600):
+        air.say(0, aloud=False)
+    assert 295 <= air.rounds_until_equal(305) <= 305

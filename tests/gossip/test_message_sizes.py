@@ -1,0 +1,108 @@
+"""Whatever the code can say fits one datagram."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from sealed import COVARIANCE, HEADER, a_seal, a_status, an_entry, sealed
+
+from drslamd.config import OptimizerSection
+from drslamd.conventions import Chain
+from drslamd.events import ChannelMessage, Send
+from drslamd.gossip import lc02, messages
+from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose
+from drslamd.gossip.team import ITEMS_PER_ENTRY, Team
+from drslamd.slam.items import ClosureItem, Keyframe, PublicPoses, RangeItem
+
+TRAITS = (0.5, 0.25, 0.125, 0.0625, 0.5, -0.5)
+
+
+def fits(send: Send) -> bool:
+    """On the air it goes, and LCM's framing takes it."""
+    lc02.encode(0, send.channel, send.payload)
+    return len(send.payload) <= 1400
+
+
+def test_a_full_status_has_1387_bytes() -> None:
+    """8 + 43 + 34 of frame, 31 peers of 18, 31 ids of 2 and 31 logs of 22."""
+    status = a_status((Heard(1, 1, 1),) * 31, (LogState(1, 1, 0, 0, 0),) * 31, ranged=(1,) * 31)
+    assert len(messages.encode(HEADER, status)) == 85 + 31 * (18 + 2 + 22) == 1387
+
+
+def test_the_status_of_a_robot_that_hears_254_others_fits() -> None:
+    team = Team(a_seal(0))
+    for robot in range(1, 255):
+        team.receive(ChannelMessage(0, *sealed(a_seal(robot), a_status())))
+    heard, logs = team.heard(), team.logs.states()
+    assert len(heard) == len(logs) == 31
+    assert fits(team.send(a_status(heard, logs, ranged=tuple(range(31))), 0))
+
+
+def test_a_full_batch_of_odometry_has_973_bytes() -> None:
+    batch = OdometryBatch(0, 0, np.zeros((150, 3)))
+    assert len(messages.encode(HEADER, batch)) == 8 + 43 + 5 * 4 + 2 + 150 * 6 == 973
+
+
+def test_a_pose_has_118_bytes() -> None:
+    assert len(messages.encode(HEADER, Pose(1, 3, 11, 0))) == 8 + 43 + 19 + 24 + 24 == 118
+
+
+def test_an_entry_with_one_keyframe_has_82_bytes() -> None:
+    assert len(messages.encode(HEADER, an_entry(0, 5))) == 8 + 43 + 5 + 8 + 18 == 82
+
+
+KEYFRAMES = tuple(Keyframe(n, 0, n, n, n) for n in range(50))
+RANGES = tuple(RangeItem(n, Chain(n, 1), n, (0.0, 0.0), (0.0, 0.0), 3.0, 0.1) for n in range(50))
+CLOSURES = tuple(
+    ClosureItem(n, True, n, Chain(n, 1), n, (0.0, 0.0, 0.0), COVARIANCE) for n in range(50)
+)
+
+
+@pytest.mark.parametrize(
+    ("keyframes", "ranges", "closures"),
+    [(KEYFRAMES, (), ()), ((), RANGES, ()), ((), (), CLOSURES), (KEYFRAMES, RANGES, CLOSURES)],
+)
+def test_items_of_every_kind_are_said_completely_in_entries_that_fit(
+    keyframes: tuple[Keyframe, ...],
+    ranges: tuple[RangeItem, ...],
+    closures: tuple[ClosureItem, ...],
+) -> None:
+    team = Team(a_seal(3))
+    entries = [team.append(e, 0) for e in team.entries(TRAITS, keyframes, ranges, closures)]
+    assert all(fits(team.send_sealed(3, payload)) for _, payload in entries)
+    assert [entry.seq for entry, _ in entries] == list(range(len(entries)))
+    assert sum(len(e.keyframes) for e, _ in entries) == len(keyframes)
+    assert sum(len(e.ranges) for e, _ in entries) == len(ranges)
+    assert sum(len(e.closures) for e, _ in entries) == len(closures)
+
+
+def test_twenty_closures_with_twenty_peers_and_the_traits_have_1288_bytes() -> None:
+    team = Team(a_seal(3))
+    (entry,) = team.entries(TRAITS, (), (), CLOSURES[:ITEMS_PER_ENTRY])
+    assert len(messages.encode(HEADER, entry)) == 64 + 24 + 20 * (10 + 50) == 1288
+
+
+def test_the_largest_rank_that_can_be_configured_is_20() -> None:
+    with pytest.raises(ValueError):
+        OptimizerSection(rank=21)
+
+
+@pytest.mark.parametrize(("rank", "at_once"), [(2, 36), (5, 14), (20, 3)])
+def test_public_poses_go_out_as_many_at_a_time_as_fit(rank: int, at_once: int) -> None:
+    """69 bytes of frame, 16 * rank of anchor, 4 + 16 * rank for each; 1400 is the most."""
+    assert 69 + 16 * rank + at_once * (4 + 16 * rank) <= 1400
+    assert 69 + 16 * rank + (at_once + 1) * (4 + 16 * rank) > 1400
+    count = 3 * at_once + 1
+    values = np.arange((count + 1) * 2 * rank).reshape(count + 1, 2 * rank) * (1 + 2j)
+    public = PublicPoses(3, 11, rank, tuple(range(100, 100 + count)), values)
+    sends = Team(a_seal(3)).send_public(public, 0)
+    parts = [messages.decode("PUBLIC", send.payload) for send in sends]
+    assert all(fits(send) for send in sends)
+    assert [len(p.keyframes) for p in parts if isinstance(p, PublicPoses)] == [at_once] * 3 + [1]
+    whole = None
+    for part in parts:
+        assert isinstance(part, PublicPoses)
+        whole = part.after(whole)
+    assert whole == public
+    assert whole is not None
+    assert np.array_equal(whole.values, values)

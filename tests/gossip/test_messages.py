@@ -1,0 +1,187 @@
+"""Messages to LCM bytes and back: nothing is changed."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from sealed import COVARIANCE, HEADER, kinds
+
+from drslamd import lcmtypes
+from drslamd.conventions import Chain
+from drslamd.gossip import messages
+from drslamd.gossip.codecs import CODECS
+from drslamd.gossip.message_types import Heard, LogState, Message, OdometryBatch, Pose, Status
+from drslamd.slam.items import ClosureItem, GraphEntry, Keyframe, PublicPoses, RangeItem
+
+i16 = st.integers(-(2**15), 2**15 - 1)
+i32 = st.integers(-(2**31), 2**31 - 1)
+i64 = st.integers(-(2**63), 2**63 - 1)
+n32 = st.integers(0, 2**31 - 1)
+robots = st.integers(0, 254)
+chains = st.builds(Chain, robots, i64)
+floats = st.floats(allow_nan=False, allow_infinity=False)
+float32s = st.floats(allow_nan=False, allow_infinity=False, width=32)
+
+
+def millimetres(steps: int) -> float:
+    return steps * 1e-3
+
+
+def tenths(steps: int) -> float:
+    return steps * 1e-4
+
+
+def six(values: st.SearchStrategy[float]) -> st.SearchStrategy[tuple[float, ...]]:
+    return st.tuples(values, values, values, values, values, values)
+
+
+diagonals = st.floats(2**-20, 2**20, width=32).map(lambda v: (v, 0.0, 0.0, v, 0.0, v))
+log_states = st.builds(
+    lambda robot, epoch, numbers: LogState(robot, epoch, *sorted(numbers)),
+    robots, i64, st.tuples(n32, n32, n32),
+)  # fmt: skip
+statuses = st.builds(
+    Status,
+    st.integers(0, 1), robots, st.booleans(), st.integers(0, 2**32 - 1), i64, i64,
+    st.lists(st.builds(Heard, robots, i64, i64), max_size=31).map(tuple),
+    st.lists(robots, max_size=31).map(tuple),
+    st.lists(log_states, max_size=31).map(tuple),
+)  # fmt: skip
+batches = st.builds(
+    lambda start, later, first, steps: OdometryBatch(
+        start, start + later, np.cumsum([first, *steps], axis=0).astype(float)
+    ),
+    st.integers(0, 2**30), st.integers(0, 2**30), st.tuples(i32, i32, i32),
+    st.lists(st.tuples(*[st.integers(-32_767, 32_767)] * 3), max_size=149),
+)  # fmt: skip
+antennas = st.tuples(i16.map(millimetres), i16.map(millimetres))
+keyframes = st.builds(Keyframe, n32, st.integers(0, 2**15 - 1), i32, i32, i32)
+ranges = st.builds(
+    RangeItem, n32, chains, n32, antennas, antennas, i32.map(tenths),
+    st.integers(1, 2**15 - 1).map(millimetres),
+)  # fmt: skip
+closures = st.builds(
+    ClosureItem, n32, st.booleans(), n32, chains, n32,
+    st.tuples(*[i32.map(tenths)] * 3), diagonals,
+)  # fmt: skip
+sigmas = st.floats(2**-20, 8, width=32)
+traits = st.tuples(sigmas, sigmas, sigmas, sigmas, *[st.floats(-8, 8, width=32)] * 2)
+entries = st.builds(
+    GraphEntry, n32, traits | st.just(()),
+    st.lists(keyframes, max_size=6).map(tuple),
+    st.lists(ranges, max_size=6).map(tuple),
+    st.lists(closures, max_size=6).map(tuple),
+)  # fmt: skip
+poses = st.builds(
+    Pose, st.integers(0, 1), robots, i64, i64, st.tuples(floats, floats, floats), six(float32s)
+)
+
+
+@st.composite
+def publics(draw: st.DrawFn) -> PublicPoses:
+    rank, count = draw(st.sampled_from([1, 2, 5, 20])), draw(st.integers(0, 4))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    parts = rng.normal(0, draw(st.sampled_from([1e-9, 1.0, 1e9])), (2, count + 1, 2 * rank))
+    real, imaginary = parts.astype(np.float32).astype(float)
+    numbers = tuple(draw(n32) for _ in range(count))
+    return PublicPoses(draw(robots), draw(i64), rank, numbers, real + 1j * imaginary)
+
+
+def through(message: Message) -> Message | str:
+    return messages.decode(messages.kind_of(message), messages.encode(HEADER, message))
+
+
+def is_same(a: Any, b: Any) -> bool:
+    """Equality of messages, arrays and all."""
+    if type(a) is not type(b):
+        return False
+    pairs = ((getattr(a, f.name), getattr(b, f.name)) for f in dataclasses.fields(a))
+    return all(np.array_equal(x, y) if isinstance(x, np.ndarray) else x == y for x, y in pairs)
+
+
+# ---- there and back ----------------------------------------------------------------------------
+
+
+@settings(
+    derandomize=True, max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+@given(st.one_of(statuses, batches, entries, poses, publics()))
+def test_every_message_comes_back_as_it_was(message: Message) -> None:
+    assert is_same(through(message), message)
+
+
+@pytest.mark.parametrize("kind", CODECS)
+def test_a_message_of_each_kind_comes_back_as_it_was(kind: str) -> None:
+    assert is_same(through(kinds()[kind]), kinds()[kind])
+
+
+def test_the_header_stands_where_every_lcm_program_finds_it() -> None:
+    for kind, message in kinds().items():
+        raw = CODECS[kind].struct.decode(messages.encode(HEADER, message))
+        head = raw.header
+        fields = (head.version, head.origin, head.epoch, head.counter, head.utime, head.tag)
+        assert fields == (1, 3, 11, 12, 13, bytes(16))
+
+
+def test_positions_travel_in_tenths_of_millimetres_and_angles_in_tenths_of_milliradians() -> None:
+    closure = ClosureItem(0, True, 1, Chain(4, 5), 2, (1.23456, -0.00004, 0.00016), COVARIANCE)
+    back = through(GraphEntry(0, closures=(closure,)))
+    assert isinstance(back, GraphEntry)
+    assert back.closures[0].a_T_b == pytest.approx((1.2346, 0.0, 0.0002), abs=1e-12)
+
+
+def test_a_range_finer_than_a_millimetre_of_sigma_is_still_a_range() -> None:
+    item = RangeItem(1, Chain(4, 5), 2, (0.0, 0.0), (0.0, 0.0), 3.0, 0.0004)
+    back = through(GraphEntry(0, ranges=(item,)))
+    assert isinstance(back, GraphEntry)
+    assert back.ranges[0].sigma_m == pytest.approx(0.001)
+
+
+def test_sample_k_of_a_batch_is_its_first_pose_plus_the_first_k_differences() -> None:
+    """As odometry_t.lcm says."""
+    steps = np.array([[10, 20, 30], [11, 18, 33], [15, 18, 32]], dtype=float)
+    raw = lcmtypes.odometry_t.decode(messages.encode(HEADER, OdometryBatch(4, 5, steps)))
+    assert (raw.x0, raw.y0, raw.theta0, raw.n0, raw.segment_start) == (10, 20, 30, 5, 4)
+    assert (raw.dx, raw.dy, raw.dtheta) == ((1, 4, 0), (-2, 0, 0), (3, -1, 0))
+
+
+def test_what_lies_before_a_step_of_more_than_32767_is_left_out_of_a_batch() -> None:
+    most = np.array([[0, 0, 0], [32_767, -32_767, 0]], dtype=float)
+    assert is_same(through(OdometryBatch(5, 7, most)), OdometryBatch(5, 7, most))
+    leap = np.array([[0, 0, 0], [1, 0, 0], [1, -32_767, 0], [2, 0, 0], [2, 0, 1]], dtype=float)
+    assert is_same(through(OdometryBatch(5, 7, leap)), OdometryBatch(5, 7, leap))
+    leap[2] = [1, -32_768, 0]
+    assert is_same(through(OdometryBatch(5, 7, leap)), OdometryBatch(5, 10, leap[3:]))
+
+
+def test_each_kind_has_a_channel_for_each_robot() -> None:
+    assert messages.channel("GRAPH", 7) == "DRSLAM_GRAPH_007"
+    for kind, message in kinds().items():
+        assert messages.kind_of(message) == kind
+        for robot in (0, 9, 254):
+            assert messages.kind_of_channel(messages.channel(kind, robot)) == kind
+
+
+@pytest.mark.parametrize(
+    "channel",
+    [
+        "",
+        "DRSLAM_GRAPH",
+        "DRSLAM_GRAPH_",
+        "DRSLAM_GRAPH_7",
+        "DRSLAM_GRAPH_0007",
+        "DRSLAM_GRAPH_255",
+        "DRSLAM_GRAPH_-01",
+        "DRSLAM_GRAPH_٠٠٧",
+        "DRSLAM_TEAPOT_007",
+        "drslam_GRAPH_007",
+        "MBOT_ODOMETRY",
+    ],
+)
+def test_another_channel_is_none_of_ours(channel: str) -> None:
+    assert messages.kind_of_channel(channel) is None

@@ -1,0 +1,201 @@
+"""What is known of one peer: its loss, its life, its odometry, its latest words."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from sealed import MS, SECOND, a_status
+
+from drslamd.conventions import Chain
+from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose
+from drslamd.gossip.peer import Peer
+from drslamd.slam.se2 import Array
+
+OWN, CHAIN = Chain(1, 10), Chain(3, 11)
+T0 = 100 * SECOND
+
+
+def a_peer() -> Peer:
+    return Peer(CHAIN, T0)
+
+
+def own_log(entries: int) -> tuple[LogState, ...]:
+    """A peer's log state of its own log."""
+    return (LogState(*CHAIN, 0, entries, entries),)
+
+
+# ---- loss --------------------------------------------------------------------------------------
+
+
+def loss_after(messages: list[str], lost: set[int]) -> float:
+    """Of a peer that sent these ("status", "other", "entry"), of which some numbers were lost."""
+    peer, entries = a_peer(), 0
+    for k, kind in enumerate(messages):
+        if kind == "entry":
+            entries += 1
+        elif k not in lost:
+            peer.heard(k * 100 * MS, T0 + k * 100 * MS)
+            if kind == "status":
+                peer.take_status(a_status(logs=own_log(entries)), k + 1, OWN)
+    return peer.loss
+
+
+def test_a_peer_of_which_everything_comes_has_lost_nothing() -> None:
+    assert a_peer().loss == 0.0
+    assert loss_after(["status", "other", "other"] * 10, set()) == 0.0
+
+
+def test_a_peer_of_which_every_fourth_message_is_lost_has_a_loss_of_a_quarter() -> None:
+    messages = ["status", "other", "other", "other"] * 20
+    assert loss_after(messages, set(range(2, 80, 4))) == pytest.approx(0.25)
+
+
+def test_lost_statuses_count_when_the_next_one_comes() -> None:
+    messages = ["status", "other"] * 20
+    assert loss_after(messages, set(range(2, 36))) == pytest.approx(1 - 4 / 38)
+
+
+def test_log_entries_have_numbers_too_and_do_not_count_as_lost() -> None:
+    assert loss_after(["status", "other", "entry", "entry"] * 20, set()) == 0.0
+    messages = ["status", "other", "entry", "other"] * 20
+    assert loss_after(messages, set(range(1, 80, 4))) == pytest.approx(1 / 3)
+
+
+def test_the_loss_is_that_of_the_last_thirty_statuses() -> None:
+    messages = ["status", "other"] * 100
+    assert loss_after(messages, {k for k in range(100) if k % 2}) == 0.0
+    assert loss_after(messages, {k for k in range(100, 200) if k % 2}) == pytest.approx(0.5)
+
+
+def test_a_peer_that_lies_about_its_log_has_some_loss_and_breaks_nothing() -> None:
+    peer = a_peer()
+    for counter, entries in ((1, 0), (2, 1), (3, 10**6), (4, 0)):
+        peer.take_status(a_status(logs=own_log(entries)), counter, OWN)
+        assert 0.0 <= peer.loss <= 1.0
+
+
+# ---- life --------------------------------------------------------------------------------------
+
+
+def test_a_peer_lives_for_five_seconds_after_its_last_message() -> None:
+    peer = a_peer()
+    peer.heard(0, T0 + SECOND)
+    assert peer.is_alive(T0 + 6 * SECOND - 1)
+    assert not peer.is_alive(T0 + 6 * SECOND)
+
+
+def test_a_peer_that_says_goodbye_is_gone_at_once() -> None:
+    peer = a_peer()
+    peer.take_status(a_status(leaving=True), 1, OWN)
+    assert not peer.is_alive(T0)
+
+
+def test_a_peer_hears_us_when_its_latest_status_names_this_very_start() -> None:
+    peer = a_peer()
+    assert not peer.hears(OWN)
+    for counter, (named, hears) in enumerate(
+        [(Heard(1, 10, 5), True), (Heard(1, 9, 5), False), (Heard(2, 10, 5), False)], start=1
+    ):
+        peer.take_status(a_status((Heard(7, 7, 0), named)), counter, OWN)
+        assert peer.hears(OWN) == hears
+
+
+def test_what_it_hears_of_us_makes_its_clock_known() -> None:
+    peer = a_peer()
+    peer.heard(T0 + SECOND, T0 + 10 * MS)
+    peer.take_status(a_status((Heard(*OWN, SECOND + 10 * MS),)), 1, OWN)
+    offset = peer.clock.offset(T0)
+    assert offset is not None
+    assert (offset.us, offset.source) == (SECOND, "messages")
+    peer.take_status(a_status((Heard(1, 9, 0),)), 2, OWN)
+    offset = peer.clock.offset(T0)
+    assert offset is not None
+    assert offset.source == "one way"
+
+
+def test_a_status_that_was_overtaken_says_nothing_new() -> None:
+    peer = a_peer()
+    late, latest = a_status(leaving=False), a_status(leaving=True)
+    assert peer.take_status(latest, 5, OWN)
+    assert not peer.take_status(late, 4, OWN)
+    assert not peer.take_status(late, 5, OWN)
+    assert peer.status is latest
+
+
+def test_a_pose_that_was_overtaken_says_nothing_new() -> None:
+    peer = a_peer()
+    late, latest = Pose(1, 3, 11, 1), Pose(1, 3, 11, 2)
+    peer.take_pose(latest, 5)
+    peer.take_pose(late, 4)
+    assert peer.pose is latest
+
+
+# ---- odometry ----------------------------------------------------------------------------------
+
+
+def steps(first: int, count: int) -> Array:
+    """Sample n is at x = n, y = 2 n, theta = 3 n."""
+    return np.array([[n, 2.0 * n, 3.0 * n] for n in range(first, first + count)])
+
+
+def batch(first: int, count: int, segment_start: int = 0) -> OdometryBatch:
+    return OdometryBatch(segment_start, first, steps(first, count))
+
+
+def test_overlapping_batches_make_one_track() -> None:
+    peer = a_peer()
+    for first in (0, 5, 10):
+        peer.extend_track(batch(first, 15))
+    assert (peer.track.n0, peer.track.end) == (0, 25)
+    assert np.array_equal(peer.track.steps(0, 25), steps(0, 25))
+    assert peer.track.covers(0, 24)
+
+
+def test_batches_that_come_twice_or_late_change_nothing() -> None:
+    peer = a_peer()
+    for first in (0, 10, 5, 0, 10):
+        peer.extend_track(batch(first, 15))
+    assert np.array_equal(peer.track.steps(0, 25), steps(0, 25))
+
+
+def test_two_lost_batches_in_a_row_lose_nothing_and_a_third_leaves_a_hole() -> None:
+    """As the robot sends them: 15 samples every 5."""
+    for first, covered in ((15, True), (20, False)):
+        peer = a_peer()
+        peer.extend_track(batch(0, 15))
+        peer.extend_track(batch(first, 15))
+        assert peer.track.covers(0, first + 14) == covered
+        assert peer.track.covers(first, first + 14)
+
+
+def test_a_break_in_the_odometry_of_the_peer_is_a_break_in_its_track() -> None:
+    peer = a_peer()
+    peer.extend_track(batch(0, 15))
+    peer.extend_track(batch(15, 5, segment_start=15))
+    assert not peer.track.covers(14, 15)
+    assert peer.track.covers(15, 19)
+
+
+# ---- what the front end learns -----------------------------------------------------------------
+
+
+def test_a_neighbour_carries_what_the_peer_said() -> None:
+    peer = a_peer()
+    peer.heard(T0 + SECOND, T0 + 10 * MS)
+    peer.take_status(a_status((Heard(*OWN, SECOND),), ranged=(1, 9), uwb_id=44), 1, OWN)
+    neighbour = peer.neighbour(OWN, T0)
+    assert (neighbour.chain, neighbour.uwb_id, neighbour.ranges_to_us) == (CHAIN, 44, True)
+    assert neighbour.ahead_us == SECOND - 5 * MS
+    peer.take_status(a_status(ranged=(9,)), 2, OWN)
+    assert not peer.neighbour(OWN, T0).ranges_to_us
+
+
+@pytest.mark.parametrize(("excess_us", "known"), [(0, True), (2, False)])
+def test_a_clock_that_is_known_worse_than_a_grid_step_is_not_used(
+    excess_us: int, known: bool
+) -> None:
+    """The sum of both delays, halved, and 3.2 ms for the drift make 100 ms."""
+    peer = a_peer()
+    peer.heard(T0, T0 + 96_800)
+    peer.take_status(a_status((Heard(*OWN, 96_800 + excess_us),)), 1, OWN)
+    assert (peer.neighbour(OWN, T0).ahead_us is not None) == known

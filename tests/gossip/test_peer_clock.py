@@ -1,0 +1,229 @@
+"""The clock of a peer against ours: how wrong it may be is said, and is true."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+
+import pytest
+from sealed import MS, SECOND
+
+from drslamd.gossip.peer_clock import Offset, PeerClock
+
+DAY = 86_400 * SECOND
+PERIOD = 2**32 * MS
+"""LinkTrack's system_time is a u32 of milliseconds."""
+T0 = 1000 * SECOND
+
+Delay = Callable[[random.Random], int]
+
+
+def constant(delay: int) -> Delay:
+    return lambda draw: delay
+
+
+SHORT = constant(2 * MS)
+
+
+def jittering(least: int, mean: int) -> Delay:
+    return lambda draw: least + round(draw.expovariate(1 / mean))
+
+
+class Conversation:
+    """Two robots that send five messages a second; `ours` listens to the peer, `theirs` to us.
+
+    The peer's clock shows `offset` more than ours at T0 and runs faster by `ppm`.
+    """
+
+    def __init__(
+        self, offset: int, ppm: float = 0.0, out: Delay = SHORT, back: Delay = SHORT
+    ) -> None:
+        self.ours, self.theirs = PeerClock(), PeerClock()
+        self.now = T0
+        self._offset, self._ppm, self._out, self._back = offset, ppm, out, back
+        self._random = random.Random(4)
+
+    def offset(self) -> int:
+        """The truth."""
+        return self._offset + round((self.now - T0) * self._ppm * 1e-6)
+
+    def talk(self, seconds: int) -> None:
+        for k in range(5 * seconds):
+            self.now += 200 * MS
+            there = self.now + self.offset()
+            self.theirs.heard(self.now, there + self._out(self._random))
+            self.ours.heard(there, self.now + self._back(self._random))
+            if k % 5 == 0:
+                self.ours.echoed(self.theirs.delay_us)
+
+    def found(self) -> Offset:
+        found = self.ours.offset(self.now)
+        assert found is not None
+        return found
+
+    def error(self) -> int:
+        return abs(self.found().us - self.offset())
+
+
+def is_within_the_claim(talk: Conversation) -> bool:
+    return talk.error() <= talk.found().uncertainty_us
+
+
+# ---- from messages -----------------------------------------------------------------------------
+
+
+def test_before_the_first_message_nothing_is_known() -> None:
+    clock = PeerClock()
+    assert clock.offset(T0) is None
+    assert clock.delay_us is None
+
+
+def test_equal_delays_both_ways_cancel() -> None:
+    talk = Conversation(offset=123_456_789, out=constant(7 * MS), back=constant(7 * MS))
+    talk.talk(5)
+    assert talk.found() == Offset(123_456_789, 7 * MS + 3_200, "messages")
+
+
+@pytest.mark.parametrize("offset", [0, 5 * SECOND, -5 * SECOND, 100 * DAY, -100 * DAY])
+def test_any_offset_is_found_to_ten_milliseconds_through_jitter(offset: int) -> None:
+    talk = Conversation(offset, out=jittering(1 * MS, 20 * MS), back=jittering(1 * MS, 20 * MS))
+    talk.talk(20)
+    assert talk.error() <= 10 * MS
+    assert is_within_the_claim(talk)
+
+
+@pytest.mark.parametrize(("out", "back"), [(0, 60), (60, 0), (5, 200), (200, 5)])
+@pytest.mark.parametrize("ppm", [-200, -100, 0, 100, 200])
+def test_unequal_delays_and_drift_stay_within_the_claim(out: int, back: int, ppm: int) -> None:
+    talk = Conversation(10 * SECOND, ppm, constant(out * MS), constant(back * MS))
+    for _ in range(40):
+        talk.talk(1)
+        assert is_within_the_claim(talk)
+    assert talk.error() >= abs(out - back) // 2 * MS - 3_200
+
+
+@pytest.mark.parametrize("ppm", [-100, 100])
+def test_a_drift_of_100_ppm_is_followed_to_ten_milliseconds_for_an_hour(ppm: int) -> None:
+    talk = Conversation(-SECOND, ppm, jittering(1 * MS, 5 * MS), jittering(1 * MS, 5 * MS))
+    for _ in range(60):
+        talk.talk(60)
+        assert talk.error() <= 10 * MS
+        assert is_within_the_claim(talk)
+
+
+def test_the_smallest_delay_counts_and_not_the_last() -> None:
+    clock = PeerClock()
+    for delay in (30 * MS, 4 * MS, 50 * MS):
+        clock.heard(T0, T0 + delay)
+    assert clock.delay_us == 4 * MS
+
+
+def test_a_small_delay_is_forgotten_after_sixteen_seconds() -> None:
+    for later, smallest in ((15, 4 * MS), (16, 30 * MS)):
+        clock = PeerClock()
+        clock.heard(T0, T0 + 4 * MS)
+        clock.heard(T0 + later * SECOND, T0 + later * SECOND + 30 * MS)
+        assert clock.delay_us == smallest
+
+
+def test_what_was_heard_before_a_long_silence_is_forgotten_with_the_first_message() -> None:
+    """In five minutes at 200 ppm the clocks moved 60 ms."""
+    talk = Conversation(0, ppm=200)
+    talk.talk(20)
+    talk.now += 300 * SECOND
+    talk.talk(1)
+    assert talk.error() <= 10 * MS
+    assert is_within_the_claim(talk)
+
+
+def test_a_peer_that_does_not_say_how_it_hears_us_is_known_to_a_tenth_of_a_second() -> None:
+    clock = PeerClock()
+    clock.heard(T0 + 5 * SECOND, T0 + 40 * MS)
+    assert clock.offset(T0) == Offset(5 * SECOND - 40 * MS, 100 * MS, "one way")
+
+
+def test_a_peer_that_no_longer_hears_us_is_known_one_way_again() -> None:
+    talk = Conversation(offset=SECOND)
+    talk.talk(5)
+    assert talk.found().source == "messages"
+    talk.ours.echoed(None)
+    assert talk.found().source == "one way"
+
+
+# ---- from LinkTrack's system_time --------------------------------------------------------------
+
+OWN_MINUS_SYSTEM = 77_000_123
+
+
+def with_radio(talk: Conversation, error: int = 0, periods: int = 0) -> Conversation:
+    """Both robots know their clock against system_time, the peer's after some of its periods."""
+    theirs = OWN_MINUS_SYSTEM + talk.offset() + error + periods * PERIOD
+    talk.ours.radio(OWN_MINUS_SYSTEM, theirs, talk.now)
+    return talk
+
+
+def a_conversation(offset: int = 9 * SECOND) -> Conversation:
+    """Messages alone are 15 ms wrong, and between 10 ms and 40 ms one way or the other."""
+    talk = Conversation(offset, out=constant(40 * MS), back=constant(10 * MS))
+    talk.talk(5)
+    return talk
+
+
+def test_the_radio_is_better_than_the_messages() -> None:
+    talk = a_conversation()
+    assert talk.error() == 15 * MS
+    assert with_radio(talk, error=1 * MS).error() == 1 * MS
+    assert talk.found().source == "LinkTrack system_time"
+    assert talk.found().uncertainty_us == 3 * MS
+
+
+@pytest.mark.parametrize("periods", [-2, -1, 0, 1, 2])
+@pytest.mark.parametrize("offset", [0, 9 * SECOND, 30 * DAY, -60 * DAY, 200 * DAY])
+def test_the_period_of_system_time_makes_no_difference(offset: int, periods: int) -> None:
+    """Robots may have been switched on months apart, and system_time wraps after 49.7 days."""
+    assert with_radio(a_conversation(offset), periods=periods).found() == Offset(
+        offset, 3 * MS, "LinkTrack system_time"
+    )
+
+
+def test_system_time_that_wraps_between_the_readings_of_two_robots_makes_no_difference() -> None:
+    """Ours wrapped already: our clock minus system_time has grown by a period."""
+    talk = a_conversation()
+    talk.ours.radio(OWN_MINUS_SYSTEM + PERIOD, OWN_MINUS_SYSTEM + 9 * SECOND, talk.now)
+    assert talk.found() == Offset(9 * SECOND, 3 * MS, "LinkTrack system_time")
+
+
+@pytest.mark.parametrize(("age", "source"), [
+    (5 * SECOND - 1, "LinkTrack system_time"), (5 * SECOND, "messages"),
+])  # fmt: skip
+def test_the_radio_counts_for_five_seconds(age: int, source: str) -> None:
+    talk = with_radio(a_conversation())
+    found = talk.ours.offset(talk.now + age)
+    assert found is not None
+    assert found.source == source
+
+
+@pytest.mark.parametrize(
+    ("error", "source"),
+    [
+        (-10 * MS - 6_200, "LinkTrack system_time"),
+        (-10 * MS - 6_201, "messages"),
+        (40 * MS + 6_200, "LinkTrack system_time"),
+        (40 * MS + 6_201, "messages"),
+        (DAY, "messages"),
+        (PERIOD // 2, "messages"),
+    ],
+)
+def test_the_radio_is_not_believed_where_the_messages_rule_it_out(error: int, source: str) -> None:
+    """Modules of two radio networks have nothing to do with each other."""
+    assert with_radio(a_conversation(), error).found().source == source
+
+
+def test_the_radio_alone_is_not_believed() -> None:
+    clock = PeerClock()
+    clock.radio(OWN_MINUS_SYSTEM, OWN_MINUS_SYSTEM, T0)
+    assert clock.offset(T0) is None
+    clock.heard(T0, T0 + 40 * MS)
+    found = clock.offset(T0)
+    assert found is not None
+    assert found.source == "one way"
