@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import socket
+
+PATIENCE_S = 0.1
+"""A manager that is busy, as when the host boots, holds up the robot no longer."""
 
 
 class Notifier:
@@ -19,7 +23,7 @@ class Notifier:
         """How often a sign of life is due, None when nobody waits for one."""
         period = os.environ.get("WATCHDOG_USEC", "")
         owner = os.environ.get("WATCHDOG_PID", str(os.getpid()))
-        if not period.isdigit() or owner != str(os.getpid()):
+        if not period.isdecimal() or owner != str(os.getpid()):
             return None
         return int(period) / 1e6
 
@@ -30,7 +34,8 @@ class Notifier:
         self._send("WATCHDOG=1")
 
     def status(self, text: str) -> None:
-        self._send(f"STATUS={text}")
+        """One line; a line break would end it and begin another message."""
+        self._send("STATUS=" + " ".join(text.splitlines()))
 
     def stopping(self) -> None:
         self._send("STOPPING=1")
@@ -39,9 +44,7 @@ class Notifier:
         if not self._address:
             return
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as notify:
-            try:
-                notify.connect(self._address)
-                notify.sendall(message.encode())
-            except OSError:
-                # a manager that went away must not take the robot with it
-                return
+            notify.settimeout(PATIENCE_S)
+            # a manager that is gone must not take the robot with it
+            with contextlib.suppress(OSError):
+                notify.sendto(message.encode(errors="replace"), self._address)
