@@ -94,26 +94,35 @@ def _run(options: argparse.Namespace) -> int:
     # one BLAS thread: the same bits on every machine, and a core left for the sensors
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    import structlog
+
+    from drslamd.daemon import Daemon
     from drslamd.io.logs import set_up
 
     config = _load(options.config)
     set_up(config.daemon)
-    asyncio.run(_serve(config))
+
+    async def serve() -> None:
+        await Daemon(config).run()
+
+    try:
+        asyncio.run(serve())
+    except ConfigError:
+        raise
+    except Exception:
+        structlog.get_logger().exception("daemon.bug", remedy="please report this")
+        return BUG
     return OK
-
-
-async def _serve(config: Config) -> None:
-    from drslamd.daemon import Daemon
-
-    await Daemon(config).run()
 
 
 def _check(options: argparse.Namespace) -> int:
     config = _load(options.config)
+    effective = config.model_dump(exclude_none=True)
+    effective["uwb"]["id"] = config.uwb_id
     if options.json:
-        print(config.model_dump_json(indent=2))
+        print(json.dumps(effective, indent=2))
     else:
-        print("\n".join(_toml(config.model_dump())))
+        print("\n".join(_toml(effective)).strip())
     return OK
 
 
@@ -121,9 +130,7 @@ def _toml(table: dict[str, Any], prefix: str = "") -> list[str]:
     """The effective configuration in the language of the file."""
     plain = {k: v for k, v in table.items() if not isinstance(v, dict)}
     lines = [f"[{prefix}]"] if prefix and plain else []
-    for key, value in plain.items():
-        if value is not None:
-            lines.append(f"{key} = {json.dumps(value)}")
+    lines += [f"{key} = {json.dumps(value)}" for key, value in plain.items()]
     for key, value in table.items():
         if isinstance(value, dict):
             lines += ["", *_toml(value, f"{prefix}.{key}" if prefix else key)]

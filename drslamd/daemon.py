@@ -12,7 +12,6 @@ import os
 import signal
 from collections import defaultdict, deque
 from collections.abc import Callable, Coroutine
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,9 +20,21 @@ import numpy as np
 import structlog
 
 from drslamd import report
-from drslamd.config import CanWheelSection, Config, DbcSection, SerialWheelSection
+from drslamd.config import Config, ConfigError, DbcSection, SerialWheelSection
 from drslamd.conventions import SECOND_US
-from drslamd.events import Effect, Event, JobDone, Note, Save, Send, Solve, Stop, Tick, Write
+from drslamd.events import (
+    Effect,
+    Event,
+    JobDone,
+    Note,
+    Restart,
+    Save,
+    Send,
+    Solve,
+    Stop,
+    Tick,
+    Write,
+)
 from drslamd.gossip.seal import team_key
 from drslamd.io.can_bus import CanBus, require_python_can
 from drslamd.io.clock import Clock, MonotonicClock, wall_epoch
@@ -34,10 +45,9 @@ from drslamd.io.state_store import StateStore, next_epoch, read_key
 from drslamd.io.status_socket import StatusSocket
 from drslamd.io.systemd import Notifier
 from drslamd.io.transport import Transport
+from drslamd.io.worker import Finished, Worker
 from drslamd.robot import Robot
 
-STOP_S = 1.5
-"""Longest wait for computations and goodbyes at the end; systemd is promised two seconds."""
 JOB_STUCK_US = 20 * SECOND_US
 """A computation that takes longer is no progress, and the watchdog is not fed."""
 TIMINGS = 1_000
@@ -60,8 +70,8 @@ class Daemon:
         self._store = StateStore(state_dir(config), config.robot.id)
         state = self._store.load()
         epochs = {int(robot): int(epoch) for robot, epoch in state.get("epochs", {}).items()}
-        epoch = next_epoch(state, wall_epoch())
-        self.robot = Robot(config, team_key(secret), epoch, epochs, _dbc_text(config))
+        self._new_robot = partial(Robot, config, team_key(secret), dbc_text=_dbc_text(config))
+        self.robot = self._new_robot(next_epoch(state, wall_epoch()), epochs)
         # the new epoch is on disk before anything is sent under it
         self._store.save(self.robot.state())
         self._transport = self._make_transport()
@@ -77,7 +87,7 @@ class Daemon:
             },
         )  # fmt: skip
         self._notifier = Notifier()
-        self._worker = ThreadPoolExecutor(1, "solver")
+        self._worker = Worker()
         self._jobs: dict[int, int] = {}
         self._timings: dict[str, deque[float]] = defaultdict(lambda: deque(maxlen=TIMINGS))
         self._timer: asyncio.TimerHandle | None = None
@@ -88,6 +98,7 @@ class Daemon:
             Write: self._write,
             Solve: self._solve,
             Save: self._save,
+            Restart: self._restart,
             Note: _note,
         }
 
@@ -95,7 +106,9 @@ class Daemon:
         """Until SIGTERM or SIGINT; a fault of ours is raised."""
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):
-            loop.add_signal_handler(number, self._stop.set)
+            loop.add_signal_handler(number, self.stop)
+        loop.set_exception_handler(lambda _, context: self._fail(context.get("exception")))
+        self._worker.start()
         log.info("daemon.start", robot=self._config.robot.id, epoch=self.robot.own.epoch)
         if self._config.team.insecure:
             log.warning("team.insecure", remedy="make a key with: drslamd keygen")
@@ -114,16 +127,15 @@ class Daemon:
         if self._failure is not None:
             raise self._failure
 
+    def stop(self) -> None:
+        """End `run` in order, as SIGTERM does."""
+        self._stop.set()
+
     def handle(self, event: Event) -> None:
-        """One event in, its effects carried out."""
+        """One event in, its effects carried out; an exception is our bug and ends the daemon."""
         if self._failure is not None:
             return
-        try:
-            effects = self.robot.handle(event)
-        except Exception as error:
-            self._fail(error)
-            return
-        for effect in effects:
+        for effect in self.robot.handle(event):
             self._perform(effect)
         self._wake()
 
@@ -148,36 +160,39 @@ class Daemon:
         self._wheels.write(effect.data)
 
     def _solve(self, effect: Solve) -> None:
-        began = self._clock.now()
-        self._jobs[effect.job_id] = began
-        future = asyncio.get_running_loop().run_in_executor(self._worker, _timed, effect.run)
+        robot, self._jobs[effect.job_id] = self.robot, self._clock.now()
 
-        def done(finished: asyncio.Future[tuple[Any, float]]) -> None:
+        def done(finished: Finished) -> None:
             self._jobs.pop(effect.job_id)
-            if finished.cancelled():
-                return
-            error = finished.exception()
-            if error is not None:
-                self._fail(error)
-                return
-            result, seconds = finished.result()
-            self._timings[effect.name].append(1e3 * seconds)
-            elapsed = round(seconds * SECOND_US)
-            self.handle(JobDone(self._clock.now(), effect.job_id, result, elapsed))
+            if finished.error is not None:
+                raise finished.error
+            if robot is self.robot:
+                self._timings[effect.name].append(1e3 * finished.seconds)
+                elapsed = round(finished.seconds * SECOND_US)
+                self.handle(JobDone(self._clock.now(), effect.job_id, finished.result, elapsed))
 
-        future.add_done_callback(done)
+        self._worker.submit(effect.run, done)
+
+    def _restart(self, effect: Restart) -> None:
+        """A new robot in the place of the old one; ports and network stay as they are."""
+        old = self.robot
+        self.robot = self._new_robot(effect.epoch, old.team.seal.epochs)
+        for state in (*old.ports.values(), old.network):
+            if state is not None:
+                self.handle(state)
+        self._save(Save(self.robot.state()))
 
     def _save(self, effect: Save) -> None:
         # a sync can take a tenth of a second on an SD card; the worker has the patience
         before = self._store.fault
-        future = asyncio.get_running_loop().run_in_executor(
-            self._worker, self._store.save, effect.state
-        )
-        future.add_done_callback(lambda _: self._report_store(before))
 
-    def _report_store(self, before: str) -> None:
-        if self._store.fault and self._store.fault != before:
-            log.warning("state.fault", what=self._store.fault)
+        def done(finished: Finished) -> None:
+            if finished.error is not None:
+                raise finished.error
+            if self._store.fault and self._store.fault != before:
+                log.warning("state.fault", what=self._store.fault)
+
+        self._worker.submit(partial(self._store.save, effect.state), done)
 
     # ---- life ----
 
@@ -215,22 +230,19 @@ class Daemon:
         return f"{picture['pose']['state']}, {alive} peers" + (f"; {problems}" if problems else "")
 
     async def _end(self, tasks: list[asyncio.Task[None]]) -> None:
-        loop = asyncio.get_running_loop()
+        """Say goodbye, keep the state, let go of everything; nobody waits for the solver."""
         if self._timer is not None:
             self._timer.cancel()
         if self._failure is None:
             for effect in self.robot.handle(Stop(self._clock.now())):
-                self._perform(effect)
+                if isinstance(effect, Save):
+                    self._store.save(effect.state)
+                else:
+                    self._perform(effect)
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
         await self._status.close()
-        idle = loop.run_in_executor(
-            None, partial(self._worker.shutdown, True, cancel_futures=False)
-        )
-        await asyncio.wait([idle], timeout=STOP_S)
-        if self._timer is not None:
-            self._timer.cancel()
         log.info("daemon.stop", robot=self._config.robot.id)
 
     # ---- parts ----
@@ -260,13 +272,6 @@ class Daemon:
         }
 
 
-def _timed(run: Callable[[], Any]) -> tuple[Any, float]:
-    clock = MonotonicClock()
-    began = clock.now()
-    result = run()
-    return result, (clock.now() - began) / SECOND_US
-
-
 def _note(note: Note) -> None:
     log.log(_LEVELS[note.level.value], note.event, **note.fields)
 
@@ -279,8 +284,6 @@ def _dbc_text(config: Config) -> str:
     Raises:
         ConfigError: the file cannot be read.
     """
-    from drslamd.config import ConfigError
-
     if not isinstance(config.wheels, DbcSection):
         return ""
     path = Path(config.wheels.dbc_file)
@@ -304,6 +307,3 @@ def socket_path(config: Config) -> Path:
     runtime = os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
     name = f"drslamd-{config.robot.id}.sock"
     return Path(runtime) / name if runtime else state_dir(config) / name
-
-
-__all__ = ["CanWheelSection", "Daemon", "socket_path", "state_dir"]

@@ -148,6 +148,13 @@ class Save:
     state: Mapping[str, Any]
 
 
+@dataclass(frozen=True)
+class Restart:
+    """Forget everything and begin again under this epoch."""
+
+    epoch: int
+
+
 class Level(Enum):
     DEBUG = "debug"
     INFO = "info"
@@ -164,4 +171,4 @@ class Note:
     fields: Mapping[str, Any] = field(default_factory=dict)
 
 
-Effect = Union[Send, Write, Solve, Save, Note]
+Effect = Union[Send, Write, Solve, Save, Restart, Note]

@@ -13,10 +13,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
+from drslamd import diagnosis
 from drslamd.config import Config
 from drslamd.conventions import GRID_US, MILLISECOND_US, SECOND_US, Chain
 from drslamd.events import (
@@ -31,6 +32,7 @@ from drslamd.events import (
     Note,
     PortCondition,
     PortState,
+    Restart,
     Save,
     SerialData,
     Solve,
@@ -50,6 +52,7 @@ from drslamd.slam.back_end import BackEnd
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.items import GraphEntry
 from drslamd.slam.neighbour import Neighbour
+from drslamd.slam.pair import Pair
 from drslamd.slam.pair_window import Request
 from drslamd.slam.se2 import Array
 
@@ -66,10 +69,10 @@ GOODBYES = 3
 
 @dataclass(frozen=True)
 class _Job:
-    """A computation under way: its module, the peer it is about, and its question."""
+    """A computation under way: its module, the pair it is about, and its question."""
 
     module: str
-    peer: int
+    pair: Pair | None = None
     request: Request | None = None
 
 
@@ -200,13 +203,13 @@ class Robot:
     def _send_odometry(self, utime: int) -> list[Effect]:
         """Short-term odometry, for peers whose windows need it (paper III-C)."""
         track = self.front.reckoning.track
-        if not len(track) or not self._neighbours(utime):
+        if not len(track) or not self.neighbours(utime):
             return []
         n0 = max(track.n0, track.segment_start, track.end - BATCH)
         batch = OdometryBatch(track.segment_start, n0, track.steps(n0, track.end - n0))
         return [self.team.send(batch, utime)]
 
-    def _neighbours(self, utime: int) -> list[Neighbour]:
+    def neighbours(self, utime: int) -> list[Neighbour]:
         """Living peers within UWB range of us, as either side measures it."""
         mine = set(self.front.ranged(utime))
         peers = (peer.neighbour(self.own, utime) for peer in self.team.living(utime).values())
@@ -214,7 +217,7 @@ class Robot:
 
     def _extend_log(self, utime: int) -> list[Effect]:
         """One entry of our log: where our wheels went, what we ranged, what module 2 kept."""
-        neighbours = self._neighbours(utime)
+        neighbours = self.neighbours(utime)
         keyframe = self.front.keyframe()
         ranges = self.front.range_items(neighbours, self.back.graph, utime)
         closures = self.front.closure_items()
@@ -233,18 +236,18 @@ class Robot:
     # ---- the three modules ----
 
     def _module1(self, utime: int) -> list[Effect]:
-        neighbours = self._neighbours(utime)
-        busy = {job.peer for job in self._jobs.values() if job.module == "relative_pose"}
+        neighbours = self.neighbours(utime)
+        busy = [job.pair for job in self._jobs.values() if job.module == "relative_pose"]
         return [
-            self._solve(_Job("relative_pose", peer, request), run)
-            for peer, request, run in self.front.module1(neighbours, self.back.graph, utime)
-            if peer not in busy
+            self._solve(_Job("relative_pose", pair, request), run)
+            for pair, request, run in self.front.module1(neighbours, self.back.graph, utime)
+            if pair not in busy
         ]
 
     def _module2(self, utime: int) -> list[Effect]:
         return [
-            self._solve(_Job("consistency", peer), run)
-            for peer, run in self.front.module2(self.back.graph)
+            self._solve(_Job("consistency", pair), run)
+            for pair, run in self.front.module2(self.back.graph)
         ]
 
     def _module3(self, utime: int) -> list[Effect]:
@@ -252,7 +255,7 @@ class Robot:
             return []
         public = {k: peer.public for k, peer in self.team.peers.items() if peer.public}
         run = self.back.job(self.team.present(utime), self.team.shifts(utime), public)
-        return [self._solve(_Job("optimizer", self.own.robot), run)] if run else []
+        return [self._solve(_Job("optimizer"), run)] if run else []
 
     def _solve(self, job: _Job, run: Callable[[], object]) -> Solve:
         self._jobs_begun += 1
@@ -261,17 +264,16 @@ class Robot:
 
     def _on_job(self, event: JobDone) -> list[Effect]:
         job = self._jobs.pop(event.job_id)
-        pair = self.front.pairs.get(job.peer)
-        if job.module == "optimizer":
-            self.back.solved(event.result)
-            public = self.back.public_poses()
-            sends = self.team.send_public(public, event.utime) if public else []
-            return [*self._publish(event.utime), *sends]
-        if pair is not None and job.module == "relative_pose":
-            pair.estimated(cast(Request, job.request), event.result)
-        elif pair is not None:
-            pair.settle(event.result)
-        return []
+        if job.pair is not None and job.request is not None:
+            job.pair.estimated(job.request, event.result)
+            return []
+        if job.pair is not None:
+            job.pair.settle(event.result)
+            return []
+        self.back.solved(event.result)
+        public = self.back.public_poses()
+        sends = self.team.send_public(public, event.utime) if public else []
+        return [*self._publish(event.utime), *sends]
 
     # ---- what we know of ourselves ----
 
@@ -305,19 +307,18 @@ class Robot:
 
     def _check_health(self, utime: int) -> list[Effect]:
         self.team.forget_silent(utime)
-        notes = []
-        for key, sentence in self._conditions(utime):
+        notes: list[Effect] = []
+        for key, sentence in diagnosis.conditions(self, utime):
             notes += self.health.set(key, sentence, utime)
-        return [*notes]
+        return [*notes, *self._restart_if_superseded(utime)]
 
-    def _conditions(self, utime: int) -> list[tuple[str, str | None]]:
-        uwb, wheels = self.ports.get("uwb"), self.ports.get("wheels")
-        return [
-            ("uwb", _port_fault(uwb) or self.uwb.advice(utime)),
-            ("wheels", _port_fault(wheels) or self.wheels.advice(utime)),
-            ("network", None if self.network is None or self.network.up else self.network.detail),
-            *self.team.conditions(utime),
-        ]
+    def _restart_if_superseded(self, utime: int) -> list[Effect]:
+        """Peers know a later start of ours, so our own memory was lost: begin above it."""
+        above = self.team.superseded_by
+        if above is None or self.team.is_own_id_used(utime):
+            return []
+        fields = {"epoch": self.own.epoch, "known_to_peers": above}
+        return [Note(Level.WARNING, "epoch.superseded", fields), Restart(above + 1)]
 
     # ---- time passes, and ends ----
 
@@ -347,9 +348,3 @@ class Robot:
         goodbye = self._status(event.utime, leaving=True)
         sends = [self.team.send(goodbye, event.utime) for _ in range(GOODBYES)]
         return [*sends, Save(self.state())]
-
-
-def _port_fault(state: PortState | None) -> str | None:
-    if state is None or state.condition is PortCondition.OPEN:
-        return None
-    return f"{state.condition.value}: {state.detail}"

@@ -8,7 +8,7 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 SHARED = REPOSITORY.parent / "shared"
-"""Recordings and test vectors that are not part of the project; tests that use them skip without."""
+"""Recordings and test vectors that are not part of the project; their tests skip without."""
 
 
 @pytest.fixture(scope="session")

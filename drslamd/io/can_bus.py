@@ -1,4 +1,7 @@
-"""A CAN bus through python-can, kept open for ever like a serial port."""
+"""A CAN bus through python-can, kept open for ever like a serial port.
+
+python-can's own Notifier is not used: an exception in its reader ends it without a word.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +17,8 @@ from drslamd.io.clock import Clock
 if TYPE_CHECKING:
     import can
 
-CHECK_S = 0.5
-"""How often a bus is asked whether its reader still lives (python-can ends it in silence)."""
+PATIENCE_S = 0.2
+"""How long a bus without a file descriptor is waited for at a time."""
 
 
 def require_python_can() -> None:
@@ -74,19 +77,40 @@ class CanBus:
         return bus
 
     async def _read_until_it_fails(self, bus: can.BusABC) -> None:
-        import can
-
-        notifier = can.Notifier(bus, [self._frame], timeout=0.2, loop=asyncio.get_running_loop())
+        """Deliver frames in the loop until the bus raises."""
         try:
-            while notifier.exception is None:
-                await asyncio.sleep(CHECK_S)
-            self._state(PortCondition.LOST, f"{self.name}: {notifier.exception}")
+            read = self._read_in_a_thread if _descriptor(bus) < 0 else self._read_when_ready
+            error = await read(bus)
+            self._state(PortCondition.LOST, f"{self.name}: {error}")
         finally:
-            await asyncio.to_thread(notifier.stop)
             await asyncio.to_thread(bus.shutdown)
 
-    def _frame(self, message: can.Message) -> None:
-        if message.is_error_frame or message.is_remote_frame:
+    async def _read_when_ready(self, bus: can.BusABC) -> Exception:
+        loop, descriptor = asyncio.get_running_loop(), _descriptor(bus)
+        failed: asyncio.Future[Exception] = loop.create_future()
+
+        def ready() -> None:
+            received = _receive(bus, 0.0)
+            if not isinstance(received, Exception):
+                self._take(received)
+            elif not failed.done():
+                failed.set_result(received)
+
+        loop.add_reader(descriptor, ready)
+        try:
+            return await failed
+        finally:
+            loop.remove_reader(descriptor)
+
+    async def _read_in_a_thread(self, bus: can.BusABC) -> Exception:
+        while True:
+            received = await asyncio.to_thread(_receive, bus, PATIENCE_S)
+            if isinstance(received, Exception):
+                return received
+            self._take(received)
+
+    def _take(self, message: can.Message | None) -> None:
+        if message is None or message.is_error_frame or message.is_remote_frame:
             return
         self._deliver(
             CanFrame(
@@ -101,3 +125,20 @@ class CanBus:
         if (condition, detail) != self._last_state:
             self._last_state = (condition, detail)
             self._deliver(PortState(self._clock.now(), "wheels", condition, detail))
+
+
+def _receive(bus: can.BusABC, patience_s: float) -> can.Message | Exception | None:
+    """One frame, nothing yet, or what ended the bus."""
+    import can
+
+    try:
+        return bus.recv(patience_s)
+    except (can.CanError, OSError, ValueError) as error:
+        return error
+
+
+def _descriptor(bus: can.BusABC) -> int:
+    try:
+        return int(bus.fileno())
+    except NotImplementedError:
+        return -1

@@ -164,3 +164,23 @@ class AsciiEmulator:
 
     def answer(self, asked: bytes) -> bytes:
         return b""
+
+
+def as_heard_at(data: bytes, sent_baud: int, heard_baud: int) -> bytes:
+    """What a receiver at another baud rate makes of bytes: it samples the same line, 8N1."""
+    line = [1, 1]
+    for byte in data:
+        line += [0, *((byte >> k) & 1 for k in range(8)), 1]
+    line += [1] * 12
+    step = sent_baud / heard_baud
+    out, at = bytearray(), 0.0
+    while at < len(line):
+        if line[int(at)]:
+            at += step / 8
+            continue
+        bits = [at + (k + 1.5) * step for k in range(8)]
+        if bits[-1] >= len(line):
+            break
+        out.append(sum(line[int(b)] << k for k, b in enumerate(bits)))
+        at += 9.5 * step
+    return bytes(out)

@@ -24,6 +24,7 @@ from drslamd.events import (
     Event,
     JobDone,
     Note,
+    Restart,
     Save,
     Send,
     SerialData,
@@ -91,6 +92,7 @@ class Member:
     """One robot of the simulated team."""
 
     robot: Robot
+    renew: Callable[[int], Robot]
     clock: Clock
     hardware: Hardware | None
     traces: Traces
@@ -107,6 +109,8 @@ class Simulator:
         self.now = 0
         self.network = network or Network()
         self.members: dict[int, Member] = {}
+        """By robot id, the latest start of each."""
+        self._everyone: list[Member] = []
         self._rng = np.random.default_rng(seed)
         self._solve_us = solve_us
         self._heap: list[tuple[int, int, Callable[[], None]]] = []
@@ -123,9 +127,13 @@ class Simulator:
         epochs: dict[int, int] | None = None,
     ) -> Member:
         """Switch a robot on, now."""
-        robot = Robot(config, team_key(secret), epoch, epochs or {})
-        member = Member(robot, clock or Clock(), hardware, Traces())
+
+        def renew(fresh: int) -> Robot:
+            return Robot(config, team_key(secret), fresh, dict(epochs or {}))
+
+        member = Member(renew(epoch), renew, clock or Clock(), hardware, Traces())
         self.members[config.robot.id] = member
+        self._everyone.append(member)
         self._tick(member)
         return member
 
@@ -205,13 +213,16 @@ class Simulator:
             member.traces.notes.append((self.now, effect))
         elif isinstance(effect, Save):
             member.traces.saved.append(effect)
+        elif isinstance(effect, Restart):
+            member.robot = member.renew(effect.epoch)
 
     def _send(self, sender: Member, effect: Send) -> None:
         data = lc02.encode(next(self._sequence), effect.channel, effect.payload)
         sender.traces.sent.append((self.now, effect.channel, effect.payload))
         source = sender.robot.own.robot
-        for target, member in self.members.items():
-            if target != source and self.network.connected(source, target, self.now):
+        for member in self._everyone:
+            target = member.robot.own.robot
+            if member is not sender and self.network.connected(source, target, self.now):
                 for arrival in self.network.arrivals(self._rng, self.now):
                     self.at(arrival, lambda m=member: self._arrive(m, data, source))  # type: ignore[misc]
 
@@ -219,12 +230,16 @@ class Simulator:
         self.handle(member, lambda utime: Datagram(utime, data, f"robot {source}"))
 
     def _solve(self, member: Member, effect: Solve) -> None:
-        start = time.perf_counter()
+        robot, start = member.robot, time.perf_counter()
         result = effect.run()
         elapsed = time.perf_counter() - start
         member.traces.solve_ms[effect.name].append(elapsed * 1e3)
         took = round(elapsed * 1e6) if self._solve_us is None else self._solve_us
         self.at(
             self.now + took,
-            lambda: self.handle(member, lambda u: JobDone(u, effect.job_id, result, took)),
+            lambda: self._done(member, robot, effect.job_id, result, took),
         )
+
+    def _done(self, member: Member, robot: Robot, job: int, result: Any, took: int) -> None:
+        if member.robot is robot:
+            self.handle(member, lambda utime: JobDone(utime, job, result, took))

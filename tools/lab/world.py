@@ -67,7 +67,8 @@ def simulate(scene: Scene, seed: int) -> Recording:
         robot: Trail(robot, t[::every], wrong(rng, truth, scene.odometry)[::every], truth[::every])
         for robot, truth in enumerate(truths)
     }
-    rows = [
+    rows = [np.zeros((0, 4))]
+    rows += [
         row
         for a in range(scene.robots)
         for b in range(a + 1, scene.robots)

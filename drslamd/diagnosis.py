@@ -1,0 +1,76 @@
+"""Why a robot is not (yet) where it should be: every silent stage gets a reason and a remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+from drslamd.conventions import SECOND_US
+from drslamd.events import PortCondition
+
+if TYPE_CHECKING:
+    from drslamd.robot import Robot
+
+PATIENCE_US = 3 * SECOND_US
+"""How long an open port may be silent before that is worth a word."""
+
+Condition = tuple[str, "str | None"]
+"""A key, and a sentence when something is wrong."""
+
+
+def conditions(robot: Robot, utime: int) -> Iterator[Condition]:
+    """Everything that is looked after, sensor by sensor and stage by stage."""
+    yield "uwb", _sensor(robot, "uwb", robot.uwb.advice, utime)
+    yield "wheels", _sensor(robot, "wheels", robot.wheels.advice, utime)
+    network = robot.network
+    yield "network", None if network is None or network.up else network.detail
+    yield from robot.team.conditions(utime)
+    yield "pose", why_not_localised(robot, utime)
+
+
+def _sensor(robot: Robot, name: str, advice: Callable[[int], str | None], utime: int) -> str | None:
+    """The fault of its port, or what its codec says once the port has been open for a while."""
+    state = robot.ports.get(name)
+    if state is None:
+        return advice(utime)
+    if state.condition is not PortCondition.OPEN:
+        return f"{name}: {state.condition.value}: {state.detail}"
+    return advice(utime) if utime - state.utime > PATIENCE_US else None
+
+
+def why_not_localised(robot: Robot, utime: int) -> str | None:
+    """The first stage at which it stops, None when the robot is localised."""
+    if robot.back.estimate is not None:
+        return None
+    peers = robot.team.peers
+    living = robot.team.living(utime)
+    if not peers:
+        return (
+            "not localised: no other robot is heard; is drslamd running on them, in this network, "
+            "with the same gossip.group and port?"
+        )
+    if not living:
+        return (
+            f"not localised: robots {_listed(peers)} are heard but do not hear this one; "
+            "is multicast let through in both directions?"
+        )
+    near = robot.neighbours(utime)
+    if not near:
+        return (
+            f"not localised: no ranges to robots {_listed(living)}; are their modules on, in the "
+            "same DR mode, and is uwb.id right on every robot?"
+        )
+    if not len(robot.front.reckoning.track):
+        return "not localised: no odometry yet"
+    owned = [(k, pair) for k, pair in robot.front.pairs.items() if k in living]
+    if not owned:
+        return (
+            f"not localised: closures with this robot are made by robots "
+            f"{_listed(peer.chain.robot for peer in near)}; ask them"
+        )
+    reasons = [f"{pair.last_verdict or 'nothing yet'} (with robot {k})" for k, pair in owned]
+    return f"not localised: {', '.join(reasons)}; drive curves, and not side by side"
+
+
+def _listed(robots: object) -> str:
+    return ", ".join(str(robot) for robot in sorted(robots))  # type: ignore[call-overload]

@@ -1,0 +1,60 @@
+"""One thread for what takes long, so that the loop is free to read sensors.
+
+The thread is a daemon: at the end of the process nobody waits for a computation whose answer
+nobody will use.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import queue
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Finished:
+    """What a computation gave, or the exception that it ended with, and how long it took."""
+
+    result: Any
+    error: BaseException | None
+    seconds: float
+
+
+class Worker:
+    """Runs one computation after the other and reports each to the loop."""
+
+    def __init__(self) -> None:
+        self._queue: queue.SimpleQueue[tuple[Callable[[], Any], Callable[[Finished], None]]]
+        self._queue = queue.SimpleQueue()
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    def start(self) -> None:
+        """Begin to work for the running loop."""
+        self._loop = asyncio.get_running_loop()
+        threading.Thread(target=self._work, name="worker", daemon=True).start()
+
+    def submit(self, run: Callable[[], Any], done: Callable[[Finished], None]) -> None:
+        """Compute `run()` in the thread, then call `done` in the loop."""
+        self._queue.put((run, done))
+
+    def _work(self) -> None:
+        assert self._loop is not None
+        while True:
+            run, done = self._queue.get()
+            began = time.perf_counter()
+            result, error = None, None
+            try:
+                result = run()
+            except BaseException as raised:
+                # not swallowed: it ends the daemon from the loop, where its end is in order
+                error = raised
+            finished = Finished(result, error, time.perf_counter() - began)
+            try:
+                self._loop.call_soon_threadsafe(done, finished)
+            except RuntimeError:
+                # the loop has closed; nobody waits any more
+                return

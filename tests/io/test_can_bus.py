@@ -1,0 +1,170 @@
+"""CAN through python-can: in one process on `virtual`, across sockets on `udp_multicast`."""
+
+from __future__ import annotations
+
+import asyncio
+import struct
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+can = pytest.importorskip("can", reason="python-can is not installed")
+
+from drslamd.config import AgilexSection, CanSection, OdriveSection  # noqa: E402
+from drslamd.events import CanFrame, Event, PortCondition, PortState  # noqa: E402
+from drslamd.io.can_bus import CanBus  # noqa: E402
+from drslamd.io.clock import MonotonicClock  # noqa: E402
+from drslamd.sensors.wheel_input import WheelInput  # noqa: E402
+
+
+async def until(so: Callable[[], bool], within_s: float = 8.0) -> None:
+    for _ in range(int(within_s / 0.01)):
+        if so():
+            return
+        await asyncio.sleep(0.01)
+    raise AssertionError("not in time")
+
+
+def exchange(section: CanSection, sent: list[Any], extra: dict[str, Any]) -> list[Event]:
+    """Put messages on a bus; what the daemon's side delivered."""
+
+    async def run() -> list[Event]:
+        events: list[Event] = []
+        task = asyncio.ensure_future(CanBus(section, MonotonicClock(), events.append).run())
+        await until(lambda: len(events) > 0)
+        with can.Bus(section.channel, interface=section.interface, **extra) as other:
+            for number, message in enumerate(sent):
+                other.send(message)
+                if number % 2:
+                    await asyncio.sleep(0.01)
+            wanted = sum(not (m.is_remote_frame or m.is_error_frame) for m in sent)
+            await until(lambda: sum(isinstance(e, CanFrame) for e in events) >= wanted)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        return events
+
+    return asyncio.run(asyncio.wait_for(run(), 20))
+
+
+BUSES = [
+    pytest.param(CanSection(interface="virtual", channel="test"), {}, id="virtual"),
+    pytest.param(
+        CanSection(interface="udp_multicast", channel="239.74.163.77"), {"hop_limit": 0},
+        id="udp_multicast",
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("section", "extra"), BUSES)
+def test_frames_arrive_with_id_width_and_data(section: CanSection, extra: dict[str, Any]) -> None:
+    if section.interface == "udp_multicast":
+        pytest.importorskip("msgpack", reason="msgpack is not installed")
+    sent = [
+        can.Message(arbitration_id=0x311, is_extended_id=False, data=bytes(range(8))),
+        can.Message(arbitration_id=0x12345678, is_extended_id=True, data=b"\x01"),
+        can.Message(arbitration_id=0x29, is_extended_id=False, is_remote_frame=True, dlc=8),
+        can.Message(arbitration_id=0x7FF, is_extended_id=False, data=b""),
+    ]
+    try:
+        events = exchange(section, sent, extra)
+    except (can.CanError, OSError) as error:
+        pytest.skip(f"no multicast route on this host: {error}")
+    assert isinstance(events[0], PortState)
+    assert events[0].condition is PortCondition.OPEN
+    frames = [(e.can_id, e.extended, e.data) for e in events if isinstance(e, CanFrame)]
+    assert frames == [
+        (0x311, False, bytes(range(8))), (0x12345678, True, b"\x01"), (0x7FF, False, b""),
+    ]  # fmt: skip
+
+
+def test_an_agilex_base_on_a_bus_becomes_motion() -> None:
+    section = AgilexSection(source="agilex", track_m=0.5)
+    sent = [
+        can.Message(
+            arbitration_id=0x311, is_extended_id=False, data=struct.pack(">ii", 10 * k, 10 * k)
+        )
+        for k in range(20)
+    ]
+    events = exchange(CanSection(interface="virtual", channel="agilex"), sent, {})
+    wheels = WheelInput(section)
+    motions = [m for e in events if isinstance(e, CanFrame) for m in wheels.on_frame(e)]
+    assert sum(m.distance_m for m in motions) == pytest.approx(0.19)
+
+
+def test_an_odrive_pair_on_a_bus_becomes_motion() -> None:
+    section = OdriveSection(
+        source="odrive", track_m=0.5, left_axis=0, right_axis=1, wheel_radius_m=0.1
+    )
+    sent = [
+        can.Message(
+            arbitration_id=axis << 5 | 0x09, is_extended_id=False,
+            data=struct.pack("<ff", 0.01 * k, 1.0),
+        )
+        for k in range(20)
+        for axis in (0, 1)
+    ]  # fmt: skip
+    events = exchange(CanSection(interface="virtual", channel="odrive"), sent, {})
+    wheels = WheelInput(section)
+    motions = [m for e in events if isinstance(e, CanFrame) for m in wheels.on_frame(e)]
+    turns = sum(m.distance_m for m in motions) / (2 * 3.14159265 * 0.1)
+    assert turns == pytest.approx(0.19, abs=0.015)
+
+
+def test_a_bus_that_cannot_be_opened_is_named_and_tried_again() -> None:
+    async def run() -> list[Event]:
+        events: list[Event] = []
+        section = CanSection(interface="socketcan", channel="nocan7")
+        task = asyncio.ensure_future(CanBus(section, MonotonicClock(), events.append).run())
+        await until(lambda: len(events) > 0)
+        await asyncio.sleep(0.5)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        return events
+
+    events = asyncio.run(asyncio.wait_for(run(), 20))
+    assert len(events) == 1
+    assert isinstance(events[0], PortState)
+    assert events[0].condition is PortCondition.MISSING
+    assert "nocan7" in events[0].detail
+
+
+def test_a_bus_whose_reader_dies_is_opened_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[Any] = []
+
+    class Broken(can.BusABC):  # type: ignore[misc,name-defined]
+        """A bus whose second receive raises, as a damaged adapter does."""
+
+        def __init__(self) -> None:
+            super().__init__(channel="broken")
+            self._left = 1
+
+        def _recv_internal(self, timeout: float | None) -> tuple[Any, bool]:
+            if self._left:
+                self._left -= 1
+                return can.Message(arbitration_id=1, is_extended_id=False, data=b"a"), True
+            raise can.CanOperationError("adapter gone")
+
+        def send(self, msg: Any, timeout: float | None = None) -> None: ...
+
+    def open_bus(*_: Any, **__: Any) -> Broken:
+        opened.append(Broken())
+        bus = opened[-1]
+        assert isinstance(bus, Broken)
+        return bus
+
+    monkeypatch.setattr(can, "Bus", open_bus)
+
+    async def run() -> list[Event]:
+        events: list[Event] = []
+        section = CanSection(interface="virtual", channel="broken")
+        task = asyncio.ensure_future(CanBus(section, MonotonicClock(), events.append).run())
+        await until(lambda: len(opened) >= 2)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        return events
+
+    events = asyncio.run(asyncio.wait_for(run(), 20))
+    states = [e.condition for e in events if isinstance(e, PortState)]
+    assert states[:2] == [PortCondition.OPEN, PortCondition.LOST]
+    assert any("adapter gone" in e.detail for e in events if isinstance(e, PortState))

@@ -1,0 +1,163 @@
+"""A serial port on a pseudo-terminal: opened, read, lost, found again."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+from lab.real_team import PseudoPort
+
+from drslamd.events import Event, PortCondition, PortState, SerialData
+from drslamd.io.clock import MonotonicClock
+from drslamd.io.serial_port import SerialPort
+
+Script = Callable[[PseudoPort, SerialPort, "list[Event]"], Awaitable[None]]
+
+
+def with_port(folder: Path, script: Script) -> list[Event]:
+    """Run a script against an open port; every event that the port delivered."""
+
+    async def run() -> list[Event]:
+        cable = PseudoPort(folder / "tty")
+        events: list[Event] = []
+        port = SerialPort("uwb", str(cable.name), 921_600, MonotonicClock(), events.append)
+        task = asyncio.ensure_future(port.run())
+        await until(lambda: len(events) > 0)
+        await script(cable, port, events)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        cable.pull()
+        return events
+
+    return asyncio.run(asyncio.wait_for(run(), 20))
+
+
+async def until(so: Callable[[], bool], within_s: float = 8.0) -> None:
+    for _ in range(int(within_s / 0.01)):
+        if so():
+            return
+        await asyncio.sleep(0.01)
+    raise AssertionError("not in time")
+
+
+def received(events: list[Event]) -> bytes:
+    return b"".join(e.data for e in events if isinstance(e, SerialData))
+
+
+def conditions(events: list[Event]) -> list[PortCondition]:
+    return [e.condition for e in events if isinstance(e, PortState)]
+
+
+def test_all_256_byte_values_arrive_as_they_were_sent(tmp_path: Path) -> None:
+    everything = bytes(range(256)) * 4
+
+    async def script(cable: PseudoPort, _: SerialPort, events: list[Event]) -> None:
+        cable.write(everything)
+        await until(lambda: len(received(events)) == len(everything))
+
+    assert received(with_port(tmp_path, script)) == everything
+
+
+def test_bytes_are_stamped_when_they_arrive(tmp_path: Path) -> None:
+    async def script(cable: PseudoPort, _: SerialPort, events: list[Event]) -> None:
+        for _again in range(10):
+            before = MonotonicClock().now()
+            count = len(events)
+            cable.write(b"x")
+            await until(lambda count=count: len(events) > count)  # type: ignore[misc]
+            assert 0 <= events[-1].utime - before < 200_000
+
+    with_port(tmp_path, script)
+
+
+def test_what_is_written_reaches_the_device(tmp_path: Path) -> None:
+    asked = []
+
+    def device(data: bytes) -> bytes:
+        asked.append(data)
+        return b"C=1:2\r"
+
+    async def script(cable: PseudoPort, port: SerialPort, events: list[Event]) -> None:
+        cable.answer_with(device)
+        port.write(b"?C\r")
+        await until(lambda: received(events) == b"C=1:2\r")
+
+    with_port(tmp_path, script)
+    assert asked == [b"?C\r"]
+
+
+def test_a_pulled_cable_is_told_once_and_the_port_comes_back(tmp_path: Path) -> None:
+    async def script(cable: PseudoPort, _: SerialPort, events: list[Event]) -> None:
+        cable.pull()
+        await until(lambda: PortCondition.MISSING in conditions(events))
+        await asyncio.sleep(0.5)
+        cable.plug()
+        await until(lambda: conditions(events)[-1] is PortCondition.OPEN)
+        cable.write(b"again")
+        await until(lambda: received(events) == b"again")
+
+    states = conditions(with_port(tmp_path, script))
+    assert states == [
+        PortCondition.OPEN, PortCondition.LOST, PortCondition.MISSING, PortCondition.OPEN,
+    ]  # fmt: skip
+
+
+def test_a_port_that_another_program_holds_is_busy_until_it_lets_go(tmp_path: Path) -> None:
+    async def run() -> None:
+        cable = PseudoPort(tmp_path / "tty")
+        events: list[Event] = []
+        other: list[Event] = []
+        path, clock = str(cable.name), MonotonicClock()
+        first = asyncio.ensure_future(SerialPort("uwb", path, 9600, clock, other.append).run())
+        await until(lambda: PortCondition.OPEN in conditions(other))
+        second = asyncio.ensure_future(SerialPort("uwb", path, 9600, clock, events.append).run())
+        await until(lambda: PortCondition.BUSY in conditions(events))
+        first.cancel()
+        await asyncio.gather(first, return_exceptions=True)
+        await until(lambda: conditions(events)[-1] is PortCondition.OPEN)
+        second.cancel()
+        await asyncio.gather(second, return_exceptions=True)
+        cable.pull()
+
+    asyncio.run(asyncio.wait_for(run(), 20))
+
+
+@pytest.mark.skipif(os.getuid() == 0, reason="root may open everything")
+def test_a_port_without_permission_says_so(tmp_path: Path) -> None:
+    forbidden = tmp_path / "tty"
+    forbidden.write_text("")
+    forbidden.chmod(0)
+    events = first_events(forbidden)
+    assert conditions(events) == [PortCondition.DENIED]
+
+
+def test_a_file_that_is_no_terminal_is_refused_with_its_name(tmp_path: Path) -> None:
+    plain = tmp_path / "plain"
+    plain.write_text("not a tty")
+    events = first_events(plain)
+    assert conditions(events) == [PortCondition.LOST]
+    assert isinstance(events[0], PortState)
+    assert str(plain) in events[0].detail
+
+
+def first_events(path: Path) -> list[Event]:
+    """What a port says of a path in its first tries."""
+
+    async def run() -> list[Event]:
+        events: list[Event] = []
+        port = SerialPort("uwb", str(path), 9600, MonotonicClock(), events.append)
+        task = asyncio.ensure_future(port.run())
+        await asyncio.sleep(0.7)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        return events
+
+    return asyncio.run(run())
+
+
+def test_a_port_that_is_not_there_is_told_once_not_at_every_try(tmp_path: Path) -> None:
+    events = first_events(tmp_path / "nothing")
+    assert conditions(events) == [PortCondition.MISSING]

@@ -1,0 +1,107 @@
+"""Recordings through real daemons and through the simulator: the same answer, and a good one.
+
+The simulated recording is made here, so that a clone without any recordings still proves this: four
+robots, 60 s at 0.5 m/s in 10 m x 12 m, ranges at 10 Hz from one module of each pair with bias
+N(0, 0.10 m) per pair, slow bias 0.06 m (2.5 s), white 0.02 m and 1 % of bursts of 0.3 m and more;
+odometry at 20 Hz with scale N(0, 3 %), yaw N(0, 0.15 deg/m), 0.5 deg/sqrt(m), 1 %/sqrt(m).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import SHARED
+from lab import outcome, pyfg, real_team, virtual_team, world
+from lab.outcome import Outcome
+from lab.recording import Recording
+
+pytestmark = pytest.mark.slow
+
+SCENE = world.Scene(robots=4, seconds=60.0, odometry_hz=20, range_hz=10, both_measure=False)
+SEED = 4
+TIERS = SHARED / "data" / "tiers_turtlebots" / "tiers_4robots_cora.pyfg"
+
+MOST_M, MOST_DEG = 0.10, 3.0
+SAME_M = 0.02
+FASTER = 10.0
+
+
+@pytest.fixture(scope="module", params=["simulated", "TIERS"])
+def recording(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Recording:
+    """What is played, read from a file."""
+    if request.param == "TIERS":
+        if not TIERS.exists():
+            pytest.skip(f"no recording at {TIERS}")
+        return pyfg.read(TIERS)
+    path: Path = tmp_path_factory.mktemp("recording") / "simulated.pyfg"
+    pyfg.write(path, world.simulate(SCENE, SEED), 0.12, [0.002, 0.001, 0.005])
+    return pyfg.read(path)
+
+
+@pytest.fixture(scope="module")
+def real(recording: Recording) -> Outcome:
+    """Four daemons, eight pseudo-terminals, multicast on lo, in real time."""
+    return asyncio.run(real_team.run(recording))
+
+
+@pytest.fixture(scope="module")
+def virtual(recording: Recording) -> Outcome:
+    return virtual_team.run(recording)
+
+
+def team(recording: Recording, result: Outcome) -> dict[str, Any]:
+    scores: dict[str, Any] = outcome.score(recording, result)["team"]
+    return scores
+
+
+@pytest.mark.parametrize("speed", ["real", "virtual"])
+def test_the_team_is_one_and_knows_where_it_was(
+    recording: Recording, speed: str, request: pytest.FixtureRequest
+) -> None:
+    result: Outcome = request.getfixturevalue(speed)
+    assert result.is_one_team
+    errors = team(recording, result)
+    assert errors["ate_rmse_m"] <= MOST_M
+    assert errors["rot_mean_deg"] <= MOST_DEG
+
+
+def test_real_and_virtual_time_give_the_same(
+    recording: Recording, real: Outcome, virtual: Outcome
+) -> None:
+    difference = team(recording, real)["ate_rmse_m"] - team(recording, virtual)["ate_rmse_m"]
+    assert abs(difference) <= SAME_M
+
+
+def test_virtual_time_is_ten_times_faster_than_real_time(recording: Recording) -> None:
+    took = []
+    for _ in range(3):
+        began = time.perf_counter()
+        virtual_team.run(recording)
+        took.append(time.perf_counter() - began)
+        if took[-1] < recording.duration / FASTER:
+            break
+    assert min(took) < recording.duration / FASTER, took
+
+
+def test_the_scores_have_every_field_of_the_schema(recording: Recording, virtual: Outcome) -> None:
+    scores = outcome.score(recording, virtual)
+    errors = {"ate_rmse_m", "ate_mean_m", "ate_std_m", "rot_mean_deg", "rot_std_deg",
+              "rot_mean_centred_deg"}  # fmt: skip
+    robots = {str(robot) for robot in recording.trails}
+    assert set(scores) == {"recording", "robots", "team", "live", "odometry", "pairs", "closures",
+                           "bytes_sent", "ms"}  # fmt: skip
+    for part in (scores, scores["live"], scores["odometry"]):
+        assert set(part["robots"]) == robots
+        assert all(set(e) == errors for e in (*part["robots"].values(), part["team"]))
+    assert set(scores["pairs"]["0-1"]) == {
+        "trans_median_m", "rot_median_deg", "trans_mean_m", "rot_mean_deg"
+    }  # fmt: skip
+    assert 0 < scores["closures"]["kept"] <= scores["closures"]["seen"]
+    assert set(scores["bytes_sent"]) == robots
+    assert set(scores["ms"]) == {"relative_pose", "consistency", "optimizer"}

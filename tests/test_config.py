@@ -1,0 +1,144 @@
+"""Twenty-odd ways to get the configuration wrong, each answered by one sentence."""
+
+from __future__ import annotations
+
+import pytest
+
+from drslamd.config import Config, ConfigError, parse
+
+GOOD = """
+[robot]
+id = 3
+[team]
+insecure = true
+[uwb]
+port = "/dev/serial/by-id/uwb"
+[wheels]
+source = "kobuki"
+port = "/dev/serial/by-id/base"
+"""
+
+
+def changed(old: str, new: str) -> str:
+    assert old in GOOD
+    return GOOD.replace(old, new)
+
+
+def faults(text: str) -> list[str]:
+    with pytest.raises(ConfigError) as caught:
+        parse(text)
+    return caught.value.faults
+
+
+def test_the_smallest_file_is_enough_and_the_rest_are_the_papers_values() -> None:
+    config = parse(GOOD)
+    assert config.robot.id == 3
+    assert config.uwb_id == 3
+    assert (config.relative_pose.tau, config.relative_pose.delta) == (50, 0.1)
+    assert (config.consistency.epsilon, config.optimizer.rank) == (0.1, 5)
+    assert config.relative_pose.rate_hz == config.consistency.rate_hz == 1.0
+
+
+def test_the_uwb_id_may_differ_from_the_robot_id() -> None:
+    assert parse(changed("[wheels]", "id = 0x11C60B53\n[wheels]")).uwb_id == 0x11C60B53
+
+
+WRONG = {
+    "an id above 254": (changed("id = 3", "id = 255"), "robot.id", "255", "254"),
+    "an id below 0": (changed("id = 3", "id = -1"), "robot.id", "-1", "0"),
+    "an id that is no number": (changed("id = 3", 'id = "three"'), "robot.id", "three", "integer"),
+    "no id at all": (changed("id = 3", ""), "robot.id", "", "missing"),
+    "neither key nor insecure": (changed("insecure = true", ""), "team", "", "neither"),
+    "key and insecure at once": (
+        changed("insecure = true", 'insecure = true\nkey_file = "k"'), "team", "", "both",
+    ),
+    "a misspelt key": (changed("insecure", "insekure"), "team.insekure", "True", "insecure"),
+    "a misspelt section": (changed("[robot]", "[robto]"), "robto", "", "robot"),
+    "a section that does not exist": (GOOD + "[magic]\nx = 1", "magic", "", "unknown"),
+    "a baud rate below any": (
+        changed("[wheels]", "baud = 300\n[wheels]"), "uwb.baud", "300", "1200",
+    ),
+    "an antenna in millimetres": (
+        changed("[wheels]", "antenna_x_m = 120\n[wheels]"), "uwb.antenna_x_m", "120", "5",
+    ),
+    "no source of odometry": (changed('source = "kobuki"', ""), "wheels.source", "", "kobuki"),
+    "an unknown source": (changed("kobuki", "kobold"), "wheels.source", "kobold", "odrive"),
+    "a track of nothing": (GOOD + "track_m = 0", "wheels.track_m", "0", "0.01"),
+    "a negative track": (GOOD + "track_m = -0.2", "wheels.track_m", "-0.2", "0.01"),
+    "a missing wheel port": (
+        changed('port = "/dev/serial/by-id/base"', ""), "wheels.port", "", "missing",
+    ),
+    "roboteq without its scale": (
+        changed('"kobuki"', '"roboteq"\ntrack_m = 0.4'), "wheels.counts_per_metre", "", "missing",
+    ),
+    "a key of another source": (GOOD + "left_axis = 1", "wheels.left_axis", "1", "unknown"),
+    "dbc counts without a scale": (
+        changed(
+            '"kobuki"\nport = "/dev/serial/by-id/base"',
+            '"dbc"\ndbc_file = "f"\nmeasures = "counts"\nleft = "A.b"\nright = "A.c"\ntrack_m = 1',
+        ), "wheels", "", "counts_per_metre",
+    ),
+    "dbc twist without its signals": (
+        changed(
+            '"kobuki"\nport = "/dev/serial/by-id/base"',
+            '"dbc"\ndbc_file = "f"\nmeasures = "twist"\ntrack_m = 1',
+        ), "wheels", "", "linear and angular",
+    ),
+    "a significance of one": (
+        GOOD + "[consistency]\nepsilon = 1.0", "consistency.epsilon", "1.0", "1",
+    ),
+    "a window of two samples": (
+        GOOD + "[relative_pose]\ntau = 2", "relative_pose.tau", "2", "3",
+    ),
+    "a rate of zero": (GOOD + "[optimizer]\nrate_hz = 0", "optimizer.rate_hz", "0", "0"),
+    "a rate that is not finite": (
+        GOOD + "[optimizer]\nrate_hz = inf", "optimizer.rate_hz", "inf", "",
+    ),
+    "an unknown algorithm": (
+        GOOD + '[optimizer]\nalgorithm = "gtsam"', "optimizer.algorithm", "gtsam", "banded",
+    ),
+    "a unicast group": (
+        GOOD + '[gossip]\ngroup = "10.0.0.1"', "gossip", "10.0.0.1", "224.0.0.0",
+    ),
+    "a group that is no address": (
+        GOOD + '[gossip]\ngroup = "team"', "gossip", "team", "multicast",
+    ),
+    "a port above 65535": (GOOD + "[gossip]\nport = 70000", "gossip.port", "70000", "65535"),
+    "a url for the native transport": (
+        GOOD + '[gossip]\nurl = "udpm://239.0.0.1:1"', "gossip", "", "liblcm",
+    ),
+    "a section that is a value": (changed("[robot]\nid = 3", "robot = 3"), "robot", "3", ""),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_fault_is_one_sentence_with_key_value_and_what_is_allowed(name: str) -> None:
+    text, key, value, allowed = WRONG[name]
+    matching = [f for f in faults(text) if f.startswith(key)]
+    assert matching, faults(text)
+    assert value in matching[0]
+    assert allowed in matching[0]
+    assert "\n" not in matching[0]
+
+
+def test_all_faults_are_named_at_once() -> None:
+    text = changed("id = 3", "id = 999").replace("kobuki", "kobold") + "[gossip]\nttl = 99"
+    assert len(faults(text)) == 3
+
+
+def test_a_syntax_error_names_its_line() -> None:
+    (sentence,) = faults(GOOD + "[robot\n")
+    assert "line 11" in sentence
+
+
+def test_file_names_count_from_the_folder_of_the_file() -> None:
+    text = changed("insecure = true", 'key_file = "team.key"')
+    assert parse(text, "/etc/drslamd").team.key_file == "/etc/drslamd/team.key"
+    absolute = changed("insecure = true", 'key_file = "/run/team.key"')
+    assert parse(absolute, "/etc/drslamd").team.key_file == "/run/team.key"
+
+
+def test_a_configuration_cannot_be_changed() -> None:
+    config: Config = parse(GOOD)
+    with pytest.raises(Exception, match="frozen"):
+        config.robot.id = 4  # type: ignore[misc]

@@ -1,0 +1,172 @@
+"""The shape of the package, read off its imports: rings, order, size, no cycles."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import REPOSITORY
+
+PACKAGE = REPOSITORY / "drslamd"
+GENERATED = PACKAGE / "lcmtypes"
+
+RINGS = {
+    "vocabulary": ["conventions", "events", "config"],
+    "pure": [
+        "sensors",
+        "slam",
+        "lcmtypes",
+        "gossip",
+        "health",
+        "diagnosis",
+        "robot",
+        "report",
+        "status_text",
+    ],
+    "shell": ["io"],
+    "entry": ["daemon", "cli", "__main__"],
+}
+"""From the inside out; a module imports only from its own ring and those before it."""
+
+PURE_ORDER = ["sensors", "slam", "lcmtypes", "gossip", "health", "diagnosis", "robot", "report"]
+"""Inside the pure ring: each knows only what stands before it."""
+
+IMPURE = {
+    "asyncio", "socket", "time", "os", "logging", "structlog", "threading", "subprocess", "random",
+    "multiprocessing", "concurrent", "signal", "serial", "can", "lcm", "datetime", "secrets",
+}  # fmt: skip
+
+MAX_FILE, MAX_FUNCTION = 350, 60
+
+
+def modules() -> list[Path]:
+    return sorted(p for p in PACKAGE.rglob("*.py") if GENERATED not in p.parents)
+
+
+def name_of(path: Path) -> str:
+    parts = list(path.relative_to(REPOSITORY).with_suffix("").parts)
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def imports_of(path: Path) -> set[str]:
+    """Dotted names that a module imports when it runs (not only for type checking)."""
+    found = set()
+    tree = ast.parse(path.read_text())
+    for_types = {
+        id(node)
+        for branch in ast.walk(tree)
+        if isinstance(branch, ast.If) and "TYPE_CHECKING" in ast.unparse(branch.test)
+        for node in ast.walk(branch)
+    }
+    for node in ast.walk(tree):
+        if id(node) in for_types:
+            continue
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {f"{node.module}.{alias.name}" for alias in node.names} | {node.module}
+    return found
+
+
+def part_of(name: str) -> str | None:
+    """The first name below drslamd, None for the package itself and for others."""
+    parts = name.split(".")
+    return parts[1] if parts[0] == "drslamd" and len(parts) > 1 else None
+
+
+def ring_of(part: str) -> int:
+    for number, parts in enumerate(RINGS.values()):
+        if part in parts:
+            return number
+    raise AssertionError(f"drslamd.{part} belongs to no ring: give it one in {__file__}")
+
+
+@pytest.mark.parametrize("path", modules(), ids=name_of)
+def test_a_module_imports_only_inwards(path: Path) -> None:
+    part = part_of(name_of(path))
+    if part is None:
+        return
+    for imported in imports_of(path):
+        other = part_of(imported)
+        if other is None or other.startswith("__version__"):
+            continue
+        if not (PACKAGE / other).exists() and not (PACKAGE / f"{other}.py").exists():
+            continue
+        assert ring_of(other) <= ring_of(part), f"{name_of(path)} imports {imported}"
+        if part in PURE_ORDER and other in PURE_ORDER:
+            assert PURE_ORDER.index(other) <= PURE_ORDER.index(part), (
+                f"{name_of(path)} imports {imported}"
+            )
+
+
+@pytest.mark.parametrize("path", modules(), ids=name_of)
+def test_the_inner_rings_touch_no_clock_no_socket_no_file(path: Path) -> None:
+    part = part_of(name_of(path))
+    if part is None or ring_of(part) > list(RINGS).index("pure"):
+        return
+    impure = {name.split(".")[0] for name in imports_of(path)} & IMPURE
+    assert not impure, f"{name_of(path)} imports {impure}"
+    calls = [n.func.id for n in ast.walk(ast.parse(path.read_text()))
+             if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)]  # fmt: skip
+    assert not {"open", "print", "input"} & set(calls)
+
+
+def test_there_is_no_import_cycle() -> None:
+    names = {name_of(path): path for path in modules()}
+    graph = {
+        name: {i for i in imports_of(path) if i in names and i != name}
+        for name, path in names.items()
+    }
+    done: set[str] = set()
+    while len(done) < len(graph):
+        free = {n for n in graph if n not in done and graph[n] <= done | {"drslamd"}}
+        assert free, f"a cycle among {sorted(set(graph) - done)}"
+        done |= free
+
+
+def test_every_module_can_be_imported_alone() -> None:
+    names = [name_of(path) for path in modules() if path.name != "__main__.py"]
+    code = (
+        "import importlib, sys\n"
+        f"for name in {names!r}:\n"
+        "    for loaded in [m for m in sys.modules if m.startswith('drslamd')]:\n"
+        "        del sys.modules[loaded]\n"
+        "    importlib.import_module(name)\n"
+    )
+    subprocess.run([sys.executable, "-W", "error", "-c", code], cwd=REPOSITORY, check=True)
+
+
+def test_the_daemon_does_not_load_what_only_a_choice_needs() -> None:
+    code = (
+        "import sys, drslamd.daemon\n"
+        "heavy = {'lcm', 'can', 'cantools', 'scipy.stats', 'scipy.optimize', 'matplotlib'}\n"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code], cwd=REPOSITORY, check=True, capture_output=True, text=True
+    )
+    assert answer.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("path", modules(), ids=name_of)
+def test_files_and_functions_stay_small(path: Path) -> None:
+    text = path.read_text()
+    assert text.count("\n") <= MAX_FILE
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            assert node.end_lineno is not None
+            assert node.end_lineno - node.lineno + 1 <= MAX_FUNCTION, node.name
+
+
+def test_the_top_level_is_what_the_user_fixed() -> None:
+    allowed = {"pyproject.toml", "drslamd", "systemd", "etc", "tools", "tests", "README.md",
+               ".ci", ".gitignore"}  # fmt: skip
+    tracked = subprocess.run(
+        ["git", "ls-files"], cwd=REPOSITORY, capture_output=True, text=True, check=False
+    )
+    if tracked.returncode:
+        pytest.skip("not a git checkout")
+    assert {line.split("/")[0] for line in tracked.stdout.splitlines()} <= allowed

@@ -1,0 +1,129 @@
+"""tools/test: lint, types, and the suite on every interpreter that is found.
+
+On the interpreter of .venv everything runs; on the others all but the tests marked slow, which
+use real processes and real time and do not depend on the interpreter. Exit code 0 only when
+everything passed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+SUPPORTED = ("3.10", "3.11", "3.12", "3.13")
+
+EXAMPLES = """\
+examples:
+  tools/test              everything, on every interpreter that is found
+  tools/test --quick      what runs all day: lint, types, the quick tests, this interpreter
+  tools/test -- -k clock  arguments after -- go to pytest (this interpreter, no lint)
+"""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run it; the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="tools/test",
+        description="Lint, types, tests.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--quick", action="store_true", help="under three minutes")
+    parser.add_argument("pytest", nargs="*", help="arguments for pytest")
+    options = parser.parse_args(arguments)
+    python = sys.executable
+    if options.pytest:
+        return _run("tests", python, "-m", "pytest", *options.pytest)
+    steps = [
+        ("lint", [python, "-m", "ruff", "check", "drslamd", "tools", "tests"]),
+        ("format", [python, "-m", "ruff", "format", "--check", "drslamd", "tools", "tests"]),
+        ("types", [python, "-m", "mypy", "drslamd", "tools/lab", *_test_folders()]),
+        ("quick tests", [python, "-m", "pytest", "-q", "-m", "not slow"]),
+    ]
+    if not options.quick:
+        steps.append(("slow tests", [python, "-m", "pytest", "-q", "-m", "slow"]))
+    failed = [name for name, command in steps if _run(name, *command)]
+    if not options.quick:
+        failed += _other_interpreters()
+    print(f"FAILED: {', '.join(failed)}" if failed else "all passed")
+    return 1 if failed else 0
+
+
+def _test_folders() -> list[str]:
+    """mypy wants test folders one by one: they are no packages."""
+    return [str(path.relative_to(ROOT)) for path in sorted((ROOT / "tests").iterdir())
+            if path.suffix == ".py" or (path.is_dir() and any(path.glob("*.py")))]  # fmt: skip
+
+
+def _run(name: str, *command: str) -> int:
+    began = time.monotonic()
+    print(f"== {name}", flush=True)
+    code = subprocess.run(command, cwd=ROOT, check=False).returncode
+    print(f"== {name}: {'ok' if code == 0 else 'FAILED'}, {time.monotonic() - began:.0f} s",
+          flush=True)  # fmt: skip
+    return code
+
+
+def _other_interpreters() -> list[str]:
+    """The quick tests on every other supported interpreter; the names of those that failed."""
+    own = f"{sys.version_info.major}.{sys.version_info.minor}"
+    failed, absent = [], []
+    for version in SUPPORTED:
+        if version == own:
+            continue
+        found = _find(version)
+        if found is None:
+            absent.append(version)
+            continue
+        python = _environment(version, found)
+        if python is None or _run(
+            f"quick tests on Python {version}", python, "-m", "pytest", "-q", "-m", "not slow",
+            "-p", "no:cacheprovider",
+        ):  # fmt: skip
+            failed.append(f"Python {version}")
+    print(f"interpreters not found, so not tested: {', '.join(absent) or 'none'}")
+    return failed
+
+
+def _find(version: str) -> str | None:
+    """An interpreter of this version that really runs."""
+    name = f"python{version}"
+    homes = [Path.home() / ".pyenv" / "versions", Path.home() / ".local/share/uv/python"]
+    places = [Path(p) / name for p in os.environ.get("PATH", "").split(os.pathsep)]
+    places += [p for home in homes for p in sorted(home.glob(f"*{version}*/bin/{name}"))]
+    for place in places:
+        if place.exists() and _says(str(place)) == version:
+            return str(place)
+    return None
+
+
+def _says(python: str) -> str:
+    code = "import sys, venv; print('%d.%d' % sys.version_info[:2])"
+    try:
+        answer = subprocess.run(
+            [python, "-c", code], capture_output=True, text=True, timeout=20, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return answer.stdout.strip()
+
+
+def _environment(version: str, python: str) -> str | None:
+    """An environment of its own for another interpreter; its python, or None."""
+    folder = ROOT / ".venvs" / version
+    inside = folder / "bin" / "python"
+    if not inside.exists() and _run(f"venv {version}", python, "-m", "venv", str(folder)):
+        return None
+    install = [str(inside), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    if _run(f"install for Python {version}", *install, "--editable", f"{ROOT}[test]"):
+        return None
+    return str(inside)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
