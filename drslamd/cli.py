@@ -10,6 +10,7 @@ import argparse
 import asyncio
 import json
 import os
+import signal
 import sys
 from pathlib import Path
 from typing import Any, NoReturn
@@ -94,25 +95,28 @@ def _run(options: argparse.Namespace) -> int:
     # one BLAS thread: the same bits on every machine, and a core left for the sensors
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    config = _load(options.config)  # before the modules that take their time
+    for number in (signal.SIGTERM, signal.SIGINT):
+        # until the daemon listens itself: the modules take half a second to load
+        signal.signal(number, lambda *_: os._exit(OK))
     import structlog
 
     from drslamd.daemon import Daemon
     from drslamd.io.logs import set_up
 
-    config = _load(options.config)
     set_up(config.daemon)
 
-    async def serve() -> None:
-        await Daemon(config).run()
-
+    daemon, code = Daemon(config), OK
     try:
-        asyncio.run(serve())
-    except ConfigError:
-        raise
+        asyncio.new_event_loop().run_until_complete(daemon.run())
     except Exception:
         structlog.get_logger().exception("daemon.bug", remedy="please report this")
-        return BUG
-    return OK
+        code = BUG
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # at once: nobody waits for a solve or an adapter that is being opened, and until the very end
+    # a second signal finds the daemon's handler, not Python's, which would change the exit code
+    os._exit(code)
 
 
 def _check(options: argparse.Namespace) -> int:
@@ -138,10 +142,10 @@ def _toml(table: dict[str, Any], prefix: str = "") -> list[str]:
 
 
 def _ask(options: argparse.Namespace, question: str) -> Any:
-    from drslamd.daemon import socket_path
+    from drslamd.daemon import socket_to_ask
     from drslamd.io.status_socket import ask
 
-    path = socket_path(_load(options.config))
+    path = socket_to_ask(_load(options.config))
     try:
         return asyncio.run(ask(path, question))
     except (OSError, ValueError, asyncio.TimeoutError) as error:

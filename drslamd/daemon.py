@@ -50,6 +50,8 @@ from drslamd.robot import Robot
 
 JOB_STUCK_US = 20 * SECOND_US
 """A computation that takes longer is no progress, and the watchdog is not fed."""
+SERVICE_RUNTIME = Path("/run/drslamd")
+"""RuntimeDirectory= of systemd/drslamd@.service."""
 TIMINGS = 1_000
 """Durations that are kept for each module."""
 
@@ -69,11 +71,13 @@ class Daemon:
         secret = None if config.team.insecure else read_key(config.team.key_file)
         self._store = StateStore(state_dir(config), config.robot.id)
         state = self._store.load()
+        self._start_faults = [self._store.fault]
         epochs = {int(robot): int(epoch) for robot, epoch in state.get("epochs", {}).items()}
         self._new_robot = partial(Robot, config, team_key(secret), dbc_text=_dbc_text(config))
         self.robot = self._new_robot(next_epoch(state, wall_epoch()), epochs)
         # the new epoch is on disk before anything is sent under it
         self._store.save(self.robot.state())
+        self._start_faults.append(self._store.fault)
         self._transport = self._make_transport()
         self._wheels = self._make_wheels()
         self._uwb = SerialPort("uwb", config.uwb.port, config.uwb.baud, self._clock, self.handle)
@@ -88,7 +92,8 @@ class Daemon:
         )  # fmt: skip
         self._notifier = Notifier()
         self._worker = Worker()
-        self._jobs: dict[int, int] = {}
+        self._jobs_waiting = 0
+        self._solver_moved = 0
         self._timings: dict[str, deque[float]] = defaultdict(lambda: deque(maxlen=TIMINGS))
         self._timer: asyncio.TimerHandle | None = None
         self._stop = asyncio.Event()
@@ -107,13 +112,17 @@ class Daemon:
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, self.stop)
-        loop.set_exception_handler(lambda _, context: self._fail(context.get("exception")))
+        loop.set_exception_handler(
+            lambda _, context: self._fail(
+                context.get("exception") or RuntimeError(context["message"])
+            )
+        )
         self._worker.start()
         log.info("daemon.start", robot=self._config.robot.id, epoch=self.robot.own.epoch)
         if self._config.team.insecure:
             log.warning("team.insecure", remedy="make a key with: drslamd keygen")
-        if self._store.fault:
-            log.warning("state.fault", what=self._store.fault)
+        for what in filter(None, self._start_faults):
+            log.warning("state.fault", what=what)
         parts = (self._transport.run(), self._uwb.run(), self._wheels.run(), self._feed_watchdog())
         tasks = [self._start(part) for part in parts]
         fault = await self._status.open()
@@ -160,10 +169,14 @@ class Daemon:
         self._wheels.write(effect.data)
 
     def _solve(self, effect: Solve) -> None:
-        robot, self._jobs[effect.job_id] = self.robot, self._clock.now()
+        robot, now = self.robot, self._clock.now()
+        if not self._jobs_waiting:
+            self._solver_moved = now
+        self._jobs_waiting += 1
 
         def done(finished: Finished) -> None:
-            self._jobs.pop(effect.job_id)
+            self._jobs_waiting -= 1
+            self._solver_moved = self._clock.now()
             if finished.error is not None:
                 raise finished.error
             if robot is self.robot:
@@ -202,8 +215,13 @@ class Daemon:
         return task
 
     def _ended(self, task: asyncio.Task[None]) -> None:
-        if not task.cancelled() and task.exception() is not None:
-            self._fail(task.exception())
+        if task.cancelled():
+            return
+        error = task.exception()
+        if error is None and not self._stop.is_set():
+            error = RuntimeError("a part of the daemon ended that must not end")
+        if error is not None:
+            self._fail(error)
 
     def _fail(self, error: BaseException | None) -> None:
         """Our own bug: say so once, and end."""
@@ -218,7 +236,7 @@ class Daemon:
             await asyncio.sleep(period / 3)
             now = self._clock.now()
             ticking = now - self.robot.next_tick < SECOND_US
-            stuck = any(now - began > JOB_STUCK_US for began in self._jobs.values())
+            stuck = self._jobs_waiting > 0 and now - self._solver_moved > JOB_STUCK_US
             if ticking and not stuck:
                 self._notifier.alive()
             self._notifier.status(self._one_line())
@@ -305,5 +323,22 @@ def socket_path(config: Config) -> Path:
     if config.daemon.status_socket:
         return Path(config.daemon.status_socket)
     runtime = os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
-    name = f"drslamd-{config.robot.id}.sock"
-    return Path(runtime) / name if runtime else state_dir(config) / name
+    return (Path(runtime) if runtime else state_dir(config)) / _socket_name(config)
+
+
+def socket_to_ask(config: Config) -> Path:
+    """Where a running daemon of this robot answers: the service's, if there is one."""
+    service = SERVICE_RUNTIME / _socket_name(config)
+    if config.daemon.status_socket or "RUNTIME_DIRECTORY" in os.environ:
+        return socket_path(config)
+    try:
+        service.stat()
+    except FileNotFoundError:
+        return socket_path(config)
+    except OSError:
+        pass  # there, but not for this user: to ask will say so
+    return service
+
+
+def _socket_name(config: Config) -> str:
+    return f"drslamd-{config.robot.id}.sock"

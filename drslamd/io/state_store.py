@@ -38,6 +38,9 @@ class StateStore:
         if not isinstance(state, dict) or state.get("schema") != SCHEMA:
             self.fault = f"{self.path} was written by another version; starting afresh"
             return {}
+        if not _is_sound(state):
+            self.fault = f"{self.path} is damaged; starting afresh"
+            return {}
         return state
 
     def save(self, state: Mapping[str, Any]) -> None:
@@ -59,6 +62,15 @@ class StateStore:
             self.fault = ""
         except OSError as error:
             self.fault = f"cannot write {self.path}: {error.strerror}"
+
+
+def _is_sound(state: dict[str, Any]) -> bool:
+    epochs = state.get("epochs", {})
+    return (
+        isinstance(state.get("epoch", 0), int)
+        and isinstance(epochs, dict)
+        and all(robot.isdecimal() and isinstance(n, int) for robot, n in epochs.items())
+    )
 
 
 def next_epoch(state: Mapping[str, Any], wall: int) -> int:
