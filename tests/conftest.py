@@ -5,10 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
-REPOSITORY = Path(__file__).resolve().parent.parent
-SHARED = REPOSITORY.parent / "shared"
-"""Recordings and test vectors that are not part of the project; their tests skip without."""
+from places import SHARED
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,7 @@ from drslamd.slam.problem import Calibration, Links, PoseEdges, Priors, Problem,
 
 def random_covariance(rng: np.random.Generator, sigma: tuple[float, float, float]) -> Array:
     root = np.diag(sigma) @ (np.eye(3) + 0.3 * rng.normal(size=(3, 3)))
-    return root @ root.T
+    return np.asarray(root @ root.T)
 
 
 def pose_edges(
@@ -133,8 +133,8 @@ def residual_vector(problem: Problem, x: Array, robust: bool = True) -> Array:
         out += whitened(*ends, closures.measured[m], closures.covariance[m])
     r = problem.ranges
     for m in range(len(r)):
-        ends = [product(poses[k], (*q, 0))[:2] for k, q in ((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m]))]
-        e = (math.hypot(*(ends[1] - ends[0])) + bias[r.pair[m]] - r.measured[m]) / r.sigma[m]
+        i, j = (product(poses[k], (*q, 0)) for k, q in ((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m])))
+        e = (math.hypot(*(j - i)[:2]) + bias[r.pair[m]] - r.measured[m]) / r.sigma[m]
         c = ROBUST_SIGMAS
         if robust:
             out.append(math.copysign(c * math.sqrt(math.log1p((e / c) ** 2)), e))
@@ -185,4 +185,4 @@ def dense(system: System, layout: Layout) -> Array:
         full[below + d, below] = full[below, below + d] = system.band[d, : n - d]
     full[:n, n:], full[n:, :n], full[n:, n:] = system.border, system.border.T, system.corner
     order = np.concatenate([layout.poses.ravel(), layout.bias, layout.scale, layout.yaw])
-    return full[np.ix_(order, order)]
+    return np.asarray(full[np.ix_(order, order)])

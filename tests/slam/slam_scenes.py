@@ -6,6 +6,7 @@ matrices and in loops, and shares no code with the package.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -238,7 +239,7 @@ def driven(rng: np.random.Generator, truth: Array, noise: OdometryNoise) -> Arra
     scale = 1 + rng.normal(0, noise.scale)
     bend = rng.normal(0, noise.yaw_rad_per_m)
     poses = [np.zeros(3)]
-    for before, after in zip(truth[:-1], truth[1:], strict=True):
+    for before, after in itertools.pairwise(truth):
         step = product(inverted(before), after)
         length = math.hypot(step[0], step[1])
         turn = bend * length + rng.normal(0, noise.yaw_rad_per_sqrt_m * math.sqrt(length))

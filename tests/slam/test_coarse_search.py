@@ -16,7 +16,7 @@ def errors_at(window: Window, rho: float, phi: float, theta: float) -> Array:
     """(n,) predicted distances of one grid point."""
     m = matrix((rho * math.cos(phi), rho * math.sin(phi), theta))
     moved = np.array([(m @ [*point, 1.0])[:2] for point in window.b_points])
-    return np.hypot(*(moved - window.a_points).T)
+    return np.asarray(np.hypot(*(moved - window.a_points).T))
 
 
 def curved(rng: np.random.Generator, sigma: float = 0.1, count: int = 100) -> Window:

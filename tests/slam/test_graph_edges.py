@@ -129,7 +129,7 @@ def test_a_chain_of_one_keyframe_has_no_links() -> None:
 
 @pytest.mark.parametrize("calibrated", [True, False])
 def test_the_covariance_of_a_link_is_that_of_noisy_drives(calibrated: bool) -> None:
-    """One link of 0.8 m in 40 steps; scale and yaw rate are drawn only when nobody estimates them."""
+    """One link of 0.8 m in 40 steps; scale and yaw rate are drawn when nobody estimates them."""
     rng, drives, steps = np.random.default_rng(4), 20_000, 40
     path = np.array([[0.0, 0, 0.3], [0.8 * math.cos(0.5), 0.8 * math.sin(0.5), 0.7]])
     edges = chain_links(chain_of(path, [0, 10]), calibrated)

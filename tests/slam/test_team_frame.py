@@ -47,8 +47,8 @@ def team_of(*joined: tuple[Chain, Chain], breaks: tuple[Chain, ...] = ()) -> Tea
 
 
 def in_frame(graph: TeamGraph, members: set[Segment], frame: Segment) -> Group:
-    assert members <= {Segment(*c, int(s)) for r in graph.chains
-                       for c in [graph.chains[r].chain] for s in graph.chains[r].rows[:, 1]}  # fmt: skip
+    known = {Segment(*c.chain, int(s)) for c in graph.chains.values() for s in c.rows[:, 1]}
+    assert members <= known
     return Group(members, frame, {})
 
 

@@ -17,7 +17,7 @@ def track_of(*samples: int, capacity: int = 100) -> Track:
 
 
 def expected(n: float) -> np.ndarray:
-    return np.array([n, 2 * n, -n]) * STEPS
+    return np.asarray(np.array([n, 2 * n, -n]) * STEPS)
 
 
 def test_an_empty_track_has_no_length() -> None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 from slam_scenes import Array, product, same_pose, wander
 
 from drslamd.conventions import Chain
@@ -23,7 +25,7 @@ def track_of(path: Array, n: Array) -> Track:
     return track
 
 
-def solved(n: list[int], poses: Array) -> Trajectory:
+def solved(n: list[int], poses: Sequence[ArrayLike] | Array) -> Trajectory:
     return Trajectory(CHAIN, np.array(n), np.array(poses))
 
 

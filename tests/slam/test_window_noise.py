@@ -106,5 +106,5 @@ def test_an_outlier_that_weighs_a_quarter_is_twice_as_uncertain() -> None:
     plain = range_covariance(t, noise, np.ones(2))
     thinned = range_covariance(t, noise, np.array([1.0, 0.25]))
     assert plain[0, 0] == pytest.approx(0.1**2 + 0.3**2)
-    assert np.allclose(thinned - plain, [[0, 0], [0, 3 * 0.1**2]])
+    assert np.allclose(thinned - plain, np.diag([0, 3 * 0.1**2]))
     assert thinned[1, 1] == pytest.approx(0.2**2 + 0.3**2)

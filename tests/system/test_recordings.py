@@ -13,11 +13,12 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from conftest import SHARED
 from lab import outcome, pyfg, real_team, virtual_team, world
 from lab.outcome import Outcome
 from lab.recording import Recording
+from places import SHARED
 
 pytestmark = pytest.mark.slow
 
@@ -40,7 +41,7 @@ def recording(
             pytest.skip(f"no recording at {TIERS}")
         return pyfg.read(TIERS)
     path: Path = tmp_path_factory.mktemp("recording") / "simulated.pyfg"
-    pyfg.write(path, world.simulate(SCENE, SEED), 0.12, [0.002, 0.001, 0.005])
+    pyfg.write(path, world.simulate(SCENE, SEED), 0.12, np.array([0.002, 0.001, 0.005]))
     return pyfg.read(path)
 
 
