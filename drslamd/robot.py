@@ -178,7 +178,8 @@ class Robot:
         return []
 
     def _repeat(self, utime: int) -> list[Effect]:
-        return list(self.team.repeats(utime))
+        is_in_a_graph = self.back.estimate is not None or bool(self.neighbours(utime))
+        return list(self.team.repeats(utime)) if is_in_a_graph else []
 
     def _send_status(self, utime: int) -> list[Effect]:
         return [self.team.send(self._status(utime), utime)]
@@ -195,7 +196,7 @@ class Robot:
             uwb_id=self.config.uwb_id,
             uwb_clock_us=UNKNOWN_CLOCK if system is None else system,
             graph_hash=self.back.digest(),
-            heard=self.team.heard(),
+            heard=self.team.heard(utime),
             ranged=tuple(sorted(r for r in ranged if r is not None))[: messages.MAX_HEARD],
             logs=self.team.logs.states(),
         )

@@ -70,8 +70,6 @@ class Team:
         self.bytes_sent = 0
         self.messages_sent = 0
         self._next_seq = 0
-        self._utime = 0
-        """Of our last round of repeats; the present, for whoever asks without saying when."""
         self.superseded_by: int | None = None
         """A later epoch of ours that a peer has heard; then our messages are refused as old."""
         self._last_refused: dict[SealFault, tuple[int, str]] = {}
@@ -136,12 +134,11 @@ class Team:
 
     def repeats(self, utime: int) -> list[Send]:
         """Log entries that somebody lacks; ask several times a second."""
-        self._utime = utime
         return [self.send_sealed(owner, sealed) for owner, sealed in self.logs.due(utime)]
 
-    def heard(self) -> tuple[Heard, ...]:
+    def heard(self, utime: int) -> tuple[Heard, ...]:
         """For our status: whom we hear, the most recent first."""
-        alive = [peer for peer in self.peers.values() if peer.is_alive(self._utime)]
+        alive = [peer for peer in self.peers.values() if peer.is_alive(utime)]
         recent = sorted(alive, key=lambda peer: -peer.last_heard)[: messages.MAX_HEARD]
         delays = [(peer.chain, peer.clock.delay_us) for peer in recent]
         return tuple(Heard(*chain, delay) for chain, delay in delays if delay is not None)

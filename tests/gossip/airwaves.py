@@ -74,7 +74,7 @@ class Air:
             for send in team.repeats(self.utime):
                 self.carry(robot, send)
             if self.utime // STEP % 10 == self._phase[robot]:
-                status = a_status(team.heard(), team.logs.states())
+                status = a_status(team.heard(self.utime), team.logs.states())
                 self.carry(robot, team.send(status, self.utime))
 
     def seconds(self, count: int, speakers: Iterable[int] = (), *, aloud: bool = True) -> None:

@@ -33,7 +33,7 @@ def test_the_status_of_a_robot_that_hears_254_others_fits() -> None:
     team = Team(a_seal(0))
     for robot in range(1, 255):
         team.receive(ChannelMessage(0, *sealed(a_seal(robot), a_status())))
-    heard, logs = team.heard(), team.logs.states()
+    heard, logs = team.heard(0), team.logs.states()
     assert len(heard) == len(logs) == 31
     assert fits(team.send(a_status(heard, logs, ranged=tuple(range(31))), 0))
 

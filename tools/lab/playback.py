@@ -44,7 +44,8 @@ class Hardware:
         rows = self._recording.ranges
         rows = rows[rows[:, 1] == self.robot]
         moments, first = np.unique(rows[:, 0], return_index=True)
-        for t, block in zip(moments.tolist(), np.split(rows, first[1:]), strict=True):
+        blocks = np.split(rows, first[1:]) if len(rows) else []
+        for t, block in zip(moments.tolist(), blocks, strict=True):
             ranges = [(int(peer), float(metres)) for _, _, peer, metres in block]
             yield Chunk(t, "uwb", partial(self.uwb.frame, t, ranges))
 
