@@ -134,9 +134,9 @@ class DbcSection(CanWheelSection):
     counter_bits: Annotated[int, Field(ge=8, le=64)] = 32
     id_mask: Annotated[int, Field(ge=1, le=0x1FFFFFFF)] = 0x1FFFFFFF
     """Applied to an id before the look-up, for ids that hold a node number."""
-    left_node: int | None = None
-    right_node: int | None = None
-    """The bits outside `id_mask` that tell the two sides apart."""
+    left_node: Annotated[int, Field(ge=0)] | None = None
+    right_node: Annotated[int, Field(ge=0)] | None = None
+    """Node numbers that tell the two sides apart: the bits outside `id_mask`, shifted down."""
     unit: Positive = 1.0
     """Factor from the unit of the speed signals to m/s (and rad/s)."""
 
@@ -150,6 +150,8 @@ class DbcSection(CanWheelSection):
             )
         if self.measures == "counts" and self.counts_per_metre is None:
             raise ValueError('measures = "counts" needs counts_per_metre')
+        if self.measures == "twist" and (self.reverse_left or self.reverse_right):
+            raise ValueError('measures = "twist" has no sides to reverse')
         return self
 
 
