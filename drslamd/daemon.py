@@ -261,6 +261,7 @@ class Daemon:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
         await self._status.close()
+        self._worker.stop()
         log.info("daemon.stop", robot=self._config.robot.id)
 
     # ---- parts ----

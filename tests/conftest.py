@@ -1,4 +1,4 @@
-"""Shared by all tests: where the recordings are, and how the suite polices itself."""
+"""Shared by all tests; how the suite polices itself is in policing.py."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 from places import SHARED
+
+pytest_plugins = ["policing", "pytester"]
 
 
 @pytest.fixture(scope="session")

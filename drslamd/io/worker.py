@@ -28,7 +28,7 @@ class Worker:
     """Runs one computation after the other and reports each to the loop."""
 
     def __init__(self) -> None:
-        self._queue: queue.SimpleQueue[tuple[Callable[[], Any], Callable[[Finished], None]]]
+        self._queue: queue.SimpleQueue[tuple[Callable[[], Any], Callable[[Finished], None]] | None]
         self._queue = queue.SimpleQueue()
         self._loop: asyncio.AbstractEventLoop | None = None
 
@@ -41,10 +41,14 @@ class Worker:
         """Compute `run()` in the thread, then call `done` in the loop."""
         self._queue.put((run, done))
 
+    def stop(self) -> None:
+        """The thread ends after what it has been given; nobody waits for that."""
+        self._queue.put(None)
+
     def _work(self) -> None:
         assert self._loop is not None
-        while True:
-            run, done = self._queue.get()
+        while task := self._queue.get():
+            run, done = task
             began = time.perf_counter()
             result, error = None, None
             try:

@@ -159,6 +159,7 @@ def test_the_worker_hands_back_results_and_exceptions_in_order() -> None:
         worker.submit(lambda: 6 * 7, take)
         worker.submit(lambda: 1 // 0, take)
         await asyncio.wait_for(done.wait(), 10)
+        worker.stop()
         return out
 
     good, bad = asyncio.run(run())
