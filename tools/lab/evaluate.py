@@ -11,11 +11,11 @@ import json
 import sys
 from pathlib import Path
 
-from lab import outcome, real_team, table, virtual_team
+from lab import edge_run, outcome, real_team, table, virtual_team
 from lab.outcome import Outcome
 from lab.progress import Progress
-from lab.readers import READERS, read
-from lab.recording import BadRecording, Recording
+from lab.readers import READERS, has_edges, read, read_edges
+from lab.recording import BadRecording, EdgeRecording, Recording
 from lab.virtual_team import SETTLE_S
 
 NO_INPUT, FAILED = 66, 70
@@ -25,6 +25,7 @@ examples:
   tools/evaluate run.pyfg                         in virtual time, scores as a table
   tools/evaluate run.pyfg --json scores.json      and as JSON (schema: tools/README.md)
   tools/evaluate run.pyfg --speed real            real processes, pseudo-terminals, multicast
+  tools/evaluate swust_three_robots               a folder of relative poses: modules 2 and 3 only
   tools/evaluate run.pyfg --config rbcd.toml      with sections added to every robot's TOML
 """
 
@@ -33,9 +34,14 @@ def main(arguments: list[str] | None = None) -> int:
     """Run it; the exit code."""
     options = _parser().parse_args(arguments)
     try:
-        recording = read(options.recording)
         extra = options.config.read_text() if options.config else ""
-        result = _run(recording, options.speed, extra)
+        recording: Recording | EdgeRecording
+        if has_edges(options.recording):
+            recording = read_edges(options.recording)
+            result = _run_edges(recording, extra)
+        else:
+            recording = read(options.recording)
+            result = _run(recording, options.speed, extra)
     except (BadRecording, OSError) as error:
         print(error, file=sys.stderr)
         return NO_INPUT
@@ -53,7 +59,7 @@ def main(arguments: list[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="tools/evaluate",
-        description=f"Run the team on a recording ({', '.join(READERS)}) and score it.",
+        description=f"Run the team on a recording ({', '.join(READERS)}, folder) and score it.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -70,6 +76,13 @@ def _run(recording: Recording, speed: str, extra: str) -> Outcome:
         result = asyncio.run(real_team.run(recording, extra=extra, progress=progress))
     else:
         result = virtual_team.run(recording, extra=extra, progress=progress)
+    progress.end()
+    return result
+
+
+def _run_edges(recording: EdgeRecording, extra: str) -> Outcome:
+    progress = Progress("rounds of optimisation, at most", edge_run.MOST_ROUNDS, "")
+    result, _ = edge_run.run(recording, extra, progress)
     progress.end()
     return result
 

@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 
 from lab import metrics
-from lab.recording import Array, Recording
+from lab.recording import Array, EdgeRecording, Recording
+
+Played = Recording | EdgeRecording
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,10 @@ class Outcome:
     """In whose frame each robot was at the end; None when it was not localised."""
     groups: dict[int, list[int]] = field(default_factory=dict)
     bytes_sent: dict[int, int] = field(default_factory=dict)
+    bias_m: dict[str, float] = field(default_factory=dict)
+    """Range bias of each pair "A-B", as the lowest robot that knows it has it at the end."""
+    scale: dict[str, float] = field(default_factory=dict)
+    """Scale error of each robot's odometry, likewise."""
     ms: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
 
     @property
@@ -59,7 +65,7 @@ class Outcome:
         return len(set(self.frames.values())) == 1 and None not in self.frames.values()
 
 
-def dead_reckoning(recording: Recording) -> dict[int, Array]:
+def dead_reckoning(recording: Played) -> dict[int, Array]:
     """Odometry of every robot, started at its true first pose."""
     out = {}
     for robot, trail in recording.trails.items():
@@ -69,7 +75,7 @@ def dead_reckoning(recording: Recording) -> dict[int, Array]:
     return out
 
 
-def score(recording: Recording, outcome: Outcome) -> dict[str, Any]:
+def score(recording: Played, outcome: Outcome) -> dict[str, Any]:
     """Every figure, by the schema of ``tools/evaluate`` (see tools/README.md)."""
     truth = {robot: trail.truth for robot, trail in recording.trails.items()}
     closures = [c for c in outcome.closures if len(c.poses)]
@@ -89,7 +95,7 @@ def score(recording: Recording, outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def _scored(recording: Recording, paths: dict[int, Path]) -> dict[str, Any]:
+def _scored(recording: Played, paths: dict[int, Path]) -> dict[str, Any]:
     """Errors at every true pose that an estimate covers, or at every estimate if those are rarer.
 
     One SE(2) is fitted for all robots together; poses that were published in another frame, before
@@ -115,7 +121,7 @@ def _scored(recording: Recording, paths: dict[int, Path]) -> dict[str, Any]:
     return metrics.team_errors(metrics.aligned(estimates, truths, frames), truths)
 
 
-def _pairs(recording: Recording, outcome: Outcome) -> dict[str, Any]:
+def _pairs(recording: Played, outcome: Outcome) -> dict[str, Any]:
     """Relative poses of module 1 where it named exactly one, against the truth."""
     found: dict[str, list[tuple[Array, Array]]] = defaultdict(list)
     for closure in outcome.closures:

@@ -42,18 +42,36 @@ class Recording:
     Attributes:
         ranges: (k, 4) time s, id of the module that measured, id of the other one, range m;
             ascending in time. Ids that have no trail are standing nodes.
+        antennas: (x, y) of a module's antenna in its robot's body frame, m, where it is not at the
+            origin; a mounting that anyone can measure, so the robots' configurations hold it.
     """
 
     name: str
     trails: dict[int, Trail]
     ranges: Array
     notes: dict[str, object] = field(default_factory=dict)
+    antennas: dict[int, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def duration(self) -> float:
         """Seconds to the last stamp of anything."""
         ends = [float(trail.t[-1]) for trail in self.trails.values()]
         return max(ends + [float(t) for t in self.ranges[-1:, 0]])
+
+
+@dataclass(frozen=True)
+class EdgeRecording:
+    """A team whose relative poses were already estimated by others: food for modules 2 and 3.
+
+    Attributes:
+        edges: (k, 6) time s, robot a, robot b, x, y (m) and yaw (rad) of b in the frame of a.
+        sigmas: (m, rad) of an edge, as measured by whoever read the recording.
+    """
+
+    name: str
+    trails: dict[int, Trail]
+    edges: Array
+    sigmas: tuple[float, float]
 
 
 def wheel_paths(trail: Trail, track_m: float) -> tuple[Array, Array]:
