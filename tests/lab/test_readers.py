@@ -186,13 +186,9 @@ def test_the_range_only_recording_has_the_bias_that_others_measured() -> None:
 
 
 def swust_folder(folder: Path) -> Path:
-    for number in (1, 2):
-        odometry = [
-            f"drone{number}\t{100 + k / 50}\t{5 + k / 100}\t{number}\t3.1" for k in range(300)
-        ]
-        truth = [
-            f"drone{number}\t{20 + 80 * (k > 0) + k}\t{5 + k / 2}\t{number}\t0" for k in range(6)
-        ]
+    for n in (1, 2):
+        odometry = [f"drone{n}\t{100 + k / 50}\t{5 + k / 100}\t{n}\t3.1" for k in range(300)]
+        truth = [f"drone{n}\t{20 + 80 * (k > 0) + k}\t{5 + k / 2}\t{n}\t0" for k in range(6)]
         (folder / f"drone{n}_odom.txt").write_text("\n".join(odometry) + "\n")
         (folder / f"gt_{n}_interpolation.txt").write_text("\n".join(truth) + "\n")
     edges = [f"drone1\tdrone2\t{t}\t0.0\t1.0\t0.1" for t in (50.0, 102.0, 103.0, 190.0)]
