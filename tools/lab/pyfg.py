@@ -8,11 +8,73 @@ nodes follow them. A range belongs to the module of the robot named first, at it
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from lab.recording import Array, BadRecording, Recording, Trail
+
+LEAST_STEP_S = 1e-4
+"""Equal stamps of neighbouring poses are moved apart by this."""
+
+FIELDS = {"VERTEX_SE2": (6,), "VERTEX_XY": (4, 5), "EDGE_SE2": (13,), "EDGE_RANGE": (6,)}
+"""How many words a line of each kind has; other kinds are left alone."""
+
+
+@dataclass(frozen=True)
+class _Edge:
+    """One step of the odometry."""
+
+    t: float
+    start: str
+    end: str
+    step: list[float]
+
+
+@dataclass
+class _File:
+    """What stands in a file. A key of a pose begins with the letter of its robot."""
+
+    truth: dict[str, tuple[float, list[float]]] = field(default_factory=dict)
+    edges: dict[str, list[_Edge]] = field(default_factory=dict)
+    ranges: list[tuple[float, str, str, float]] = field(default_factory=list)
+    nodes: set[str] = field(default_factory=set)
+
+    def take(self, words: list[str]) -> None:
+        """
+        Raises:
+            ValueError: this line cannot be used.
+        """
+        kind, counts = words[0], FIELDS.get(words[0])
+        if counts is None:
+            return
+        if len(words) not in counts:
+            raise ValueError(f"{kind} has {len(words)} words, not {counts[-1]}")
+        if kind == "VERTEX_XY":
+            self.nodes.add(words[-3][0])
+            return
+        t = _number(words[1])
+        if kind == "VERTEX_SE2":
+            self.truth[words[2]] = t, [_number(w) for w in words[3:6]]
+        elif kind == "EDGE_SE2":
+            self._take_edge(_Edge(t, words[2], words[3], [_number(w) for w in words[4:7]]))
+        else:
+            self.ranges.append((t, words[2][0], words[3][0], _number(words[4])))
+
+    def _take_edge(self, edge: _Edge) -> None:
+        chain = self.edges.setdefault(edge.start[0], [])
+        if edge.end[0] != edge.start[0] or (chain and chain[-1].end != edge.start):
+            raise ValueError(f"EDGE_SE2 {edge.start} {edge.end} does not continue the odometry")
+        chain.append(edge)
+
+
+def _number(word: str) -> float:
+    value = float(word)
+    if not math.isfinite(value):
+        raise ValueError(f"{word} is no number to work with")
+    return value
 
 
 def read(path: Path) -> Recording:
@@ -21,63 +83,49 @@ def read(path: Path) -> Recording:
     Raises:
         BadRecording: not a pyfg file, or one without odometry.
     """
-    truth: dict[str, tuple[float, ...]] = {}
-    edges: dict[str, list[tuple[float, str, str, float, float, float]]] = {}
-    ranges: list[tuple[float, str, str, float]] = []
-    nodes: set[str] = set()
+    file = _File()
     for number, line in enumerate(path.read_text().splitlines(), start=1):
-        words = line.split()
-        if not words:
-            continue
         try:
-            if words[0] == "VERTEX_SE2":
-                truth[words[2]] = tuple(float(w) for w in words[3:6])
-            elif words[0] == "VERTEX_XY":
-                nodes.add(words[-3])
-            elif words[0] == "EDGE_SE2":
-                dx, dy, dyaw = (float(w) for w in words[4:7])
-                edges.setdefault(words[2][0], []).append(
-                    (float(words[1]), words[2], words[3], dx, dy, dyaw)
-                )
-            elif words[0] == "EDGE_RANGE":
-                ranges.append((float(words[1]), words[2], words[3], float(words[4])))
-        except (IndexError, ValueError) as error:
+            if line.strip():
+                file.take(line.split())
+        except ValueError as error:
             raise BadRecording(f"{path.name} line {number}: {error}") from None
-    if not edges:
+    if not file.edges:
         raise BadRecording(f"{path.name}: no EDGE_SE2 line, so no odometry to play")
-    letters = sorted(edges)
+    every = [e for edges in file.edges.values() for e in edges]
+    missing = [key for e in every for key in (e.start, e.end) if key not in file.truth]
+    if missing:
+        raise BadRecording(f"{path.name}: no VERTEX_SE2 {missing[0]}, so nothing to score against")
+    standing = file.nodes | {letter for _, *ends, _ in file.ranges for letter in ends}
+    letters = [*sorted(file.edges), *sorted(standing - set(file.edges))]
     ids = {letter: k for k, letter in enumerate(letters)}
-    for node in sorted(nodes):
-        ids.setdefault(node[0], len(ids))
-    start = min([*(e[0][0] for e in edges.values()), *(r[0] for r in ranges)]) - 0.1
-    trails = {ids[s]: _trail(ids[s], edges[s], truth, start, path) for s in letters}
-    table = np.array([(t - start, ids[a[0]], ids[b[0]], r) for t, a, b, r in ranges], dtype=float)
+    start = min([_began(e, file) for e in file.edges.values()] + [r[0] for r in file.ranges]) - 0.1
+    trails = {
+        ids[letter]: _trail(ids[letter], edges, file, start)
+        for letter, edges in sorted(file.edges.items())
+    }
+    table = np.array([(t - start, ids[a], ids[b], r) for t, a, b, r in file.ranges], dtype=float)
     table = table.reshape(-1, 4)
     return Recording(path.name, trails, table[np.argsort(table[:, 0], kind="stable")])
 
 
-def _trail(
-    robot: int,
-    edges: list[tuple[float, str, str, float, float, float]],
-    truth: dict[str, tuple[float, ...]],
-    start: float,
-    path: Path,
-) -> Trail:
+def _began(edges: list[_Edge], file: _File) -> float:
+    """When the first pose of a robot was: only its vertex knows, by another clock it may be."""
+    return min(file.truth[edges[0].start][0], edges[0].t - LEAST_STEP_S)
+
+
+def _trail(robot: int, edges: list[_Edge], file: _File, start: float) -> Trail:
     """Chain the edges of one robot; the stamp of an edge is that of the pose it leads to."""
     pose = np.zeros(3)
-    poses = [pose]
-    times = [edges[0][0] - start - 0.05]
-    keys = [edges[0][1]]
-    for t, _, key, dx, dy, dyaw in edges:
+    poses, times = [pose], [_began(edges, file) - start]
+    for edge in edges:
+        dx, dy, dyaw = edge.step
         cos, sin = np.cos(pose[2]), np.sin(pose[2])
         pose = pose + [cos * dx - sin * dy, sin * dx + cos * dy, dyaw]
         poses.append(pose)
-        times.append(max(t - start, times[-1] + 1e-4))
-        keys.append(key)
-    missing = [key for key in keys if key not in truth]
-    if missing:
-        raise BadRecording(f"{path.name}: no VERTEX_SE2 {missing[0]}, so nothing to score against")
-    return Trail(robot, np.array(times), np.array(poses), np.array([truth[k] for k in keys]))
+        times.append(max(edge.t - start, times[-1] + LEAST_STEP_S))
+    truth = [file.truth[key][1] for key in (edges[0].start, *(e.end for e in edges))]
+    return Trail(robot, np.array(times), np.array(poses), np.array(truth))
 
 
 def write(path: Path, recording: Recording, range_sigma: float, odometry_sigmas: Array) -> None:
