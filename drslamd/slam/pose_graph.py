@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.conventions import ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain, Segment
-from drslamd.slam.items import ClosureItem, GraphEntry, Keyframe, RangeItem
+from drslamd.slam.items import ClosureItem, GraphEntry, Keyframe, RangeItem, RelativePoses
 from drslamd.slam.odometry import OdometryNoise, growth
 from drslamd.slam.problem import Index
 from drslamd.slam.se2 import Array
@@ -28,6 +28,8 @@ MAX_RANGES = 20_000
 """Of one pair, 1.6 MB; the oldest are forgotten."""
 MAX_CLOSURES = 4_000
 """Of one pair."""
+MAX_RELATIVE = 1_000
+"""Log entries with relative poses of one chain: 27,000 of them at most."""
 
 WAITING = 1_024
 """Rows that came in and are not yet sorted into their table."""
@@ -81,12 +83,14 @@ class ChainItems:
     Attributes:
         noise: of its odometry.
         antenna: (2,) in the body frame, m.
+        relative: relative poses that it measured in full precision, by log entry.
     """
 
     def __init__(self, chain: Chain) -> None:
         self.chain = chain
         self.noise = DEFAULT_NOISE
         self.antenna: Array = np.zeros(2)
+        self.relative: dict[int, tuple[RelativePoses, ...]] = {}
         self._traits_seq = -1
         self._table = Rows(5, MAX_KEYFRAMES)
         self._rows = self._table.data
@@ -96,6 +100,11 @@ class ChainItems:
     def add(self, k: Keyframe) -> None:
         metres, radians = TRANSLATION_STEP_M, ROTATION_STEP_RAD
         self._table.add([k.n, k.segment, k.x * metres, k.y * metres, k.theta * radians])
+
+    def add_relative(self, seq: int, relative: tuple[RelativePoses, ...]) -> None:
+        self.relative[seq] = relative
+        while len(self.relative) > MAX_RELATIVE:
+            del self.relative[min(self.relative)]
 
     def take_traits(self, seq: int, traits: tuple[float, ...]) -> None:
         """The sigmas of `OdometryNoise` and the antenna's place; the latest entry counts."""
@@ -213,6 +222,8 @@ class TeamGraph:
             items.take_traits(entry.seq, entry.traits)
         for k in entry.keyframes:
             items.add(k)
+        if entry.relative:
+            items.add_relative(entry.seq, entry.relative)
         for place, r in enumerate(entry.ranges):
             pair = self._pair(origin, r.peer)
             if pair:

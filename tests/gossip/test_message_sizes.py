@@ -47,8 +47,8 @@ def test_a_pose_has_118_bytes() -> None:
     assert len(messages.encode(HEADER, Pose(1, 3, 11, 0))) == 8 + 43 + 19 + 24 + 24 == 118
 
 
-def test_an_entry_with_one_keyframe_has_82_bytes() -> None:
-    assert len(messages.encode(HEADER, an_entry(0, 5))) == 8 + 43 + 5 + 8 + 18 == 82
+def test_an_entry_with_one_keyframe_has_84_bytes() -> None:
+    assert len(messages.encode(HEADER, an_entry(0, 5))) == 8 + 43 + 5 + 10 + 18 == 84
 
 
 KEYFRAMES = tuple(Keyframe(n, 0, n, n, n) for n in range(50))
@@ -76,10 +76,10 @@ def test_items_of_every_kind_are_said_completely_in_entries_that_fit(
     assert sum(len(e.closures) for e, _ in entries) == len(closures)
 
 
-def test_twenty_closures_with_twenty_peers_and_the_traits_have_1288_bytes() -> None:
+def test_twenty_closures_with_twenty_peers_and_the_traits_have_1290_bytes() -> None:
     team = Team(a_seal(3))
     (entry,) = team.entries(TRAITS, (), (), CLOSURES[:ITEMS_PER_ENTRY])
-    assert len(messages.encode(HEADER, entry)) == 64 + 24 + 20 * (10 + 50) == 1288
+    assert len(messages.encode(HEADER, entry)) == 66 + 24 + 20 * (10 + 50) == 1290
 
 
 def test_the_largest_rank_that_can_be_configured_is_20() -> None:
