@@ -14,6 +14,7 @@ import asyncio
 import functools
 import gc
 import os
+import sysconfig
 import threading
 import time
 from asyncio import base_events, events, runners
@@ -31,6 +32,7 @@ COMPUTING_S = 0.1
 WAITING_S = 0.5
 TASK_GRACE_S = 0.5
 
+_INSTALLED = sysconfig.get_path("purelib")
 _PACKAGE = str(REPOSITORY / "drslamd")
 _loop_faults: list[str] = []
 
@@ -45,12 +47,15 @@ def threads() -> dict[int, str]:
 
 
 def descriptors() -> dict[int, str]:
+    """All but those of files that came with an installed package, such as fonts."""
     found = {}
     for name in os.listdir("/proc/self/fd"):
         try:
-            found[int(name)] = f"descriptor {name} of {os.readlink(f'/proc/self/fd/{name}')}"
+            what = os.readlink(f"/proc/self/fd/{name}")
         except FileNotFoundError:
             continue  # the one that listed the folder
+        if not what.startswith(_INSTALLED):
+            found[int(name)] = f"descriptor {name} of {what}"
     return found
 
 

@@ -73,7 +73,8 @@ GOOD_LOOPS = [
 @pytest.fixture
 def court(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Iterator[pytest.Pytester]:
     """Short patience inside; what the accused left behind is cleared away afterwards."""
-    monkeypatch.setattr(policing, "GRACE_S", 0.2)
+    monkeypatch.setattr(policing, "GRACE_S", 0.15)
+    monkeypatch.setattr(policing, "TASK_GRACE_S", 0.15)
     open_before, children_before = set(policing.descriptors()), set(policing.children())
     yield pytester
     for pid in set(policing.children()) - children_before:

@@ -52,7 +52,7 @@ def test_the_common_radio_time_comes_back(frame: int) -> None:
         assert offset is None
     else:
         assert offset is not None
-        assert abs(offset) == pytest.approx(LATE_US, abs=2_000)
+        assert offset == pytest.approx(LATE_US, abs=2_000)
 
 
 def motions_of(base: WheelEmulator, left: list[float], right: list[float]) -> list[Motion]:

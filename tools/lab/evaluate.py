@@ -1,6 +1,6 @@
 """tools/evaluate: run the team on a recording and write its scores.
 
-Exit codes: 0 done, 2 wrong usage, 66 unusable recording, 70 a daemon failed.
+Exit codes: 0 done, 2 wrong usage, 66 unusable recording, 70 a daemon failed, 78 fault in --config.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import json
 import sys
 from pathlib import Path
 
+from drslamd.config import ConfigError
 from lab import edge_run, outcome, real_team, table, virtual_team
 from lab.outcome import Outcome
 from lab.progress import Progress
@@ -18,7 +19,7 @@ from lab.readers import READERS, has_edges, read, read_edges
 from lab.recording import BadRecording, EdgeRecording, Recording
 from lab.virtual_team import SETTLE_S
 
-NO_INPUT, FAILED = 66, 70
+NO_INPUT, FAILED, BAD_CONFIG = 66, 70, 78
 
 EXAMPLES = """\
 examples:
@@ -45,6 +46,9 @@ def main(arguments: list[str] | None = None) -> int:
     except (BadRecording, OSError) as error:
         print(error, file=sys.stderr)
         return NO_INPUT
+    except ConfigError as error:
+        print(error, file=sys.stderr)
+        return BAD_CONFIG
     except real_team.TeamFailed as error:
         print(error, file=sys.stderr)
         return FAILED
