@@ -31,6 +31,18 @@ def run(
     hardware: dict[int, Hardware] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Outcome:
+    """Play the whole recording and ask the team what it found; arguments as in `play`."""
+    return outcome(play(recording, seed, network, extra, hardware, progress))
+
+
+def play(
+    recording: Recording,
+    seed: int = 0,
+    network: Network | None = None,
+    extra: str = "",
+    hardware: dict[int, Hardware] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Simulator:
     """Play the whole recording.
 
     Args:
@@ -48,7 +60,7 @@ def run(
         if progress:
             progress(second)
     simulator.run(end)
-    return outcome(simulator)
+    return simulator
 
 
 def outcome(simulator: Simulator) -> Outcome:
