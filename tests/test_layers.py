@@ -127,6 +127,7 @@ def test_there_is_no_import_cycle() -> None:
         done |= free
 
 
+@pytest.mark.slow
 def test_every_module_can_be_imported_alone() -> None:
     names = [name_of(path) for path in modules() if path.name != "__main__.py"]
     code = (

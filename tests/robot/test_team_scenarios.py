@@ -193,6 +193,7 @@ def test_a_pulled_uwb_cable_is_named_and_the_team_goes_on_when_it_is_back() -> N
     assert team.errors()["ate_rmse_m"] < 0.10
 
 
+@pytest.mark.slow
 def test_after_silent_wheels_the_path_is_a_new_piece_that_finds_its_place() -> None:
     team = VirtualTeam(world.Scene(**{**EASY.__dict__, "seconds": 90.0}), on=())
     team.cut = lambda robot, port, t: robot == 1 and port == "wheels" and 30 < t < 40
@@ -238,6 +239,7 @@ def test_a_robot_whose_memory_was_lost_begins_above_what_its_peers_know() -> Non
     assert team.member(0).robot.team.peers[1].chain.epoch == forgetful.robot.own.epoch
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "extra",
     [

@@ -44,6 +44,7 @@ def nees(hypothesis: Hypothesis, true: Array) -> float:
     return float(error @ np.linalg.solve(hypothesis.covariance, error))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("span", "seeds"), [(20.0, range(100, 122)), (30.0, range(200, 227))])
 def test_errors_are_as_large_as_the_covariance_says(span: float, seeds: range) -> None:
     """At least 100 unique answers for each length: about 1 by degree, hardly one beyond 3 sigma.

@@ -1,7 +1,7 @@
 """tools/test: lint, types, and the suite on every interpreter that is found.
 
-On the interpreter of .venv everything runs; on the others all but the tests marked slow, which
-use real processes and real time and do not depend on the interpreter. Exit code 0 only when
+On the interpreter of .venv everything runs; on the others all but the tests marked slow: real
+processes, real time, long computations, which do not depend on the interpreter. Exit code 0 only when
 everything passed.
 """
 
