@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from drslamd import diagnosis
+from drslamd.broadcast import Broadcast
 from drslamd.config import Config
 from drslamd.conventions import GRID_US, MILLISECOND_US, SECOND_US, Chain
 from drslamd.events import (
@@ -40,8 +41,6 @@ from drslamd.events import (
     Tick,
     Write,
 )
-from drslamd.gossip import messages
-from drslamd.gossip.messages import UNKNOWN_CLOCK, OdometryBatch, Pose, Status
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
 from drslamd.health import Health
@@ -59,9 +58,6 @@ from drslamd.slam.se2 import Array
 POLL_US = 10 * MILLISECOND_US
 """How finely the wheels that must be asked are asked; their driver knows its own rate."""
 REPEAT_US = 100 * MILLISECOND_US
-BATCH_US = SECOND_US // 2
-BATCH = 15
-"""Odometry samples in a batch: two of three batches may be lost without losing a sample."""
 SAVE_US = 60 * SECOND_US
 GOODBYES = 3
 """Last messages of an orderly stop; at 30 % loss one gets through in 97 % of cases."""
@@ -96,6 +92,7 @@ class Robot:
         self.team = Team(Seal(key, config.robot.id, epoch, epochs))
         self.front = FrontEnd(config, self.own)
         self.back = BackEnd(config, self.own)
+        self.broadcast = Broadcast(config, self.team, self.front, self.back)
         self.health = Health()
         self.ports: dict[str, PortState] = {}
         self.network: NetworkState | None = None
@@ -109,7 +106,7 @@ class Robot:
         self._timers: dict[Callable[[int], list[Effect]], int] = {
             self._repeat: REPEAT_US,
             self._send_status: SECOND_US,
-            self._send_odometry: BATCH_US,
+            self._send_odometry: SECOND_US,
             self._extend_log: SECOND_US,
             self._module1: module_us[0],
             self._module2: module_us[1],
@@ -182,33 +179,11 @@ class Robot:
         return list(self.team.repeats(utime)) if is_in_a_graph else []
 
     def _send_status(self, utime: int) -> list[Effect]:
-        return [self.team.send(self._status(utime), utime)]
-
-    def _status(self, utime: int, leaving: bool = False) -> Status:
-        system = self.uwb.system_offset_us(utime)
-        self.team.compare_radio_clocks(system, utime)
-        ranged = (self.team.robot_of_uwb(uwb_id) for uwb_id in self.front.ranged(utime))
-        estimate = self.back.estimate
-        return Status(
-            state=int(estimate is not None),
-            frame=estimate.frame.robot if estimate else self.own.robot,
-            leaving=leaving,
-            uwb_id=self.config.uwb_id,
-            uwb_clock_us=UNKNOWN_CLOCK if system is None else system,
-            graph_hash=self.back.digest(),
-            heard=self.team.heard(utime),
-            ranged=tuple(sorted(r for r in ranged if r is not None))[: messages.MAX_HEARD],
-            logs=self.team.logs.states(),
-        )
+        clock = self.uwb.system_offset_us(utime)
+        return self.broadcast.heartbeat(self.neighbours(utime), clock, utime)
 
     def _send_odometry(self, utime: int) -> list[Effect]:
-        """Short-term odometry, for peers whose windows need it (paper III-C)."""
-        track = self.front.reckoning.track
-        if not len(track) or not self.neighbours(utime):
-            return []
-        n0 = max(track.n0, track.segment_start, track.end - BATCH)
-        batch = OdometryBatch(track.segment_start, n0, track.steps(n0, track.end - n0))
-        return [self.team.send(batch, utime)]
+        return self.broadcast.odometry(self.neighbours(utime), utime)
 
     def neighbours(self, utime: int) -> list[Neighbour]:
         """Living peers within UWB range of us, as either side measures it."""
@@ -274,7 +249,7 @@ class Robot:
         self.back.solved(event.result)
         public = self.back.public_poses()
         sends = self.team.send_public(public, event.utime) if public else []
-        return [*self._publish(event.utime), *sends]
+        return [*self.broadcast.pose(self.pose(), event.utime), *sends]
 
     # ---- what we know of ourselves ----
 
@@ -293,18 +268,6 @@ class Robot:
         pose = se2.compose(solved.poses[-1], se2.between(track.at(last), track.at(now)))
         covariance = self.back.estimate.covariances[self.own.robot]
         return now * GRID_US, np.append(pose[:2], se2.wrap(pose[2])), covariance
-
-    def _publish(self, utime: int) -> list[Effect]:
-        estimate, found = self.back.estimate, self.pose()
-        if estimate is None or found is None:
-            return []
-        pose_utime, pose, covariance = found
-        x, y, theta = pose.tolist()
-        frame = estimate.frame
-        message = Pose(
-            1, frame.robot, frame.epoch, pose_utime, (x, y, theta), se2.packed(covariance)
-        )
-        return [self.team.send(message, utime)]
 
     def _check_health(self, utime: int) -> list[Effect]:
         self.team.forget_silent(utime)
@@ -346,6 +309,6 @@ class Robot:
         return [Save(self.state())]
 
     def _on_stop(self, event: Stop) -> list[Effect]:
-        goodbye = self._status(event.utime, leaving=True)
+        goodbye = self.broadcast.status([], None, event.utime, leaving=True)
         sends = [self.team.send(goodbye, event.utime) for _ in range(GOODBYES)]
         return [*sends, Save(self.state())]

@@ -18,6 +18,7 @@ from drslamd.gossip.message_types import (
     MAX_BATCH,
     MAX_HEARD,
     MAX_LOGS,
+    NOTHING_WANTED,
     Heard,
     LogState,
     OdometryBatch,
@@ -72,7 +73,9 @@ def _read_status(raw: Any) -> Status:
     logs = tuple(LogState(_robot(r.id), r.epoch, r.first, r.complete, r.newest) for r in raw.logs)
     if any(not 0 <= log.first <= log.complete <= log.newest for log in logs):
         raise ValueError("log that ends before it starts")
-    heard = tuple(Heard(_robot(h.id), h.epoch, h.delay_us) for h in raw.heard)
+    heard = tuple(Heard(_robot(h.id), h.epoch, h.delay_us, h.wanted_n) for h in raw.heard)
+    if any(h.wanted_n < NOTHING_WANTED for h in heard):
+        raise ValueError("odometry before the first sample wanted")
     ranged = tuple(_robot(robot) for robot in raw.ranged)
     return Status(_flag(raw.state), _robot(raw.frame), bool(_flag(raw.leaving)), raw.uwb_id,
                   raw.uwb_clock_us, raw.graph_hash, heard, ranged, logs)  # fmt: skip

@@ -14,22 +14,30 @@ from drslamd.slam.se2 import Array
 UNKNOWN_CLOCK = -(2**63)
 """`Status.uwb_clock_us` of a robot that does not know LinkTrack's system_time."""
 
-MAX_HEARD = 31
-"""Peers named in one status, which with as many logs has 1,387 bytes. Robots that hear more than
+NOTHING_WANTED = -1
+
+MAX_HEARD = 28
+"""Peers named in one status, which with as many logs has 1,365 bytes. Robots that hear more than
 this many others do not all learn that they are heard."""
-MAX_LOGS = 31
+MAX_LOGS = 28
 """Logs named in one status; whoever holds more names them in turn."""
 MAX_BATCH = 150
-"""Odometry samples in one message: 15 s, 973 bytes."""
+"""Odometry samples in one message: 15 s, 965 bytes."""
 
 
 @dataclass(frozen=True)
 class Heard:
-    """A peer that is heard, and the smallest (arrival here - utime there) of late."""
+    """A peer that is heard.
+
+    Attributes:
+        delay_us: the smallest (arrival here - utime there) of late.
+        wanted_n: first sample of its odometry that we lack and need, `NOTHING_WANTED` if none.
+    """
 
     id: int
     epoch: int
     delay_us: int
+    wanted_n: int = NOTHING_WANTED
 
 
 @dataclass(frozen=True)

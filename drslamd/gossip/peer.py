@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from drslamd.conventions import GRID_US, SECOND_US, Chain
-from drslamd.gossip.message_types import OdometryBatch, Pose, Status
+from drslamd.gossip.message_types import MAX_BATCH, NOTHING_WANTED, OdometryBatch, Pose, Status
 from drslamd.gossip.peer_clock import PeerClock
 from drslamd.slam.items import PublicPoses
 from drslamd.slam.neighbour import Neighbour
@@ -13,6 +13,8 @@ from drslamd.slam.odometry import PEER_TRACK_SAMPLES, Track
 
 SILENCE_US = 5 * SECOND_US
 """Five heartbeats: at 50 % loss a living peer stays silent so long in 3 % of cases."""
+GAP_US = 8 * SECOND_US
+"""What of its odometry is not said again for so long will not be."""
 LOSS_STATUSES = 30
 """Heartbeats over which the loss is counted: the last half minute or so."""
 
@@ -30,6 +32,8 @@ class Peer:
         self.last_heard = utime
         self.received = 0
         self._status_counter = self._pose_counter = 0
+        self._status_at = utime
+        self._gap_since: int | None = None
         self._tallies: deque[tuple[int, int]] = deque(maxlen=LOSS_STATUSES)
         """(messages that it had sent, those of them that had come) at each of its statuses."""
 
@@ -47,11 +51,11 @@ class Peer:
         (sent_before, came_before), (sent, came) = self._tallies[0], self._tallies[-1]
         return max(0.0, 1 - (came - came_before) / max(1, sent - sent_before))
 
-    def take_status(self, status: Status, counter: int, own: Chain) -> bool:
+    def take_status(self, status: Status, counter: int, own: Chain, utime: int) -> bool:
         """Keep the latest status; False when this one was overtaken by a later one."""
         if counter <= self._status_counter:
             return False
-        self._status_counter, self.status = counter, status
+        self._status_counter, self.status, self._status_at = counter, status, utime
         # entries of its log have counters too, but are not heard from the peer alone
         entries = max((log.newest for log in status.logs if log.id == self.chain.robot), default=0)
         self._tallies.append((counter - entries, self.received))
@@ -68,13 +72,23 @@ class Peer:
         """Keep what the peer said last of each of its public poses."""
         self.public = message.after(self.public)
 
-    def extend_track(self, batch: OdometryBatch) -> None:
-        """Append what is new in a batch; batches overlap, so nothing is lost with one."""
+    def extend_track(self, batch: OdometryBatch, utime: int) -> None:
+        """Append what is new in a batch; one that leaves a gap waits for those before it."""
         track = self.track
+        if batch.n0 > max(track.end, batch.segment_start) and len(batch.steps) < MAX_BATCH:
+            self._gap_since = utime if self._gap_since is None else self._gap_since
+            if utime - self._gap_since < GAP_US:
+                return
+        self._gap_since = None
         for n, steps in enumerate(batch.steps, start=batch.n0):
             if not len(track) or n >= track.end:
                 track.append(n, steps)
         track.segment_start = max(track.segment_start, batch.segment_start)
+
+    @property
+    def lacks_odometry(self) -> bool:
+        """Does its odometry wait for samples that were lost?"""
+        return self._gap_since is not None
 
     def is_alive(self, utime: int) -> bool:
         """Heard of late, and not on its way out."""
@@ -89,6 +103,7 @@ class Peer:
         """What the front end must know of a living peer."""
         assert self.status is not None
         offset = self.clock.offset(utime)
+        wanted = (h.wanted_n for h in self.status.heard if (h.id, h.epoch) == own)
         known = offset is not None and offset.uncertainty_us <= GRID_US
         return Neighbour(
             self.chain,
@@ -96,4 +111,6 @@ class Peer:
             own.robot in self.status.ranged,
             self.track,
             offset.us if offset is not None and known else None,
+            next(wanted, NOTHING_WANTED),
+            self._status_at,
         )

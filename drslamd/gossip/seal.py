@@ -23,8 +23,9 @@ from drslamd.gossip.lc02 import MAX_PAYLOAD
 
 VERSION = 1
 KEY_BYTES = 32
-TAG_BYTES = 16
-_HEADER = struct.Struct(">8sbhqqq16s")
+TAG_BYTES = 8
+"""A forger needs 2^63 tries, each of them a datagram."""
+_HEADER = struct.Struct(f">8sbhqqq{TAG_BYTES}s")
 """LCM's fingerprint, then header_t in LCM's order (big-endian, packed)."""
 _TAG_AT = _HEADER.size - TAG_BYTES
 _PUBLIC_KEY = b"drslamd without a team key      "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 
 from drslamd.conventions import SECOND_US, Chain
@@ -21,8 +21,8 @@ FORGET_US = 600 * SECOND_US
 TRAITS_EVERY = 64
 """Log entries between two that say what our sensors are like."""
 ITEMS_PER_ENTRY = 20
-"""Keyframes, ranges and closures in one log entry; 20 closures with 20 peers are 1,290 bytes."""
-PUBLIC_ENVELOPE_BYTES = 69
+"""Keyframes, ranges and closures in one log entry; 20 closures with 20 peers are 1,282 bytes."""
+PUBLIC_ENVELOPE_BYTES = 61
 """What a public_poses_t needs besides its poses."""
 UNVERIFIED_US = 10 * SECOND_US
 """How long after a message that does not fit the team key it is still spoken of."""
@@ -136,12 +136,21 @@ class Team:
         """Log entries that somebody lacks; ask several times a second."""
         return [self.send_sealed(owner, sealed) for owner, sealed in self.logs.due(utime)]
 
-    def heard(self, utime: int) -> tuple[Heard, ...]:
-        """For our status: whom we hear, the most recent first."""
+    def heard(self, utime: int, needed: Container[int] = ()) -> tuple[Heard, ...]:
+        """For our status: whom we hear, the most recent first.
+
+        Args:
+            needed: robots whose odometry we need.
+        """
         alive = [peer for peer in self.peers.values() if peer.is_alive(utime)]
         recent = sorted(alive, key=lambda peer: -peer.last_heard)[: messages.MAX_HEARD]
-        delays = [(peer.chain, peer.clock.delay_us) for peer in recent]
-        return tuple(Heard(*chain, delay) for chain, delay in delays if delay is not None)
+        return tuple(
+            Heard(*peer.chain, peer.clock.delay_us, peer.track.end)
+            if peer.chain.robot in needed
+            else Heard(*peer.chain, peer.clock.delay_us)
+            for peer in recent
+            if peer.clock.delay_us is not None
+        )
 
     # ---- incoming ----
 
@@ -196,7 +205,7 @@ class Team:
         if isinstance(message, Status):
             self._status(peer, message, header.counter, utime)
         elif isinstance(message, OdometryBatch):
-            peer.extend_track(message)
+            peer.extend_track(message, utime)
         elif isinstance(message, Pose):
             peer.take_pose(message, header.counter)
         else:
@@ -204,13 +213,17 @@ class Team:
         return Received(origin, message)
 
     def _status(self, peer: Peer, status: Status, counter: int, utime: int) -> None:
-        if not peer.take_status(status, counter, self.own):
+        if not peer.take_status(status, counter, self.own, utime):
             return
         self.logs.peer_holds(status.logs, peer.chain.robot, utime)
         starts = [(s.id, s.epoch) for s in status.heard] + [(s.id, s.epoch) for s in status.logs]
         for robot, epoch in starts:
             if robot == self.own.robot and epoch > self.own.epoch:
                 self.superseded_by = max(self.superseded_by or 0, epoch)
+
+    def lacks_odometry(self) -> bool:
+        """Was odometry lost that may still come?"""
+        return any(peer.lacks_odometry for peer in self.peers.values())
 
     # ---- who is there ----
 

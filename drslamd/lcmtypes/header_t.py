@@ -17,7 +17,7 @@ class header_t(object):
 
     __typenames__ = ["int8_t", "int16_t", "int64_t", "int64_t", "int64_t", "byte"]
 
-    __dimensions__ = [None, None, None, None, None, [16]]
+    __dimensions__ = [None, None, None, None, None, [8]]
 
     def __init__(self):
         self.version = 0
@@ -53,7 +53,7 @@ class header_t(object):
         self.tag = b""
         """
         keyed BLAKE2b over channel and message, this field zero
-        LCM Type: byte[16]
+        LCM Type: byte[8]
         """
 
 
@@ -65,7 +65,7 @@ class header_t(object):
 
     def _encode_one(self, buf):
         buf.write(struct.pack(">bhqqq", self.version, self.origin, self.epoch, self.counter, self.utime))
-        buf.write(bytearray(self.tag[:16]))
+        buf.write(bytearray(self.tag[:8]))
 
     @staticmethod
     def decode(data: bytes):
@@ -81,13 +81,13 @@ class header_t(object):
     def _decode_one(buf):
         self = header_t()
         self.version, self.origin, self.epoch, self.counter, self.utime = struct.unpack(">bhqqq", buf.read(27))
-        self.tag = buf.read(16)
+        self.tag = buf.read(8)
         return self
 
     @staticmethod
     def _get_hash_recursive(parents):
         if header_t in parents: return 0
-        tmphash = (0xedddf949ba04981c) & 0xffffffffffffffff
+        tmphash = (0xf3122206b645fa6f) & 0xffffffffffffffff
         tmphash  = (((tmphash<<1)&0xffffffffffffffff) + (tmphash>>63)) & 0xffffffffffffffff
         return tmphash
     _packed_fingerprint = None

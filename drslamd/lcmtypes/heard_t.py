@@ -10,11 +10,11 @@ import struct
 class heard_t(object):
     """ One peer as the sender hears it. """
 
-    __slots__ = ["id", "epoch", "delay_us"]
+    __slots__ = ["id", "epoch", "delay_us", "wanted_n"]
 
-    __typenames__ = ["int16_t", "int64_t", "int64_t"]
+    __typenames__ = ["int16_t", "int64_t", "int64_t", "int32_t"]
 
-    __dimensions__ = [None, None, None]
+    __dimensions__ = [None, None, None, None]
 
     def __init__(self):
         self.id = 0
@@ -27,6 +27,12 @@ class heard_t(object):
         LCM Type: int64_t
         """
 
+        self.wanted_n = 0
+        """
+        first sample of its odometry that the sender lacks and needs; -1 needs none
+        LCM Type: int32_t
+        """
+
 
     def encode(self):
         buf = BytesIO()
@@ -35,7 +41,7 @@ class heard_t(object):
         return buf.getvalue()
 
     def _encode_one(self, buf):
-        buf.write(struct.pack(">hqq", self.id, self.epoch, self.delay_us))
+        buf.write(struct.pack(">hqqi", self.id, self.epoch, self.delay_us, self.wanted_n))
 
     @staticmethod
     def decode(data: bytes):
@@ -50,13 +56,13 @@ class heard_t(object):
     @staticmethod
     def _decode_one(buf):
         self = heard_t()
-        self.id, self.epoch, self.delay_us = struct.unpack(">hqq", buf.read(18))
+        self.id, self.epoch, self.delay_us, self.wanted_n = struct.unpack(">hqqi", buf.read(22))
         return self
 
     @staticmethod
     def _get_hash_recursive(parents):
         if heard_t in parents: return 0
-        tmphash = (0xe3dc510d828cedfd) & 0xffffffffffffffff
+        tmphash = (0xe75b68cabd96a714) & 0xffffffffffffffff
         tmphash  = (((tmphash<<1)&0xffffffffffffffff) + (tmphash>>63)) & 0xffffffffffffffff
         return tmphash
     _packed_fingerprint = None

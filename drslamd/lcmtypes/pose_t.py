@@ -14,7 +14,7 @@ class pose_t(object):
 
     __slots__ = ["header", "state", "frame", "frame_epoch", "pose_utime", "x", "y", "theta", "covariance"]
 
-    __typenames__ = ["drslamd.lcmtypes.header_t", "int8_t", "int16_t", "int64_t", "int64_t", "double", "double", "double", "float"]
+    __typenames__ = ["drslamd.lcmtypes.header_t", "int8_t", "int16_t", "int64_t", "int64_t", "float", "float", "float", "float"]
 
     __dimensions__ = [None, None, None, None, None, None, None, None, [6]]
 
@@ -44,15 +44,15 @@ class pose_t(object):
         self.x = 0.0
         """
         m
-        LCM Type: double
+        LCM Type: float
         """
 
         self.y = 0.0
-        """ LCM Type: double """
+        """ LCM Type: float """
         self.theta = 0.0
         """
         rad
-        LCM Type: double
+        LCM Type: float
         """
 
         self.covariance = [ 0.0 for dim0 in range(6) ]
@@ -71,7 +71,7 @@ class pose_t(object):
     def _encode_one(self, buf):
         assert self.header._get_packed_fingerprint() == drslamd.lcmtypes.header_t._get_packed_fingerprint()
         self.header._encode_one(buf)
-        buf.write(struct.pack(">bhqqddd", self.state, self.frame, self.frame_epoch, self.pose_utime, self.x, self.y, self.theta))
+        buf.write(struct.pack(">bhqqfff", self.state, self.frame, self.frame_epoch, self.pose_utime, self.x, self.y, self.theta))
         buf.write(struct.pack('>6f', *self.covariance[:6]))
 
     @staticmethod
@@ -88,7 +88,7 @@ class pose_t(object):
     def _decode_one(buf):
         self = pose_t()
         self.header = drslamd.lcmtypes.header_t._decode_one(buf)
-        self.state, self.frame, self.frame_epoch, self.pose_utime, self.x, self.y, self.theta = struct.unpack(">bhqqddd", buf.read(43))
+        self.state, self.frame, self.frame_epoch, self.pose_utime, self.x, self.y, self.theta = struct.unpack(">bhqqfff", buf.read(31))
         self.covariance = struct.unpack('>6f', buf.read(24))
         return self
 
@@ -96,7 +96,7 @@ class pose_t(object):
     def _get_hash_recursive(parents):
         if pose_t in parents: return 0
         newparents = parents + [pose_t]
-        tmphash = (0xe9e7a46b0c3ad719+ drslamd.lcmtypes.header_t._get_hash_recursive(newparents)) & 0xffffffffffffffff
+        tmphash = (0x50d4626a0ba5f1d2+ drslamd.lcmtypes.header_t._get_hash_recursive(newparents)) & 0xffffffffffffffff
         tmphash  = (((tmphash<<1)&0xffffffffffffffff) + (tmphash>>63)) & 0xffffffffffffffff
         return tmphash
     _packed_fingerprint = None

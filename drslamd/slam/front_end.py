@@ -96,6 +96,11 @@ class FrontEnd:
         """Are we the one of the two that makes closures?"""
         return self._own.robot < peer.chain.robot or not peer.ranges_to_us
 
+    def needed(self, neighbours: list[Neighbour], utime: int) -> set[int]:
+        """Robots whose odometry our windows need."""
+        mine = self.ranged(utime)
+        return {p.chain.robot for p in neighbours if self._owns(p) and p.uwb_id in mine}
+
     def _sides(
         self, neighbours: list[Neighbour], graph: TeamGraph, utime: int
     ) -> list[tuple[Pair, Side, Side]]:

@@ -17,6 +17,8 @@ class Neighbour:
         ranges_to_us: does it measure ranges to us?
         track: its odometry of the last minutes.
         ahead_us: its clock minus ours; None while that is not known well enough.
+        wanted_n: first sample of our odometry that it lacked and needed when it last said so, at
+            wanted_at, us; -1 when it needs none.
     """
 
     chain: Chain
@@ -24,3 +26,5 @@ class Neighbour:
     ranges_to_us: bool
     track: Track
     ahead_us: int | None
+    wanted_n: int = -1
+    wanted_at: int = 0

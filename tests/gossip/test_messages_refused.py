@@ -58,7 +58,7 @@ ACCEPTED: list[tuple[Any, ...]] = [
     ("GRAPH", "closures", 0, "kept", 0),
     ("GRAPH", "closures", 0, "covariance", (1, 0.99, 0, 1, 0, 1)),
     ("POSE", "state", 0),
-    ("POSE", "theta", -1e300),
+    ("POSE", "theta", -3e38),
     ("PUBLIC", "keyframes", (0, 0)),
 ]
 REFUSED: list[tuple[Any, ...]] = [
@@ -140,17 +140,17 @@ def test_a_value_beyond_its_bound_is_refused_with_a_phrase(case: tuple[Any, ...]
 
 
 COUNTS = {
-    "heard": ("STATUS", 51 + 28, ">h"),
-    "ranged": ("STATUS", 51 + 28 + 2 + 18, ">h"),
-    "logs": ("STATUS", 51 + 28 + 2 + 18 + 2 + 4, ">h"),
-    "samples": ("ODOMETRY", 51 + 20, ">h"),
-    "traits": ("GRAPH", 51 + 4, ">b"),
-    "keyframes": ("GRAPH", 51 + 5 + 24, ">h"),
-    "peers": ("GRAPH", 51 + 5 + 24 + 2 + 18, ">h"),
-    "ranges": ("GRAPH", 51 + 5 + 24 + 2 + 18 + 2 + 10, ">h"),
-    "closures": ("GRAPH", 51 + 5 + 24 + 2 + 18 + 2 + 10 + 2 + 23, ">h"),
-    "public poses": ("PUBLIC", 51 + 12, ">h"),
-    "values": ("PUBLIC", 51 + 14 + 8, ">i"),
+    "heard": ("STATUS", 43 + 28, ">h"),
+    "ranged": ("STATUS", 43 + 28 + 2 + 22, ">h"),
+    "logs": ("STATUS", 43 + 28 + 2 + 22 + 2 + 4, ">h"),
+    "samples": ("ODOMETRY", 43 + 20, ">h"),
+    "traits": ("GRAPH", 43 + 4, ">b"),
+    "keyframes": ("GRAPH", 43 + 5 + 24, ">h"),
+    "peers": ("GRAPH", 43 + 5 + 24 + 2 + 18, ">h"),
+    "ranges": ("GRAPH", 43 + 5 + 24 + 2 + 18 + 2 + 10, ">h"),
+    "closures": ("GRAPH", 43 + 5 + 24 + 2 + 18 + 2 + 10 + 2 + 23, ">h"),
+    "public poses": ("PUBLIC", 43 + 12, ">h"),
+    "values": ("PUBLIC", 43 + 14 + 8, ">i"),
 }
 """Where the counts stand in the messages of `kinds`, by the .lcm files."""
 
@@ -178,9 +178,9 @@ def test_peers_that_no_item_names_are_refused(change: Callable[[Any], object]) -
 
 
 @pytest.mark.parametrize(("heard", "logs", "ranged", "fits"), [
-    (31, 31, 31, True), (32, 0, 0, False), (0, 32, 0, False), (0, 0, 32, False),
+    (28, 28, 28, True), (29, 0, 0, False), (0, 29, 0, False), (0, 0, 29, False),
 ])  # fmt: skip
-def test_a_status_names_at_most_31_of_each(heard: int, logs: int, ranged: int, fits: bool) -> None:
+def test_a_status_names_at_most_28_of_each(heard: int, logs: int, ranged: int, fits: bool) -> None:
     status = a_status(
         tuple(Heard(k, 1, 0) for k in range(heard)),
         tuple(LogState(k, 1, 0, 0, 0) for k in range(logs)),
@@ -224,7 +224,7 @@ def is_judged(kind: str, payload: bytes) -> bool:
     head = CODECS[kind].struct.decode(payload).header
     header = Header(head.version, head.origin, head.epoch, head.counter, head.utime)
     again = messages.encode(header, message)
-    return bool(again[:35] + head.tag + again[51:] == payload)
+    return bool(again[:35] + head.tag + again[43:] == payload)
 
 
 @pytest.mark.parametrize("kind", CODECS)
@@ -239,7 +239,7 @@ def test_a_message_with_any_bit_flipped_is_refused_or_says_what_it_says(kind: st
 @pytest.mark.parametrize("kind", CODECS)
 def test_random_bytes_behind_a_fingerprint_are_judged(kind: str) -> None:
     draw = random.Random(kind)
-    head = messages.encode(HEADER, kinds()[kind])[:51]
+    head = messages.encode(HEADER, kinds()[kind])[:43]
     for _ in range(3_000):
-        kept = draw.choice([0, 8, 51])
+        kept = draw.choice([0, 8, 43])
         assert is_judged(kind, head[:kept] + draw.randbytes(draw.randrange(200)))

@@ -36,7 +36,7 @@ def loss_after(messages: list[str], lost: set[int]) -> float:
         elif k not in lost:
             peer.heard(k * 100 * MS, T0 + k * 100 * MS)
             if kind == "status":
-                peer.take_status(a_status(logs=own_log(entries)), k + 1, OWN)
+                peer.take_status(a_status(logs=own_log(entries)), k + 1, OWN, 0)
     return peer.loss
 
 
@@ -70,7 +70,7 @@ def test_the_loss_is_that_of_the_last_thirty_statuses() -> None:
 def test_a_peer_that_lies_about_its_log_has_some_loss_and_breaks_nothing() -> None:
     peer = a_peer()
     for counter, entries in ((1, 0), (2, 1), (3, 10**6), (4, 0)):
-        peer.take_status(a_status(logs=own_log(entries)), counter, OWN)
+        peer.take_status(a_status(logs=own_log(entries)), counter, OWN, 0)
         assert 0.0 <= peer.loss <= 1.0
 
 
@@ -86,7 +86,7 @@ def test_a_peer_lives_for_five_seconds_after_its_last_message() -> None:
 
 def test_a_peer_that_says_goodbye_is_gone_at_once() -> None:
     peer = a_peer()
-    peer.take_status(a_status(leaving=True), 1, OWN)
+    peer.take_status(a_status(leaving=True), 1, OWN, 0)
     assert not peer.is_alive(T0)
 
 
@@ -96,18 +96,18 @@ def test_a_peer_hears_us_when_its_latest_status_names_this_very_start() -> None:
     for counter, (named, hears) in enumerate(
         [(Heard(1, 10, 5), True), (Heard(1, 9, 5), False), (Heard(2, 10, 5), False)], start=1
     ):
-        peer.take_status(a_status((Heard(7, 7, 0), named)), counter, OWN)
+        peer.take_status(a_status((Heard(7, 7, 0), named)), counter, OWN, 0)
         assert peer.hears(OWN) == hears
 
 
 def test_what_it_hears_of_us_makes_its_clock_known() -> None:
     peer = a_peer()
     peer.heard(T0 + SECOND, T0 + 10 * MS)
-    peer.take_status(a_status((Heard(*OWN, SECOND + 10 * MS),)), 1, OWN)
+    peer.take_status(a_status((Heard(*OWN, SECOND + 10 * MS),)), 1, OWN, 0)
     offset = peer.clock.offset(T0)
     assert offset is not None
     assert (offset.us, offset.source) == (SECOND, "messages")
-    peer.take_status(a_status((Heard(1, 9, 0),)), 2, OWN)
+    peer.take_status(a_status((Heard(1, 9, 0),)), 2, OWN, 0)
     offset = peer.clock.offset(T0)
     assert offset is not None
     assert offset.source == "one way"
@@ -116,9 +116,9 @@ def test_what_it_hears_of_us_makes_its_clock_known() -> None:
 def test_a_status_that_was_overtaken_says_nothing_new() -> None:
     peer = a_peer()
     late, latest = a_status(leaving=False), a_status(leaving=True)
-    assert peer.take_status(latest, 5, OWN)
-    assert not peer.take_status(late, 4, OWN)
-    assert not peer.take_status(late, 5, OWN)
+    assert peer.take_status(latest, 5, OWN, 0)
+    assert not peer.take_status(late, 4, OWN, 0)
+    assert not peer.take_status(late, 5, OWN, 0)
     assert peer.status is latest
 
 
@@ -145,7 +145,7 @@ def batch(first: int, count: int, segment_start: int = 0) -> OdometryBatch:
 def test_overlapping_batches_make_one_track() -> None:
     peer = a_peer()
     for first in (0, 5, 10):
-        peer.extend_track(batch(first, 15))
+        peer.extend_track(batch(first, 15), 0)
     assert (peer.track.n0, peer.track.end) == (0, 25)
     assert np.array_equal(peer.track.steps(0, 25), steps(0, 25))
     assert peer.track.covers(0, 24)
@@ -154,24 +154,42 @@ def test_overlapping_batches_make_one_track() -> None:
 def test_batches_that_come_twice_or_late_change_nothing() -> None:
     peer = a_peer()
     for first in (0, 10, 5, 0, 10):
-        peer.extend_track(batch(first, 15))
+        peer.extend_track(batch(first, 15), 0)
     assert np.array_equal(peer.track.steps(0, 25), steps(0, 25))
 
 
-def test_two_lost_batches_in_a_row_lose_nothing_and_a_third_leaves_a_hole() -> None:
-    """As the robot sends them: 15 samples every 5."""
-    for first, covered in ((15, True), (20, False)):
-        peer = a_peer()
-        peer.extend_track(batch(0, 15))
-        peer.extend_track(batch(first, 15))
-        assert peer.track.covers(0, first + 14) == covered
-        assert peer.track.covers(first, first + 14)
+def test_a_batch_that_leaves_a_gap_waits_for_what_was_lost() -> None:
+    peer = a_peer()
+    peer.extend_track(batch(0, 10), 0)
+    peer.extend_track(batch(20, 10), SECOND)
+    assert peer.track.end == 10
+    assert peer.lacks_odometry
+    peer.extend_track(batch(10, 30), 2 * SECOND)
+    assert peer.track.covers(0, 39)
+    assert not peer.lacks_odometry
+
+
+@pytest.mark.parametrize(("later", "taken"), [(8 * SECOND - 1, False), (8 * SECOND, True)])
+def test_after_eight_seconds_a_gap_is_a_hole(later: int, taken: bool) -> None:
+    peer = a_peer()
+    peer.extend_track(batch(0, 10), 0)
+    peer.extend_track(batch(20, 10), SECOND)
+    peer.extend_track(batch(30, 10), SECOND + later)
+    assert peer.track.covers(30, 39) == taken
+    assert not peer.track.covers(0, 39)
+
+
+@pytest.mark.parametrize(("count", "taken"), [(149, False), (150, True)])
+def test_a_batch_of_all_that_fits_is_the_beginning(count: int, taken: bool) -> None:
+    peer = a_peer()
+    peer.extend_track(batch(500, count), 0)
+    assert len(peer.track) == (count if taken else 0)
 
 
 def test_a_break_in_the_odometry_of_the_peer_is_a_break_in_its_track() -> None:
     peer = a_peer()
-    peer.extend_track(batch(0, 15))
-    peer.extend_track(batch(15, 5, segment_start=15))
+    peer.extend_track(batch(0, 15), 0)
+    peer.extend_track(batch(15, 5, segment_start=15), 0)
     assert not peer.track.covers(14, 15)
     assert peer.track.covers(15, 19)
 
@@ -182,11 +200,11 @@ def test_a_break_in_the_odometry_of_the_peer_is_a_break_in_its_track() -> None:
 def test_a_neighbour_carries_what_the_peer_said() -> None:
     peer = a_peer()
     peer.heard(T0 + SECOND, T0 + 10 * MS)
-    peer.take_status(a_status((Heard(*OWN, SECOND),), ranged=(1, 9), uwb_id=44), 1, OWN)
+    peer.take_status(a_status((Heard(*OWN, SECOND),), ranged=(1, 9), uwb_id=44), 1, OWN, 0)
     neighbour = peer.neighbour(OWN, T0)
     assert (neighbour.chain, neighbour.uwb_id, neighbour.ranges_to_us) == (CHAIN, 44, True)
     assert neighbour.ahead_us == SECOND - 5 * MS
-    peer.take_status(a_status(ranged=(9,)), 2, OWN)
+    peer.take_status(a_status(ranged=(9,)), 2, OWN, 0)
     assert not peer.neighbour(OWN, T0).ranges_to_us
 
 
@@ -197,5 +215,5 @@ def test_a_clock_that_is_known_worse_than_a_grid_step_is_not_used(
     """The sum of both delays, halved, and 3.2 ms for the drift make 100 ms."""
     peer = a_peer()
     peer.heard(T0, T0 + 96_800)
-    peer.take_status(a_status((Heard(*OWN, 96_800 + excess_us),)), 1, OWN)
+    peer.take_status(a_status((Heard(*OWN, 96_800 + excess_us),)), 1, OWN, 0)
     assert (peer.neighbour(OWN, T0).ahead_us is not None) == known

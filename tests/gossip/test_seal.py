@@ -94,8 +94,8 @@ def test_the_tag_covers_the_channel() -> None:
 
 def test_a_message_shorter_than_its_header_is_refused() -> None:
     channel, payload = sealed(a_seal(3), a_status())
-    assert opened(a_seal(1), (channel, payload[:50])) is SealFault.TOO_SHORT
-    assert opened(a_seal(1), (channel, payload[:51])) is SealFault.WRONG_TAG
+    assert opened(a_seal(1), (channel, payload[:42])) is SealFault.TOO_SHORT
+    assert opened(a_seal(1), (channel, payload[:43])) is SealFault.WRONG_TAG
 
 
 def test_a_message_longer_than_a_datagram_is_refused() -> None:

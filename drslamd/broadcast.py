@@ -1,0 +1,146 @@
+"""What a robot says of its own accord, and when that is worth a datagram.
+
+Most of a small datagram is its envelope, so what nobody needs is not said: odometry goes only to
+who makes closures with it and from the first sample that is lacked there, a heartbeat without news
+comes half as often, and a pose that moved less than it is uncertain waits for its second.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Hashable
+
+import numpy as np
+
+from drslamd.config import Config
+from drslamd.conventions import SECOND_US
+from drslamd.events import Effect
+from drslamd.gossip.message_types import (
+    MAX_BATCH,
+    MAX_HEARD,
+    NOTHING_WANTED,
+    UNKNOWN_CLOCK,
+    OdometryBatch,
+    Pose,
+    Status,
+)
+from drslamd.gossip.team import Team
+from drslamd.slam import se2
+from drslamd.slam.back_end import BackEnd
+from drslamd.slam.front_end import FrontEnd
+from drslamd.slam.neighbour import Neighbour
+from drslamd.slam.se2 import Array
+
+QUIET_US = 2 * SECOND_US
+"""Between heartbeats of a robot that is localised, lacks nothing and hears the same as before."""
+POSE_US = SECOND_US
+"""Longest silence about the pose of a localised robot."""
+BATCHES = 8
+"""Batches that are remembered: more than go out between two statuses."""
+ON_THE_AIR_US = SECOND_US // 5
+"""A status that comes so shortly after a batch cannot know of it."""
+SOONER_US = SECOND_US // 20
+"""Timers of one period may be so uneven."""
+
+
+class Broadcast:
+    """Our status, odometry and pose for the others."""
+
+    def __init__(self, config: Config, team: Team, front: FrontEnd, back: BackEnd) -> None:
+        self._config = config
+        self._team, self._front, self._back = team, front, back
+        self._news: Hashable = None
+        self._status_said = self._pose_said = -QUIET_US
+        self._pose: Array = np.full(3, np.inf)
+        self._odometry_said: deque[tuple[int, int]] = deque(maxlen=BATCHES)
+        """When batches were said, and one past the last sample of each."""
+
+    # ---- heartbeat ----
+
+    def heartbeat(
+        self, neighbours: list[Neighbour], uwb_clock: int | None, utime: int
+    ) -> list[Effect]:
+        """Our status, unless it says what it said a second ago.
+
+        Args:
+            uwb_clock: our clock minus LinkTrack's system_time, us, where that is known.
+        """
+        self._team.compare_radio_clocks(uwb_clock, utime)
+        status = self.status(neighbours, uwb_clock, utime)
+        lacks = self._team.lacks_odometry() or any(g.complete < g.newest for g in status.logs)
+        news = (status.state, status.frame, status.uwb_id, status.ranged,
+                frozenset((h.id, h.epoch) for h in status.heard))  # fmt: skip
+        quiet = bool(status.state) and not lacks and news == self._news
+        if quiet and utime - self._status_said < QUIET_US - SOONER_US:
+            return []
+        self._news, self._status_said = news, utime
+        return [self._team.send(status, utime)]
+
+    def status(
+        self,
+        neighbours: list[Neighbour],
+        uwb_clock: int | None,
+        utime: int,
+        leaving: bool = False,
+    ) -> Status:
+        """What we are, whom we hear, what we hold."""
+        estimate = self._back.estimate
+        ranged = (self._team.robot_of_uwb(uwb_id) for uwb_id in self._front.ranged(utime))
+        return Status(
+            state=int(estimate is not None),
+            frame=estimate.frame.robot if estimate else self._team.own.robot,
+            leaving=leaving,
+            uwb_id=self._config.uwb_id,
+            uwb_clock_us=UNKNOWN_CLOCK if uwb_clock is None else uwb_clock,
+            graph_hash=self._back.digest(),
+            heard=self._team.heard(utime, self._front.needed(neighbours, utime)),
+            ranged=tuple(sorted(r for r in ranged if r is not None))[:MAX_HEARD],
+            logs=self._team.logs.states(),
+        )
+
+    # ---- odometry ----
+
+    def odometry(self, neighbours: list[Neighbour], utime: int) -> list[Effect]:
+        """Short-term odometry, for peers whose windows need it (paper III-C)."""
+        track = self._front.reckoning.track
+        wants = [self._lacked(peer) for peer in neighbours if peer.wanted_n != NOTHING_WANTED]
+        if not len(track) or not wants:
+            return []
+        n0 = max(track.n0, track.segment_start, track.end - MAX_BATCH, min(wants))
+        if n0 >= track.end:
+            return []
+        self._odometry_said.append((utime, track.end))
+        batch = OdometryBatch(track.segment_start, n0, track.steps(n0, track.end - n0))
+        return [self._team.send(batch, utime)]
+
+    def _lacked(self, peer: Neighbour) -> int:
+        """First sample to say to a peer: what we said counts as heard until it should know."""
+        said = self._odometry_said
+        known = [end for at, end in said if at + ON_THE_AIR_US < peer.wanted_at]
+        is_lost = bool(known) and peer.wanted_n < known[-1]
+        return peer.wanted_n if is_lost or not said else said[-1][1]
+
+    # ---- pose ----
+
+    def pose(self, found: tuple[int, Array, Array] | None, utime: int) -> list[Effect]:
+        """Where we are, when that is news.
+
+        Args:
+            found: time of the pose in us, w_T_a (3,), covariance (3, 3).
+        """
+        estimate = self._back.estimate
+        if estimate is None or found is None:
+            return []
+        pose_utime, pose, covariance = found
+        moved = pose - self._pose
+        moved[2] = se2.wrap(moved[2]) if np.isfinite(moved[2]) else moved[2]
+        known = bool((moved**2 < np.diag(covariance)).all())
+        if known and utime - self._pose_said < POSE_US - SOONER_US:
+            return []
+        self._pose, self._pose_said = pose, utime
+        x, y, theta = pose.tolist()
+        frame = estimate.frame
+        message = Pose(
+            1, frame.robot, frame.epoch, pose_utime, (x, y, theta), se2.packed(covariance)
+        )
+        return [self._team.send(message, utime)]

@@ -1,0 +1,89 @@
+"""What robots say of their own accord: no more than somebody needs, and no less."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from lab.simulator import Network
+from teams import EASY, VirtualTeam
+
+from drslamd.conventions import SECOND_US
+from drslamd.gossip import messages
+from drslamd.gossip.messages import OdometryBatch
+
+RUN_S = 55
+
+
+@pytest.fixture(scope="module")
+def team() -> VirtualTeam:
+    """Three robots that found each other."""
+    team = VirtualTeam(EASY)
+    team.run(RUN_S)
+    assert set(team.frames().values()) == {0}
+    return team
+
+
+def sent(team: VirtualTeam, robot: int, kind: str) -> list[tuple[float, bytes]]:
+    """Times in s of the run, and payloads."""
+    name = messages.channel(kind, robot)
+    traces = team.member(robot).traces
+    return [(t / SECOND_US, payload) for t, channel, payload in traces.sent if channel == name]
+
+
+def batches(team: VirtualTeam, robot: int) -> list[OdometryBatch]:
+    out = [messages.decode("ODOMETRY", payload) for _, payload in sent(team, robot, "ODOMETRY")]
+    assert all(isinstance(batch, OdometryBatch) for batch in out)
+    return [batch for batch in out if isinstance(batch, OdometryBatch)]
+
+
+def test_nobody_says_odometry_to_robots_that_make_no_closures_with_it(team: VirtualTeam) -> None:
+    """The lower id makes the closures of a pair."""
+    assert batches(team, 0) == []
+    assert batches(team, 1) != []
+    assert batches(team, 2) != []
+
+
+def test_every_sample_of_odometry_is_said_once_while_nothing_is_lost(team: VirtualTeam) -> None:
+    later = batches(team, 2)[5:]
+    assert len(later) > 30
+    for before, batch in pairwise(later):
+        assert batch.n0 == before.n0 + len(before.steps)
+
+
+def test_a_heartbeat_without_news_comes_every_other_second(team: VirtualTeam) -> None:
+    times = np.array([t for t, _ in sent(team, 1, "STATUS")])
+    early, late = np.diff(times[times < 8]), np.diff(times[times > 30])
+    assert early == pytest.approx(1.0, abs=0.05)
+    assert np.median(late) == pytest.approx(2.0, abs=0.05)
+
+
+def test_a_localised_robot_says_where_it_is_every_second(team: VirtualTeam) -> None:
+    times = np.array([t for t, _ in sent(team, 1, "POSE")])
+    assert np.diff(times[times > 30]).max() < 1.2
+
+
+def test_at_ten_solutions_a_second_a_pose_is_said_when_it_is_news() -> None:
+    team = VirtualTeam(EASY, extra="[optimizer]\nrate_hz = 10.0\n")
+    team.run(40.0)
+    said = sum(t > 30 for t, _ in sent(team, 1, "POSE"))
+    assert 11 <= said <= 70
+
+
+def test_odometry_that_was_lost_is_said_again_so_that_no_hole_remains() -> None:
+    team = VirtualTeam(EASY, network=Network(loss=0.3))
+    team.run(40.0)
+    for owner, peer in ((0, 1), (0, 2), (1, 2)):
+        track = team.member(owner).robot.team.peers[peer].track
+        assert len(track) > 300
+        assert np.isfinite(track.poses).all()
+
+
+def test_a_robot_that_comes_late_gets_the_odometry_of_the_last_fifteen_seconds() -> None:
+    team = VirtualTeam(EASY, on=(1, 2))
+    team.run(30.0)
+    team.start(0)
+    team.run(36.0)
+    track = team.member(0).robot.team.peers[2].track
+    assert 150 <= len(track) <= 220
