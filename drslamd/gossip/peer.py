@@ -12,7 +12,8 @@ from drslamd.slam.neighbour import Neighbour
 from drslamd.slam.odometry import PEER_TRACK_SAMPLES, Track
 
 SILENCE_US = 5 * SECOND_US
-"""Five heartbeats: at 50 % loss a living peer stays silent so long in 3 % of cases."""
+"""A robot says something every second (its pose, its odometry or its status): at 50 % loss a living
+peer stays silent so long in 3 % of cases."""
 GAP_US = 8 * SECOND_US
 """What of its odometry is not said again for so long will not be."""
 LOSS_STATUSES = 30
