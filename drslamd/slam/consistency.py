@@ -16,10 +16,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from drslamd.slam import se2
+from drslamd.slam import loops, se2
 from drslamd.slam.chi_squared import quantile3
-from drslamd.slam.clique import IncrementalClique, bits, is_clique
-from drslamd.slam.odometry import OdometryNoise, covariance_between
+from drslamd.slam.clique import IncrementalClique, bits
+from drslamd.slam.loops import Places, columns
+from drslamd.slam.odometry import OdometryNoise
 from drslamd.slam.se2 import Array
 
 MAX_VERTICES = 1_000
@@ -52,24 +53,23 @@ class Candidate:
 
 @dataclass
 class _Columns:
-    """The candidates as arrays, one row each."""
+    """The candidates as arrays, one column each."""
 
     closure: Array
     offset: Array
     covariance: Array
-    a_pose: Array
-    b_pose: Array
+    a_place: Array
+    b_place: Array
     a_sums: Array
     b_sums: Array
 
     @staticmethod
     def empty() -> _Columns:
-        shapes: list[tuple[int, ...]] = [(), (3,), (3, 3), (3,), (3,), (6,), (6,)]
-        return _Columns(*(np.empty((MAX_VERTICES, *shape)) for shape in shapes))
+        return _Columns(*(np.empty((rows, MAX_VERTICES)) for rows in (1, 3, 6, 2, 2, 6, 6)))
 
     def all(self) -> list[Array]:
         return [self.closure, self.offset, self.covariance,
-                self.a_pose, self.b_pose, self.a_sums, self.b_sums]  # fmt: skip
+                self.a_place, self.b_place, self.a_sums, self.b_sums]  # fmt: skip
 
 
 @dataclass
@@ -98,40 +98,49 @@ class PairConsistency:
         # (x, y, theta) in the frame of a become a left twist in the frame of a's odometry
         local = se2.adjoint(np.array([*candidate.a_T_b[:2], 0.0]))
         carry = se2.adjoint(candidate.a_pose) @ local
-        row = [candidate.closure, offset, carry @ candidate.covariance @ carry.T,
-               candidate.a_pose, candidate.b_pose, candidate.a_sums, candidate.b_sums]  # fmt: skip
+        covariance = np.array(se2.packed(carry @ candidate.covariance @ carry.T))
+        row = [np.array([candidate.closure]), offset, covariance, candidate.a_pose[:2],
+               candidate.b_pose[:2], candidate.a_sums, candidate.b_sums]  # fmt: skip
         for column, value in zip(self._columns.all(), row, strict=True):
-            column[k] = value
+            column[:, k] = value
         distance = self.distances(k)
         agrees = (distance <= quantile3(1 - self.epsilon)) & (
-            self._columns.closure[:k] != candidate.closure
+            self._columns.closure[0, :k] != candidate.closure
         )
         self.graph.add(int.from_bytes(np.packbits(agrees, bitorder="little").tobytes(), "little"))
-        if not is_clique(self.graph.adjacency, self.graph.clique):
+        if not self.graph.is_verified():
             raise AssertionError("the consistent set is not a clique")
 
     def distances(self, k: int) -> Array:
         """(k,) squared Mahalanobis length of the loops of candidate k with all before it."""
-        return self._lengths(np.full(k, k), np.arange(k))
+        return self._lengths(k, slice(k))
 
-    def _lengths(self, k: Array, i: Array) -> Array:
+    def _lengths(self, k: Places, i: Places) -> Array:
         """(m,) squared Mahalanobis lengths of the loops of candidates k with i, each i before k."""
         c = self._columns
-        loop = se2.log(se2.compose(c.offset[k], se2.inverse(c.offset[i])))
-        moved_a = covariance_between(self.noise_a, c.a_pose, c.a_sums, i, k)
-        moved_b = covariance_between(self.noise_b, c.b_pose, c.b_sums, i, k)
-        carry = se2.adjoint(c.offset[k])
-        carried_b = carry @ moved_b @ np.swapaxes(carry, -1, -2)
-        return squared_length(loop, c.covariance[i] + c.covariance[k] + moved_a + carried_b)
+        offset = columns(c.offset, k)
+        moved_a, moved_b = (
+            loops.odometry_covariance(
+                noise, columns(place, k) - columns(place, i), columns(sums, k) - columns(sums, i)
+            )
+            for noise, place, sums in (
+                (self.noise_a, c.a_place, c.a_sums),
+                (self.noise_b, c.b_place, c.b_sums),
+            )
+        )
+        covariance = columns(c.covariance, i) + columns(c.covariance, k)
+        covariance += moved_a + loops.carried(offset, moved_b)
+        return loops.squared_length(loops.twists(offset, columns(c.offset, i)), covariance)
 
     def renew_sums(self, vertices: Array, a_sums: Array, b_sums: Array) -> None:
         """What `odometry.growth` says now of the ends of some candidates: keyframes that came
         late make the way to those behind them longer."""
-        self._columns.a_sums[vertices], self._columns.b_sums[vertices] = a_sums, b_sums
+        self._columns.a_sums[:, vertices] = a_sums.T
+        self._columns.b_sums[:, vertices] = b_sums.T
 
     def kept(self) -> list[int]:
         """Closures of the largest consistent set, as the numbers that they were given."""
-        return [int(self._columns.closure[v]) for v in bits(self.graph.clique)]
+        return [int(self._columns.closure[0, v]) for v in bits(self.graph.clique)]
 
     def kept_vertices(self) -> list[int]:
         return bits(self.graph.clique)
@@ -146,7 +155,7 @@ class PairConsistency:
         None when it is kept itself. Hypotheses of its own window are no reason: those exclude
         each other whatever their distance.
         """
-        closure = self._columns.closure
+        closure = self._columns.closure[0]
         kept = np.array(bits(self.graph.clique), dtype=np.int64)
         others = kept[closure[kept] != closure[vertex]]
         if vertex in kept or not len(others):
@@ -158,26 +167,6 @@ class PairConsistency:
     def _forget(self) -> None:
         keep = MAX_VERTICES - FORGET
         for column in self._columns.all():
-            column[:keep] = column[FORGET:].copy()
+            column[:, :keep] = column[:, FORGET:].copy()
         self.graph.drop_oldest(FORGET)
         self.forgotten += FORGET
-
-
-def squared_length(error: Array, covariance: Array) -> Array:
-    """error' covariance^-1 error for (n, 3) and (n, 3, 3), by elimination.
-
-    Infinite where the covariance is none, as sums over an absurd trajectory may make it.
-    """
-    c = covariance
-    e0, e1, e2 = error[:, 0], error[:, 1], error[:, 2]
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        d0 = c[:, 0, 0]
-        l10, l20 = c[:, 1, 0] / d0, c[:, 2, 0] / d0
-        d1 = c[:, 1, 1] - l10 * c[:, 1, 0]
-        c21 = c[:, 2, 1] - l20 * c[:, 1, 0]
-        l21 = c21 / d1
-        d2 = c[:, 2, 2] - l20 * c[:, 2, 0] - l21 * c21
-        y1 = e1 - l10 * e0
-        y2 = e2 - l20 * e0 - l21 * y1
-        length = e0 * e0 / d0 + y1 * y1 / d1 + y2 * y2 / d2
-    return np.where((d0 > 0) & (d1 > 0) & (d2 > 0), length, np.inf)

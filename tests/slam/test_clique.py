@@ -5,10 +5,11 @@ from __future__ import annotations
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
-from drslamd.slam.clique import IncrementalClique, bits, greedy, is_clique
+from drslamd.slam import clique as clique_module
+from drslamd.slam.clique import IncrementalClique, bits
 
 
 def random_graph(seed: int, n: int, density: float) -> nx.Graph:
@@ -47,7 +48,7 @@ def test_the_clique_is_one_at_every_moment_and_nearly_the_largest(n: int, densit
             clique.add(sum(1 << other for other in graph[vertex] if other < vertex))
             kept = bits(clique.clique)
             assert all_joined(graph, kept)
-            assert is_clique(clique.adjacency, clique.clique)
+            assert clique.is_verified()
             assert len(kept) <= maximum(graph.subgraph(range(vertex + 1)))
         found, best = found + len(bits(clique.clique)), best + maximum(graph)
     assert found >= 0.94 * best
@@ -63,19 +64,36 @@ def test_planted_cliques_are_found() -> None:
         assert set(planted) <= set(bits(incremental(graph).clique))
 
 
-@given(st.integers(0, 10_000), st.integers(1, 20), st.sampled_from([0.3, 0.6, 0.9]))
-@settings(max_examples=60)
-def test_a_greedy_clique_holds_its_start_and_stays_inside(
-    seed: int, n: int, density: float
+@pytest.mark.parametrize("good", [0.3, 0.5, 0.8])
+def test_among_closures_with_noise_it_is_nearly_as_large_as_the_largest(good: float) -> None:
+    """Three in a hundred pairs of good closures disagree by chance."""
+    found = best = 0
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        graph = random_graph(seed, 100, 0.02)
+        right = np.flatnonzero(rng.random(100) < good).tolist()
+        graph.add_edges_from((a, b) for a in right for b in right if a < b and rng.random() < 0.97)
+        found += len(bits(incremental(graph).clique))
+        best += nx.max_weight_clique(graph, weight=None)[1]
+    assert found >= 0.94 * best
+
+
+def test_without_a_processor_that_counts_bits_the_answer_is_the_same(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    graph = random_graph(seed, n, density)
-    adjacency = incremental(graph).adjacency
-    allowed = np.random.default_rng(seed).integers(0, 1 << n)
-    for start in range(n):
-        kept = bits(greedy(adjacency, start, int(allowed)))
-        assert start in kept
-        assert all_joined(graph, kept)
-        assert all(k == start or int(allowed) >> k & 1 for k in kept)
+    graph = random_graph(3, 80, 0.7)
+    there = incremental(graph)
+    monkeypatch.delattr(np, "bitwise_count", raising=False)
+    assert incremental(graph).clique == there.clique
+    assert there.runner_up() == incremental(graph).runner_up()
+
+
+def test_more_vertices_than_one_word_holds_keep_their_edges() -> None:
+    graph = random_graph(1, 200, 0.3)
+    clique = incremental(graph)
+    assert clique_module.WORD < 200
+    for vertex, mask in enumerate(clique.adjacency):
+        assert bits(mask) == sorted(graph[vertex])
 
 
 def test_the_same_graph_gives_the_same_clique() -> None:
@@ -86,11 +104,16 @@ def test_the_same_graph_gives_the_same_clique() -> None:
     assert bits(incremental(pair).clique) == [0, 1, 2]
 
 
-def test_a_set_with_a_missing_edge_is_no_clique() -> None:
-    square = incremental(nx.cycle_graph(4))
-    assert is_clique(square.adjacency, 0b0011)
-    assert not is_clique(square.adjacency, 0b0111)
-    assert is_clique(square.adjacency, 0)
+@pytest.mark.parametrize("vertices", [range(2), range(64, 66), range(63, 65)])
+def test_a_set_with_a_missing_edge_is_not_verified(vertices: range) -> None:
+    graph = nx.empty_graph(70)
+    graph.add_edges_from([tuple(vertices), (vertices[1], 69)])
+    clique = incremental(graph)
+    for good in (0, 1 << 3, sum(1 << v for v in vertices)):
+        clique.clique = good
+        assert clique.is_verified()
+    clique.clique = sum(1 << v for v in (*vertices, 69))
+    assert not clique.is_verified()
 
 
 def test_the_runner_up_is_the_largest_set_outside() -> None:
@@ -120,7 +143,7 @@ def test_forgetting_leaves_the_graph_of_the_others(count: int) -> None:
     rest = nx.relabel_nodes(graph.subgraph(range(count, 20)), lambda k: k - count)
     assert len(clique) == 20 - count
     assert clique.adjacency == incremental(rest).adjacency
-    assert is_clique(clique.adjacency, clique.clique)
+    assert clique.is_verified()
     assert len(bits(clique.clique)) >= len(kept)
 
 

@@ -8,7 +8,8 @@ from slam_scenes import NOISE, Array, inverted, matrix, pose_of, product, wander
 
 from drslamd.slam import consistency, se2
 from drslamd.slam.chi_squared import quantile3
-from drslamd.slam.consistency import Candidate, PairConsistency, squared_length
+from drslamd.slam.clique import IncrementalClique
+from drslamd.slam.consistency import Candidate, PairConsistency
 from drslamd.slam.odometry import growth
 
 EPSILON = 0.1
@@ -214,17 +215,15 @@ def test_renewed_sums_make_the_way_between_longer() -> None:
     assert pair.distances(1)[0] < 0.7 * before
 
 
-def test_squared_lengths_are_those_of_solved_systems() -> None:
-    rng = np.random.default_rng(13)
-    root = rng.normal(size=(200, 3, 3))
-    covariance = root @ np.swapaxes(root, 1, 2) + 0.01 * np.eye(3)
-    error = rng.normal(size=(200, 3))
-    expected = [e @ np.linalg.solve(c, e) for e, c in zip(error, covariance, strict=True)]
-    assert np.allclose(squared_length(error, covariance), expected)
+def test_a_set_that_is_no_clique_is_never_handed_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    drive = Drive(14)
+    pair = judged(drive.candidate(0, 10))
 
+    def wrong(graph: IncrementalClique, neighbours: int) -> None:
+        add(graph, neighbours)
+        graph.clique = 0b11
 
-@pytest.mark.parametrize(
-    "covariance", [np.zeros((3, 3)), np.diag([1.0, -1.0, 1.0]), np.full((3, 3), np.nan)]
-)
-def test_a_covariance_that_is_none_agrees_with_nothing(covariance: Array) -> None:
-    assert squared_length(np.ones((1, 3)), covariance[None]).tolist() == [np.inf]
+    add = IncrementalClique.add
+    monkeypatch.setattr(IncrementalClique, "add", wrong)
+    with pytest.raises(AssertionError, match="not a clique"):
+        pair.add(drive.candidate(1, 100, product(drive.true(100), [9.0, 0, 0])))
