@@ -90,8 +90,12 @@ def test_the_same_seed_sends_the_same_bytes() -> None:
     "network",
     [
         pytest.param(Network(loss=0.3), id="30 percent lost"),
-        pytest.param(Network(duplicate=0.5), id="half of it twice"),
-        pytest.param(Network(delay_us=0, jitter_us=300_000), id="late and out of order"),
+        pytest.param(Network(duplicate=0.5), id="half of it twice", marks=pytest.mark.slow),
+        pytest.param(
+            Network(delay_us=0, jitter_us=300_000),
+            id="late and out of order",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_a_bad_radio_delays_the_answer_and_does_not_change_it(

@@ -1,8 +1,8 @@
 """tools/test: lint, types, and the suite on every interpreter that is found.
 
 On the interpreter of .venv everything runs; on the others all but the tests marked slow: real
-processes, real time, long computations, which do not depend on the interpreter. Exit code 0 only when
-everything passed.
+processes, real time, long computations, none of which depends on the interpreter. Exit code 0
+only when everything passed.
 """
 
 from __future__ import annotations
