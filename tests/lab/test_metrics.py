@@ -145,10 +145,10 @@ def test_dead_reckoning_starts_at_the_true_pose_and_is_not_aligned() -> None:
 def test_an_estimate_is_scored_where_it_is_and_angles_take_the_short_way() -> None:
     """It covers the second half only, at other stamps, and its heading crosses 180 degrees."""
     t = 0.1 * np.arange(41)
-    truth = np.column_stack([t, np.zeros(41), 3.0 + 0.1 * t])
+    truth = np.column_stack([t, np.zeros(41), 2.9 + 0.1 * t])
     recording = Recording("made up", {0: Trail(0, t, truth, truth)}, np.zeros((0, 4)))
-    when = np.arange(1.95, 4.0, 0.05)
-    heading = (3.0 + 0.1 * when + np.pi) % (2 * np.pi) - np.pi
+    when = np.arange(1.95, 4.0, 0.07)
+    heading = (2.9 + 0.1 * when + np.pi) % (2 * np.pi) - np.pi
     poses = np.column_stack([when, np.zeros(len(when)), heading])
     scores = score(recording, Outcome(final={0: Path(when, poses, np.zeros(len(when)))}))
     assert scores["team"]["ate_rmse_m"] == pytest.approx(0, abs=1e-9)
