@@ -26,6 +26,8 @@ from drslamd.slam.team_frame import Group
 
 YAW_PRIOR_FLOOR = 1e-4
 """rad/m; a prior of zero width would make the system singular."""
+BIAS_TAILS = 3.0
+"""Half widths of Cauchy's distribution within which four of five biases lie."""
 HINT = 10.0**2
 """Variance, m^2 and rad^2, that closures get here. What they say is said better by the ranges that
 they came from; but where those are missing nothing else holds the group together."""
@@ -69,14 +71,14 @@ def stated(
     """Number the group's poses by time and collect its edges.
 
     Args:
-        bias_sigma: prior of the range bias of a pair, m.
+        bias_sigma: how far off a pair's ranges may be, m.
     """
     numbers = graph_edges.numbering(graph, group.members, group.shift_us)
     robots = sorted({s.robot for s in group.members})
     ranges, pairs = graph_edges.ranges(graph, numbers)
     chains = [graph.chains[robot] for robot in robots]
     priors = Priors(
-        np.full(len(pairs), bias_sigma),
+        np.full(len(pairs), bias_sigma / BIAS_TAILS),
         np.array([items.noise.scale for items in chains]),
         np.array([max(items.noise.yaw_rad_per_m, YAW_PRIOR_FLOOR) for items in chains]),
     )

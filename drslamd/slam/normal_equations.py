@@ -131,6 +131,15 @@ class System:
         self.gradient[unknowns] += stiffness * error
         self.cost += float(np.sum(stiffness * error**2))
 
+    def hold_loosely(self, unknowns: Index, error: Array, sigma: Array) -> None:
+        """Add independent priors with the tails of Cauchy's: log(1 + (e / sigma)^2) by its weight.
+
+        Where little is measured the unknown stays near zero; where much is, the prior gives way.
+        """
+        scaled = (error / sigma) ** 2
+        self.hold(unknowns, error, 1 / (sigma**2 * (1 + scaled)))
+        self.cost += float(np.sum(np.log1p(scaled) - scaled / (1 + scaled)))
+
 
 class _Scatter:
     """Where the blocks of one set of edges go in the system; the same in every iteration."""
@@ -193,7 +202,7 @@ class Equations:
         self._add_closures(system, poses)
         self._add_ranges(system, poses, calibration.bias)
         layout, priors = self.layout, self._problem.priors
-        system.hold(layout.bias, calibration.bias, priors.bias**-2.0)
+        system.hold_loosely(layout.bias, calibration.bias, priors.bias)
         system.hold(layout.scale, calibration.scale, priors.scale**-2.0)
         system.hold(layout.yaw, calibration.yaw, priors.yaw**-2.0)
         gauge = self._problem.gauge

@@ -116,8 +116,8 @@ def residual_vector(problem: Problem, x: Array, robust: bool = True) -> Array:
     """Whose sum of squares is the cost, one residual after the other.
 
     Args:
-        robust: ranges by the root of Cauchy's cost; otherwise by the error times the root of
-            Cauchy's weight there, with which Gauss and Newton work.
+        robust: ranges and biases by the root of Cauchy's cost; otherwise by the error itself,
+            which Gauss and Newton weigh by `range_weights`.
     """
     poses, bias, scale, yaw = unpacked(problem, x)
     out: list[float] = []
@@ -135,16 +135,18 @@ def residual_vector(problem: Problem, x: Array, robust: bool = True) -> Array:
     for m in range(len(r)):
         i, j = (product(poses[k], (*q, 0)) for k, q in ((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m])))
         e = (math.hypot(*(j - i)[:2]) + bias[r.pair[m]] - r.measured[m]) / r.sigma[m]
-        c = ROBUST_SIGMAS
-        if robust:
-            out.append(math.copysign(c * math.sqrt(math.log1p((e / c) ** 2)), e))
-        else:
-            out.append(e)
-    for values, sigmas in ((bias, problem.priors.bias), (scale, problem.priors.scale),
-                           (yaw, problem.priors.yaw)):  # fmt: skip
+        out.append(cauchy_root(e, ROBUST_SIGMAS) if robust else e)
+    for e in bias / problem.priors.bias:
+        out.append(cauchy_root(e, 1.0) if robust else e)
+    for values, sigmas in ((scale, problem.priors.scale), (yaw, problem.priors.yaw)):
         out += (values / sigmas).tolist()
     out += ((poses[problem.gauge] - problem.initial[problem.gauge]) / GAUGE_SIGMA).tolist()
     return np.array(out)
+
+
+def cauchy_root(e: float, c: float) -> float:
+    """Whose square is c^2 log(1 + (e / c)^2)."""
+    return math.copysign(c * math.sqrt(math.log1p((e / c) ** 2)), e)
 
 
 def whitened(
@@ -157,12 +159,14 @@ def whitened(
 
 
 def range_weights(problem: Problem, x: Array) -> Array:
-    """Cauchy's weight of every residual of `residual_vector`; 1 where it is no range."""
+    """Cauchy's weight of every residual of `residual_vector`; 1 where it is no range or bias."""
     plain = residual_vector(problem, x, robust=False)
     first = 3 * (len(problem.links) + len(problem.closures))
     weights = np.ones(len(plain))
     part = slice(first, first + len(problem.ranges))
     weights[part] = 1 / (1 + (plain[part] / ROBUST_SIGMAS) ** 2)
+    biases = slice(part.stop, part.stop + len(problem.priors.bias))
+    weights[biases] = 1 / (1 + plain[biases] ** 2)
     return weights
 
 

@@ -86,7 +86,7 @@ def test_priors_are_those_of_the_robots_and_of_the_configuration() -> None:
     still = replace(NOISE, yaw_rad_per_m=1e-6, scale=0.07)
     team.graph.chains[1].noise = still
     problem = stated(team.graph, group_of(team.graph), None, 0.25).problem
-    assert problem.priors.bias.tolist() == [0.25] * 3
+    assert problem.priors.bias == pytest.approx(0.25 / 3)
     assert problem.priors.scale == pytest.approx([0.03, 0.07, 0.03])
     assert problem.priors.yaw == pytest.approx(
         [NOISE.yaw_rad_per_m, YAW_PRIOR_FLOOR, NOISE.yaw_rad_per_m]
