@@ -1,0 +1,123 @@
+"""Module 1 beside a vectorised grid with scipy's least squares."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import cycle
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from drslamd.slam import coarse_search, relative_pose
+from drslamd.slam.window import Window
+from lab.benchmark import timing, windows
+from lab.benchmark.rows import Peer, Row
+from lab.recording import Array
+
+DELTA = 0.1
+TAUS = (50, 100, 200)
+PAPER_MS = {50: 13.0, 100: 19.0, 200: 29.0}
+CERES_MS = {50: 0.72, 100: 1.19, 200: 2.55}
+GRID = "grid + least_squares"
+POOL = 20
+"""Windows that every program goes through in turns."""
+STARTS = 17
+"""Of the search that stands for the truth."""
+SAME_COST = 1.001
+
+
+def rows(quick: bool) -> Iterator[Row]:
+    """All figures of module 1."""
+    one: dict[int, float] = {}
+    for tau in TAUS:
+        rng = np.random.default_rng(tau)
+        pool = [windows.window(rng, tau)[0] for _ in range(POOL)]
+        programs = {"one": over(pool, one_seed), "full": over(pool, full), GRID: over(pool, grid)}
+        times = timing.in_turns(programs, 60 if quick else 400, 4 if quick else 30)
+        one[tau] = times["one"].median
+        quoted = (Peer("paper", PAPER_MS[tau], False), Peer("C++ Ceres", CERES_MS[tau], False))
+        peers = (Peer(GRID, times[GRID].median, True), *quoted)
+        yield Row(1, f"one seed, tau {tau}", one[tau], "ms", 0.5, times["one"].p99, peers)
+        found = times["full"]
+        yield Row(1, f"all seeds, covariance, verdict, tau {tau}", found.median, "ms", 1.0,
+                  found.p99, peers)  # fmt: skip
+    yield Row(1, "one seed, t(200) / t(50)", one[200] / one[50], "ratio", 1.3)
+    count = 60 if quick else 400
+    yield Row(1, "global minimum found, tau 100", global_share(count, False), "share", 0.995)
+    yield Row(1, "the same, nearly straight", global_share(count, True), "share", 0.95)
+
+
+def over(pool: list[Window], solve: Callable[[Window], object]) -> Callable[[], object]:
+    """A program that takes the next window at every call."""
+    turns = cycle(pool)
+    return lambda: solve(next(turns))
+
+
+def one_seed(window: Window) -> Array:
+    """The best point of the coarse search, refined: the paper's question."""
+    return _refined(window, 1)
+
+
+def full(window: Window) -> relative_pose.Estimate:
+    """What the daemon asks of every window."""
+    return relative_pose.solve(window, windows.NOISE, DELTA)
+
+
+def _refined(window: Window, seeds: int) -> Array:
+    a, b = window.a_points, window.b_points
+    rho = float(np.median(window.ranges[-3:]))
+    found = coarse_search.seeds(a, b, window.ranges, rho, DELTA, seeds)
+    return relative_pose.refine(a, b, window.ranges, found, windows.NOISE.ranges)
+
+
+def grid(window: Window) -> Array:
+    """The peer: every point of the grid by broadcasting, then MINPACK with its Jacobian."""
+    a, b, ranges = window.a_points, window.b_points, window.ranges
+    angles = np.arange(-np.pi, np.pi, DELTA)
+    phi, theta = (x[..., None] for x in np.meshgrid(angles, angles, indexing="ij"))
+    cos, sin = np.cos(theta), np.sin(theta)
+    x = ranges[-1] * np.cos(phi) + cos * b[:, 0] - sin * b[:, 1] - a[:, 0]
+    y = ranges[-1] * np.sin(phi) + sin * b[:, 0] + cos * b[:, 1] - a[:, 1]
+    cost = ((np.hypot(x, y) - ranges) ** 2).sum(axis=-1)
+    i, j = np.unravel_index(np.argmin(cost), cost.shape)
+    phi_0 = angles[i]
+    start = np.array([ranges[-1] * np.cos(phi_0), ranges[-1] * np.sin(phi_0), angles[j]])
+    return polished(window, start)[0]
+
+
+def polished(window: Window, start: Array) -> tuple[Array, float]:
+    """The nearest minimum of the sum of squared range errors, and that sum."""
+    a, b, ranges = window.a_points, window.b_points, window.ranges
+
+    def parts(pose: Array) -> tuple[Array, Array, Array]:
+        cos, sin = np.cos(pose[2]), np.sin(pose[2])
+        arm = np.stack([cos * b[:, 0] - sin * b[:, 1], sin * b[:, 0] + cos * b[:, 1]])
+        sight = pose[:2, None] + arm - a.T
+        return arm, sight, np.hypot(*sight)
+
+    def errors(pose: Array) -> Array:
+        return np.asarray(parts(pose)[2] - ranges)
+
+    def jacobian(pose: Array) -> Array:
+        arm, sight, length = parts(pose)
+        x, y = sight / length
+        return np.stack([x, y, y * arm[0] - x * arm[1]], axis=-1)
+
+    found = least_squares(errors, start, jacobian, method="lm")
+    return np.asarray(found.x), float(2 * found.cost)
+
+
+def global_share(count: int, straight: bool) -> float:
+    """Share of windows of 100 ranges whose best minimum is among those of our search."""
+    rng = np.random.default_rng(7 + straight)
+    hits = 0
+    for _ in range(count):
+        window, truth = windows.window(rng, 100, straight)
+        ours = [polished(window, pose)[1] for pose in _refined(window, relative_pose.SEEDS)]
+        phi = rng.uniform(-np.pi, np.pi, STARTS - 1)
+        theta = rng.uniform(-np.pi, np.pi, STARTS - 1)
+        place = window.ranges[-1] * np.stack([np.cos(phi), np.sin(phi)])
+        starts = [truth, *np.column_stack([place.T, theta])]
+        best = min(polished(window, start)[1] for start in starts)
+        hits += min(ours) <= best * SAME_COST
+    return hits / count
