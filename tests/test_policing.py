@@ -9,10 +9,17 @@ from collections.abc import Iterator
 import policing
 import pytest
 
-IMPORTS = "import os, socket, subprocess, threading, time"
+IMPORTS = """
+import os, socket, subprocess, threading, time
+HELD = os.path.abspath("held")
+
+def hold():
+    while os.path.exists(HELD):
+        time.sleep(0.02)
+"""
 BAD = {
-    "threading.Thread(target=time.sleep, args=(0.5,)).start()": "left behind: thread",
-    "threading.Thread(target=time.sleep, args=(0.5,), name='worker', daemon=True).start()":
+    "threading.Thread(target=hold).start()": "left behind: thread",
+    "threading.Thread(target=hold, name='worker', daemon=True).start()":
         "left behind: thread 'worker'",
     "socket.socket().detach()": "of socket:",
     "os.open('/proc/self/stat', os.O_RDONLY)": "/stat",
@@ -76,7 +83,9 @@ def court(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Iterato
     monkeypatch.setattr(policing, "GRACE_S", 0.15)
     monkeypatch.setattr(policing, "TASK_GRACE_S", 0.15)
     open_before, children_before = set(policing.descriptors()), set(policing.children())
+    (pytester.path / "held").touch()
     yield pytester
+    (pytester.path / "held").unlink()
     for pid in set(policing.children()) - children_before:
         os.kill(pid, signal.SIGKILL)
         os.waitpid(pid, 0)
