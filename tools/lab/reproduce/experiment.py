@@ -21,8 +21,8 @@ from lab.outcome import dead_reckoning
 from lab.recording import Array, Recording
 
 WHEELS = world.OdometryModel(scale=0.13, yaw_deg_per_m=0.235)
-"""Random parts as measured. The systematic ones, which differ most from robot to robot (-7 ... +21 %
-and -0.6 ... +8 degrees per metre in recordings), carry the calibration: see `calibrated`."""
+"""Random parts as measured. The systematic ones, which differ most from robot to robot
+(-7 ... +21 % and -0.6 ... +8 deg/m in recordings), carry the calibration: see `calibrated`."""
 SCENE = world.Scene(seconds=353.0, speed=0.2, odometry_hz=10, odometry=WHEELS)
 PAIRS = ((0, 1), (0, 2), (1, 2))
 POSE_TIMES = np.arange(20.0, 353.0)
@@ -70,12 +70,18 @@ class Trial:
         return metrics.relative(self.truth[a], self.truth[b])
 
     def window(
-        self, pair: tuple[int, int], k: int, tau: int, farthest: float = np.inf
+        self,
+        pair: tuple[int, int],
+        k: int,
+        tau: int,
+        farthest: float = np.inf,
+        points: int | None = None,
     ) -> Window | None:
         """Equation 1 at pose time k: samples t - tau ... t, seen from both latest poses.
 
         Args:
-            farthest: longer ranges count as not measured, m; None when the latest one is.
+            farthest: longer ranges count as not measured, m; no window when the latest one is.
+            points: thin the samples out to so many, by medians as the daemon does.
         """
         data, (a, b) = self.pairs[pair], pair
         last = int(np.searchsorted(data.t, POSE_TIMES[k] + GRID_S / 2))
@@ -83,11 +89,16 @@ class Trial:
         rows = rows[data.ranges[rows] <= farthest]
         if not len(rows) or rows[-1] != last - 1:
             return None
+        t, ranges = data.t[rows], data.ranges[rows]
+        if points is not None and tau > points:
+            t, ranges, _ = binned(t, ranges, tau * GRID_S / points)
+        a_poses = metrics.at_times(data.t, data.a_odometry, t)
+        b_poses = metrics.at_times(data.t, data.b_odometry, t)
         return Window(
-            data.t[rows] - POSE_TIMES[k],
-            data.ranges[rows],
-            se2.between(self.odometry[a][k], data.a_odometry[rows]),
-            se2.between(self.odometry[b][k], data.b_odometry[rows]),
+            t - POSE_TIMES[k],
+            ranges,
+            se2.between(self.odometry[a][k], a_poses),
+            se2.between(self.odometry[b][k], b_poses),
             np.zeros(2),
             np.zeros(2),
         )

@@ -63,10 +63,10 @@ def nls(window: Window, seed: int) -> Array:
     a, b = window.a_points, window.b_points
 
     def error(pose: Array) -> Array:
-        return relative_pose.residuals(pose[None], a, b, window.ranges)[0][0]
+        return np.asarray(relative_pose.residuals(pose[None], a, b, window.ranges)[0][0])
 
     def slope(pose: Array) -> Array:
-        return relative_pose.residuals(pose[None], a, b, window.ranges)[2][0]
+        return np.asarray(relative_pose.residuals(pose[None], a, b, window.ranges)[2][0])
 
     return np.asarray(least_squares(error, guess, slope, method="lm").x)
 

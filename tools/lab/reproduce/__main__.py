@@ -1,0 +1,93 @@
+"""The command line of tools/reproduce.
+
+Exit codes: 0 done and everything reached, 1 done and something not reached, 2 wrong usage,
+130 broken off (what is done is kept).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from lab.progress import Progress
+from lab.reproduce import experiment, pages, pictures, plan, verdict
+from lab.reproduce.state import State
+
+EXAMPLES = """\
+examples:
+  tools/reproduce --quick                   one seed, under three minutes
+  tools/reproduce                           20 seeds, all tables; goes on where it stopped
+  tools/reproduce --seeds 40 --out /tmp/x   more of them, elsewhere
+  tools/reproduce --calibrate               the noise for which odometry is as wrong as the paper's
+
+The folder gets results.md, results.json (with the verdict) and pictures.
+"""
+BROKEN_OFF = 130
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run it; the exit code."""
+    options = _parser().parse_args(arguments)
+    if options.calibrate:
+        model = experiment.calibrated(range(options.seeds))
+        print(f"scale = {model.scale:.3f}, yaw_deg_per_m = {model.yaw_deg_per_m:.3f}")
+        return 0
+    out = options.out or Path("out/reproduce-quick" if options.quick else "out/reproduce")
+    pieces = plan.quick() if options.quick else plan.full(options.seeds)
+    state = State(out / "state.json")
+    if state.stale:
+        print(f"{out}/state.json was made by other code: starting anew", file=sys.stderr)
+    try:
+        work(pieces, state)
+    except KeyboardInterrupt:
+        print(f"\nbroken off; {len(state.done)} pieces are kept in {out}", file=sys.stderr)
+        return BROKEN_OFF
+    checks = write(pieces, state, out)
+    print((out / "verdict.md").read_text())
+    print(f"everything: {out}/results.md")
+    return 0 if all(check.ok for check in checks) else 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="tools/reproduce",
+        description="Make the paper's experiment anew; fill its tables, printed and ours.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--quick", action="store_true", help="one seed, fewer rows")
+    parser.add_argument("--seeds", type=int, default=plan.SEEDS, metavar="N", help="default 20")
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help="default out/reproduce[-quick]")
+    parser.add_argument("--calibrate", action="store_true", help="print the noise and end")
+    return parser
+
+
+def work(pieces: list[plan.Piece], state: State) -> None:
+    """Do what is not done yet."""
+    progress = Progress("reproducing", sum(piece.seconds for piece in pieces))
+    done = 0.0
+    for piece in pieces:
+        progress(done)
+        if piece.name not in state.done:
+            state.keep(piece.name, piece.run())
+        done += piece.seconds
+    progress(done)
+    progress.end()
+
+
+def write(pieces: list[plan.Piece], state: State, out: Path) -> list[verdict.Check]:
+    """Pages, figures and pictures of everything in the state."""
+    total = state.total([piece.name for piece in pieces])
+    checks = verdict.checks(total)
+    figures = {"verdict": [check.as_dict() for check in checks], "figures": total.as_dict()}
+    (out / "results.json").write_text(json.dumps(figures, indent=1) + "\n")
+    (out / "verdict.md").write_text(pages.verdict(checks))
+    drawn = pictures.draw(total, out)
+    (out / "results.md").write_text(pages.everything(total, checks, drawn))
+    return checks
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,102 @@
+"""The work, in pieces that can be done one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from lab import metrics, virtual_team
+from lab.reproduce import central, table2, team_column, window_columns
+from lab.reproduce.experiment import PAIRS, pose_errors, trial
+from lab.reproduce.tally import Tally
+
+SEEDS = 20
+WINDOW_SEEDS, SWEEP_SEEDS = 8, 2
+"""Windows by themselves are many in every seed."""
+RBCD = '[relative_pose]\nalgorithm = "paper"\n[optimizer]\nalgorithm = "rbcd"\n'
+SYSTEMS = {
+    "paper/1": RBCD + "rate_hz = 1\n",
+    "paper/10": RBCD + "rate_hz = 10\n",
+    "drslamd/1": "[optimizer]\nrate_hz = 1\n",
+    "drslamd/10": "[optimizer]\nrate_hz = 10\n",
+}
+"""Table IV: what the robots are told, by column and rate of DPGO in Hz."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Some work under a name; `seconds` are of one core, for the progress bar."""
+
+    name: str
+    seconds: float
+    run: Callable[[], Tally]
+
+
+def quick() -> list[Piece]:
+    """One seed, the rows that the text of the paper speaks of: under three minutes."""
+    return [
+        Piece("table2/0", 12, lambda: table2.fill(trial(0), (10, 50), (None, 0.1, 0.5))),
+        Piece("central/0", 1, partial(_central, 0)),
+        Piece("team/0", 35, partial(_team, 0)),
+        Piece("table1/0", 15, lambda: window_columns.table1(trial(0), 30)),
+        Piece("sweeps/0", 15, lambda: window_columns.sweeps(trial(0), 60)),
+    ]
+
+
+def full(seeds: int) -> list[Piece]:
+    """Everything; what the verdict needs comes first, seed by seed."""
+    pieces = []
+    for seed in range(seeds):
+        pieces += [
+            Piece(f"table2/{seed}", 30, partial(_table2, seed)),
+            Piece(f"central/{seed}", 1, partial(_central, seed)),
+            Piece(f"team/{seed}", 35, partial(_team, seed)),
+        ]
+    pieces += [
+        Piece(f"table1/{s}", 40, partial(_table1, s)) for s in range(min(WINDOW_SEEDS, seeds))
+    ]
+    pieces += [
+        Piece(f"sweeps/{s}", 60, partial(_sweeps, s)) for s in range(min(SWEEP_SEEDS, seeds))
+    ]
+    pieces += [Piece(f"table4/{name}", 90, partial(_system, name)) for name in SYSTEMS]
+    return pieces
+
+
+def _table1(seed: int) -> Tally:
+    return window_columns.table1(trial(seed), 9)
+
+
+def _table2(seed: int) -> Tally:
+    return table2.fill(trial(seed), table2.TAUS, table2.EPSILONS)
+
+
+def _team(seed: int) -> Tally:
+    return team_column.run(trial(seed))
+
+
+def _sweeps(seed: int) -> Tally:
+    return window_columns.sweeps(trial(seed), 20)
+
+
+def _central(seed: int) -> Tally:
+    """Table III's rival."""
+    tally, data = Tally(), trial(seed)
+    poses = central.solve(data)
+    for a, b in PAIRS:
+        found = metrics.relative(poses[a], poses[b])
+        tally.poses("central", pose_errors(found, data.true_pairs(a, b)))
+    robots = sorted(poses)
+    ate = table2.joint_ate([poses[r] for r in robots], [data.truth[r] for r in robots])
+    tally.add("central/ate", ate)
+    return tally
+
+
+def _system(name: str) -> Tally:
+    """Table IV: time per module and bytes of three robots over the whole experiment."""
+    result = virtual_team.run(trial(0).recording, extra=SYSTEMS[name])
+    tally = Tally()
+    tally.add(f"table4/{name}/bytes", float(sum(result.bytes_sent.values())))
+    for module, ms in result.ms.items():
+        tally.add(f"table4/{name}/ms/{module}", ms)
+    return tally

@@ -1,0 +1,160 @@
+"""What was to be reached, and whether it was: one check per line of the promise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from typing import Any
+
+from lab.reproduce import printed
+from lab.reproduce.table2 import EPSILONS, TAUS
+from lab.reproduce.tally import Tally
+from lab.reproduce.window_columns import TAUS as WINDOW_TAUS
+
+HALF = 0.5
+BEST_M, BEST_DEG = 0.20, 2.0
+"""Wanted of this system where the paper has its best row."""
+BEST_ROW = (50, 0.5)
+LIKE_PRINTED = 1.5
+CALIBRATED = 0.15
+
+
+@dataclass(frozen=True)
+class Check:
+    """One promise: what was reached (None: nothing was measured), what was wanted."""
+
+    name: str
+    reached: float | None
+    wanted: str
+    ok: bool
+
+    def as_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def at_most(name: str, reached: float, limit: float) -> Check:
+    return Check(name, _number(reached), f"<= {limit:.3g}", reached <= limit)
+
+
+def at_least(name: str, reached: float, limit: float) -> Check:
+    return Check(name, _number(reached), f">= {limit:.3g}", reached >= limit)
+
+
+def within(name: str, reached: float, low: float, high: float) -> Check:
+    return Check(name, _number(reached), f"{low:.3g} ... {high:.3g}", low <= reached <= high)
+
+
+def _number(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def checks(total: Tally) -> list[Check]:
+    """All of them, for the rows that were computed."""
+    return [*_data(total), *_shape(total), *_beaten(total), *_honest(total)]
+
+
+def _data(total: Tally) -> list[Check]:
+    """Is odometry as wrong as the paper's?"""
+    return [
+        within(f"odometry alone, {unit}", total[f"odometry/{unit}"].mean,
+               wanted * (1 - CALIBRATED), wanted * (1 + CALIBRATED))
+        for unit, wanted in zip(("m", "deg"), printed.TABLE_3["odometry"], strict=True)
+    ]  # fmt: skip
+
+
+def _shape(total: Tally) -> list[Check]:
+    """Does the paper's column behave like the paper?"""
+    out = []
+    for tau in WINDOW_TAUS:
+        for unit in ("m", "deg"):
+            both = total[f"table1/{tau}/both/{unit}"].mean
+            for part in ("nls", "coarse"):
+                alone = total[f"table1/{tau}/{part}/{unit}"].mean
+                out.append(at_most(
+                    f"paper, tau {tau}: coarse + NLS against {part} alone, {unit}",
+                    both, alone,
+                ))  # fmt: skip
+    for one, more in pairwise(WINDOW_TAUS):
+        for unit in ("m", "deg"):
+            short, long = (total[f"table1/{tau}/both/{unit}"].mean for tau in (one, more))
+            out.append(at_most(f"paper, tau {more} against {one}, {unit}", long, short))
+    for tau, epsilon in _computed(total):
+        name = f"table2/{tau}/{epsilon}"
+        for unit in ("m", "deg"):
+            before, after = (total[f"{name}/{when}/{unit}"].mean for when in ("before", "after"))
+            if epsilon is not None:
+                out.append(at_most(
+                    f"paper, tau {tau}, epsilon {epsilon}: PCM lowers the error, {unit}",
+                    before, total[f"table2/{tau}/None/before/{unit}"].mean,
+                ))  # fmt: skip
+            out.append(
+                at_most(
+                    f"paper, tau {tau}, epsilon {epsilon}: DPGO lowers it again, {unit}",
+                    after,
+                    before,
+                )
+            )
+    for unit, wanted in zip(("m", "deg"), printed.TABLE_2[BEST_ROW][3:], strict=True):
+        out.append(within(
+            f"paper, DPGO at tau 50, epsilon 0.5, {unit}",
+            total[f"table2/{BEST_ROW[0]}/{BEST_ROW[1]}/after/{unit}"].mean,
+            wanted / LIKE_PRINTED, wanted * LIKE_PRINTED,
+        ))  # fmt: skip
+    return out
+
+
+def _computed(total: Tally) -> list[tuple[int, float | None]]:
+    return [
+        (tau, epsilon)
+        for tau in TAUS
+        for epsilon in EPSILONS
+        if f"table2/{tau}/{epsilon}/after/m" in total
+    ]
+
+
+def _beaten(total: Tally) -> list[Check]:
+    """Is this system at most half as wrong, at every row?"""
+    out = [at_least("drslamd, share of poses localised in one frame",
+                    total["drslamd/localised"].mean, 1.0)]  # fmt: skip
+    for tau, epsilon in _computed(total):
+        for unit in ("m", "deg"):
+            paper = total[f"table2/{tau}/{epsilon}/after/{unit}"].mean
+            out.append(at_most(
+                f"drslamd against half of the paper's row tau {tau}, epsilon {epsilon}, {unit}",
+                total[f"drslamd/after/{unit}"].mean, HALF * paper,
+            ))  # fmt: skip
+    for unit, limit in (("m", BEST_M), ("deg", BEST_DEG)):
+        out.append(at_most(f"drslamd, final, {unit}", total[f"drslamd/after/{unit}"].mean, limit))
+    return out
+
+
+def _honest(total: Tally) -> list[Check]:
+    """Are claimed covariances true?"""
+    short = f"table1/{WINDOW_TAUS[0]}/drslamd"
+    out = []
+    answers = total[f"{short}/claim/below"]
+    if answers.n:
+        out += [
+            at_least("closures at tau 10 not marked ambiguous: squared Mahalanobis <= 14.2",
+                     answers.mean, 0.98),
+            at_most("closures at tau 10 not marked ambiguous: squared Mahalanobis > 50",
+                    total[f"{short}/claim/wild"].mean, 0.0),
+        ]  # fmt: skip
+    else:
+        asked = total[f"{short}/unique"].n
+        name = f"closures at tau 10 not marked ambiguous: none among {asked} windows"
+        out.append(Check(name, None, "98 % of them honest", asked > 0))
+    claim = "drslamd/claim"
+    return [
+        *out,
+        at_least("closures of the daemon's windows: squared Mahalanobis <= 14.2",
+                 total[f"{claim}/below"].mean, 0.98),
+        at_most("closures of the daemon's windows: squared Mahalanobis > 50",
+                total[f"{claim}/wild"].mean, 0.0),
+        within("closures: NEES per degree of freedom", total[f"{claim}/nees"].mean, 0.8, 1.25),
+        within("published poses: NEES per degree of freedom",
+               total["drslamd/published/nees"].mean, 0.8, 1.25),
+        within("published poses: share inside the 95 % ellipse",
+               total["drslamd/published/inside"].mean, 0.90, 0.99),
+    ]  # fmt: skip
