@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 Words = NDArray[np.uint64]
 WORD = 64
-GONE = np.iinfo(np.int64).max
-"""More neighbours than anybody has."""
+GONE = 1 << 40
+"""More neighbours than anybody has, also after all of them went."""
 _ONES_OF_BYTE = np.array([value.bit_count() for value in range(256)], dtype=np.int64)
 
 
@@ -79,21 +79,23 @@ class IncrementalClique:
         if left < least:
             return 0
         words = self._words(allowed)
-        alive = _flags(words).astype(bool)
-        vertices = np.flatnonzero(alive)
-        degree = np.full(len(alive), GONE)
+        vertices = np.flatnonzero(_flags(words))
+        degree = np.full(WORD * len(words), GONE)
         degree[vertices] = _ones(self._rows[vertices] & words)
         while left >= least:
             fewest = int(np.argmin(degree))
             if degree[fewest] == left - 1:
-                return int.from_bytes(np.packbits(degree < GONE, bitorder="little"), "little")
-            gone = degree < least - 1
-            gone[fewest] = True
-            removed = np.flatnonzero(gone)
-            left -= len(removed)
-            degree -= _flags(self._rows[removed]).sum(axis=0, dtype=np.int64)
-            alive[removed] = False
-            degree[~alive] = GONE
+                found = np.packbits(degree < left, bitorder="little")
+                return int.from_bytes(found.tobytes(), "little")
+            if degree[fewest] < least - 1:
+                hopeless = np.flatnonzero(degree < least - 1)
+                left -= len(hopeless)
+                degree -= _flags(self._rows[hopeless]).sum(axis=0, dtype=np.int64)
+                degree[hopeless] = GONE
+            else:
+                left -= 1
+                degree -= _flags(self._rows[fewest])
+                degree[fewest] = GONE
         return 0
 
     def runner_up(self, least: int = 1) -> int:

@@ -10,7 +10,6 @@ from typing import Union
 
 import numpy as np
 
-from drslamd.slam import se2
 from drslamd.slam.odometry import OdometryNoise
 from drslamd.slam.se2 import Array
 
@@ -26,14 +25,16 @@ def columns(table: Array, at: Places) -> Array:
 def twists(later: Array, earlier: Array) -> tuple[Array, Array, Array]:
     """The twist of ``later earlier^-1`` for poses (3, m)."""
     turn = later[2] - earlier[2]
-    cos, sin = np.cos(turn), np.sin(turn)
+    turn = turn - 2 * np.pi * np.rint(turn / (2 * np.pi))
+    half = turn / 2
+    # never zero, which would leave half / tan(half) undefined; this near to it, it is 1
+    half = np.where(np.abs(half) < 1e-9, 1e-9, half)
+    s, c = np.sin(half), np.cos(half)
+    cos, sin = 1 - 2 * s * s, 2 * s * c
     x = later[0] - cos * earlier[0] + sin * earlier[1]
     y = later[1] - sin * earlier[0] - cos * earlier[1]
-    half = se2.wrap(turn) / 2
-    # half / tan(half), by its limit near zero
-    small = np.abs(half) < 1e-6
-    a = np.where(small, 1.0, half / np.tan(np.where(small, 1.0, half)))
-    return a * x + half * y, a * y - half * x, 2 * half
+    a = half * c / s
+    return a * x + half * y, a * y - half * x, turn
 
 
 def odometry_covariance(noise: OdometryNoise, way: Array, sums: Array) -> Array:
@@ -49,14 +50,14 @@ def odometry_covariance(noise: OdometryNoise, way: Array, sums: Array) -> Array:
     # constant scale and yaw rate: squares of what they do over the whole way
     wx, wy = noise.scale * way
     by, bx, bs = (noise.yaw_rad_per_m * part for part in (y, x_neg, s))
-    return np.stack([
-        turn * yy + drawn + wx * wx + by * by,
-        turn * xy_neg + wx * wy + by * bx,
-        turn * y + by * bs,
-        turn * xx + drawn + wy * wy + bx * bx,
-        turn * x_neg + bx * bs,
-        turn * s + bs * bs,
-    ])  # fmt: skip
+    out = np.empty(sums.shape)
+    out[0] = turn * yy + drawn + wx * wx + by * by
+    out[1] = turn * xy_neg + wx * wy + by * bx
+    out[2] = turn * y + by * bs
+    out[3] = turn * xx + drawn + wy * wy + bx * bx
+    out[4] = turn * x_neg + bx * bs
+    out[5] = turn * s + bs * bs
+    return out
 
 
 def carried(pose: Array, covariance: Array) -> Array:
@@ -70,14 +71,14 @@ def carried(pose: Array, covariance: Array) -> Array:
     cross = 2 * cs * xy
     # ... and moved by the lever (wx, wy) of the angle
     hx, hy = tt * wx, tt * wy
-    return np.stack([
-        cc * xx - cross + ss * yy + (2 * rx + hx) * wx,
-        cs * (xx - yy) + (cc - ss) * xy + rx * wy + ry * wx + hx * wy,
-        rx + hx,
-        ss * xx + cross + cc * yy + (2 * ry + hy) * wy,
-        ry + hy,
-        tt,
-    ])  # fmt: skip
+    out = np.empty(covariance.shape)
+    out[0] = cc * xx - cross + ss * yy + (2 * rx + hx) * wx
+    out[1] = cs * (xx - yy) + (cc - ss) * xy + rx * wy + ry * wx + hx * wy
+    out[2] = rx + hx
+    out[3] = ss * xx + cross + cc * yy + (2 * ry + hy) * wy
+    out[4] = ry + hy
+    out[5] = tt
+    return out
 
 
 def squared_length(twist: tuple[Array, Array, Array], covariance: Array) -> Array:
