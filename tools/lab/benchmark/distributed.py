@@ -30,9 +30,9 @@ KEY = bytes(32)
 EDGES_PER_ENTRY = 27
 """As many as one datagram takes."""
 OWN_AGAIN, OTHERS_AGAIN = 7, 3
-"""How often a robot says an entry in every round after the first: its own, and those of others that
-it holds. At 30 % loss an entry then fails to reach a third robot by the end of the second round
-with a probability of 0.3^8 (1 - 0.7 (1 - 0.3^3)), so that one team of three in 400 needs another."""
+"""How often a robot says an entry in every round after the first: its own, and those of others
+that it holds. At 30 % loss an entry then fails to reach a third robot by the end of the second
+round with a probability of 0.3^8 (1 - 0.7 (1 - 0.3^3)): one team of three in 400 needs another."""
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,7 @@ class Graph:
 
     @cached_property
     def place(self) -> Array:
-        """(k,) of each pose in the order of time, robots one after the other where there is none."""
+        """(k,) of each pose in the order of time, or of the file where times are not the same."""
         order = np.lexsort((self.robot, self.n)) if self.known.same_time else np.arange(self.count)
         place = np.empty(self.count, dtype=np.int64)
         place[order] = np.arange(self.count)

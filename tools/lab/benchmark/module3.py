@@ -147,9 +147,15 @@ def block_descent(graph: Graph, rounds: int) -> Iterator[Row]:
     robot = graph.robot[np.argsort(graph.place)]
     began = timing.now_ms()
     for _ in range(rounds):
-        lifted = np.concatenate(
-            [lifted[None], *(_descended(graph, lifted, robot, k)[None] for k in np.unique(robot))]
-        ).sum(axis=0) - len(np.unique(robot)) * lifted
+        lifted = (
+            np.concatenate(
+                [
+                    lifted[None],
+                    *(_descended(graph, lifted, robot, k)[None] for k in np.unique(robot)),
+                ]
+            ).sum(axis=0)
+            - len(np.unique(robot)) * lifted
+        )
     taken = timing.now_ms() - began
     gap = graph.gap(judge.cost(rbcd.rounded(lifted, lifted[0])))
     name = f"{graph.name}, plain block descent (rbcd)"
@@ -178,4 +184,4 @@ def _descended(graph: Graph, lifted: Array, robot: Array, number: int) -> Array:
     )  # fmt: skip
     out = lifted.copy()
     out[mine] = rbcd.rows(rbcd.descend(block, rbcd.stacked(lifted[mine])))
-    return out
+    return np.asarray(out)

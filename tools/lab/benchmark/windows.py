@@ -31,7 +31,7 @@ def window(rng: np.random.Generator, tau: int, straight: bool = False) -> tuple[
         a_T_b = np.array([distance * np.cos(phi), distance * np.sin(phi), theta])
         b_in_a = se2.transform(a_T_b, paths[1][:, :2])
         ranges = np.hypot(*(b_in_a - paths[0][:, :2]).T)
-        if NEAREST_M <= ranges.min() and ranges.max() <= FARTHEST_M:
+        if ranges.min() >= NEAREST_M and ranges.max() <= FARTHEST_M:
             break
     noisy = ranges + rng.normal(0, SIGMA_M, tau)
     t = (np.arange(tau) - tau + 1) / HZ

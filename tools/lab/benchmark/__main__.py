@@ -1,0 +1,100 @@
+"""tools/benchmark: every module beside its peers, on one core.
+
+Exit codes: 0 done, 1 with --check: something became worse, 2 wrong usage, 66 no pose graphs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy
+
+from lab.benchmark import graphs, module1, module2, module3, pipeline, rows, timing
+from lab.benchmark.rows import Row
+from lab.progress import Progress
+from lab.recording import BadRecording
+
+WORSE, NO_INPUT = 1, 66
+PARTS = {"1": module1, "2": module2, "3": module3, "all": pipeline}
+EXAMPLES = """\
+examples:
+  tools/benchmark                              all of it, some minutes
+  tools/benchmark --quick --json now.json      under two minutes, fewer repetitions
+  tools/benchmark --quick --check before.json  and say what became worse
+  tools/benchmark --module 3                   one module
+
+Times are CPU time on one core. Peers "in this run" take turns with drslamd on the same inputs;
+"elsewhere" are figures of another machine, from papers or measured once. Only ratios compare.
+"""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run it; the exit code."""
+    options = _parser().parse_args(arguments)
+    try:
+        stored = (
+            rows.from_json(json.loads(options.check.read_text())["rows"]) if options.check else []
+        )
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        print(f"{options.check}: no results of tools/benchmark: {error}", file=sys.stderr)
+        return NO_INPUT
+    timing.pin()
+    try:
+        found = _run(options.module or list(PARTS), options.quick)
+    except (OSError, BadRecording) as error:
+        print(f"{error}; DRSLAMD_POSEGRAPHS names the folder", file=sys.stderr)
+        return NO_INPUT
+    print(f"{_machine()}\n\n{rows.markdown(found)}")
+    if options.json:
+        written = {"machine": _machine(), "quick": options.quick, "rows": rows.to_json(found)}
+        options.json.write_text(json.dumps(written, indent=1) + "\n")
+    worse = rows.regressions(found, stored)
+    for sentence in worse:
+        print(f"worse: {sentence}", file=sys.stderr)
+    return WORSE if worse else 0
+
+
+def _stored(path: Path) -> list[Row]:
+    return rows.from_json(json.loads(path.read_text())["rows"])
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="tools/benchmark",
+        description="Time each module of drslamd beside its peers.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--quick", action="store_true", help="fewer repetitions and graphs")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
+    parser.add_argument("--check", type=Path, metavar="FILE", help="compare with an earlier --json")
+    parser.add_argument("--module", action="append", choices=list(PARTS), help="only this one")
+    return parser
+
+
+def _run(parts: list[str], quick: bool) -> list[Row]:
+    progress, found = Progress("benchmark", len(parts), "parts"), []
+    for done, part in enumerate(parts):
+        progress(done)
+        found += list(PARTS[part].rows(quick))
+    progress(len(parts))
+    progress.end()
+    return found
+
+
+def _machine() -> str:
+    versions: dict[str, Any] = {
+        "Python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__
+    }  # fmt: skip
+    named = ", ".join(f"{name} {version}" for name, version in versions.items())
+    return f"{platform.machine()}, one core, CPU time; {named}; graphs of {graphs.FOLDER.name}/"
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
