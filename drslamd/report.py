@@ -146,8 +146,8 @@ def _graph(robot: Robot) -> dict[str, Any]:
             "frame": estimate.frame.robot,
             "iterations": estimate.iterations,
             "converged": estimate.converged,
-            "range_bias_m": {f"{a}-{b}": round(v, 4) for (a, b), v in estimate.bias_m.items()},
-            "wheel_scale": {str(k): round(v, 5) for k, v in estimate.scale.items()},
+            "range_bias_m": {f"{a}-{b}": round(v.value, 4) for (a, b), v in estimate.bias_m.items()},
+            "wheel_scale": {str(k): round(v.value, 5) for k, v in estimate.scale.items()},
         }
     return out
 
@@ -164,7 +164,7 @@ def trajectories(robot: Robot) -> dict[str, Any]:
     for number, solved in sorted(estimate.trajectories.items()):
         n, poses = solved.n, solved.poses
         if number == robot.own.robot:
-            n, poses = bent(robot.front.reckoning.track, solved)
+            n, poses = bent(robot.front.reckoning.track, robot.back.history.latest or solved)
         out[str(number)] = {
             "epoch": solved.chain.epoch,
             "utime": (n * GRID_US).astype(int).tolist(),

@@ -11,11 +11,13 @@ from drslamd.conventions import Chain, Segment
 from drslamd.slam import team_frame
 from drslamd.slam.banded_optimizer import Banded
 from drslamd.slam.estimate import TeamEstimate, Trajectory
+from drslamd.slam.history import History
 from drslamd.slam.items import GraphEntry, PublicPoses
 from drslamd.slam.optimizer import Job, Optimizer
 from drslamd.slam.pose_graph import TeamGraph
 from drslamd.slam.rbcd_optimizer import Rbcd
 from drslamd.slam.team_frame import Group
+from drslamd.slam.thinning import Thinning
 
 OPTIMIZERS: dict[str, Callable[[Config, Chain], Optimizer]] = {"banded": Banded, "rbcd": Rbcd}
 """By `optimizer.algorithm`."""
@@ -28,6 +30,9 @@ class BackEnd:
         self._own = own
         self._optimizer = OPTIMIZERS[config.optimizer.algorithm](config, own)
         self.graph = TeamGraph()
+        self._thinning = Thinning(self.graph)
+        self.history = History()
+        """Where we were."""
         self.group: set[Segment] = set()
         self.estimate: TeamEstimate | None = None
         """Of the group that our current segment is in; None while it is in none."""
@@ -37,6 +42,7 @@ class BackEnd:
 
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
         self.graph.insert(origin, entry)
+        self._thinning.after(origin.robot)
         self._inserted += 1
 
     def digest(self) -> int:
@@ -86,6 +92,9 @@ class BackEnd:
 
     def solved(self, result: TeamEstimate) -> None:
         self.estimate = result
+        own = result.trajectories.get(self._own.robot)
+        if own is not None:
+            self.history.update(own)
 
     def public_poses(self) -> PublicPoses | None:
         """What neighbours must know of a relaxation: our poses that carry closures."""

@@ -142,16 +142,18 @@ def chain_links(items: ChainItems, calibrated: bool) -> PoseEdges:
 
 def closures(graph: TeamGraph, numbers: Numbering) -> PoseEdges:
     """All kept closures between numbered poses."""
-    rows: list[tuple[int, int, Sequence[float], Array]] = []
+    ends, upper = [np.zeros((2, 0), dtype=np.int64)], [np.zeros((0, 9))]
     for pair in graph.usable():
         kept = pair.kept()
-        a, b = _ends(graph, numbers, pair, np.array([(c.a_n, c.b_n) for c in kept]).reshape(-1, 2))
-        rows += [
-            (i, j, closure.a_T_b, se2.unpacked(closure.covariance))
-            for closure, i, j in zip(kept, a.tolist(), b.tolist(), strict=True)
-            if i >= 0 and j >= 0
-        ]
-    return pose_edges(rows)
+        places = np.array([(c.a_n, c.b_n) for c in kept]).reshape(-1, 2)
+        both = np.stack(_ends(graph, numbers, pair, places))
+        used = (both >= 0).all(axis=0)
+        ends.append(both[:, used])
+        upper.append(np.array([(*c.a_T_b, *c.covariance) for c in kept]).reshape(-1, 9)[used])
+    i, j = np.concatenate(ends, axis=1)
+    values = np.concatenate(upper)
+    full = values[:, 3 + np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])]
+    return PoseEdges(i, j, values[:, :3], full)
 
 
 def pose_edges(rows: Sequence[tuple[int, int, Sequence[float], Array]]) -> PoseEdges:

@@ -67,6 +67,10 @@ class Rows:
             self._merge()
         return self._sorted
 
+    def replace(self, rows: Array) -> None:
+        """Let these rows, in order, be all."""
+        self._sorted, self._new = rows, []
+
     def _merge(self) -> None:
         rows = np.concatenate([self._sorted, np.array(self._new)])
         self._new = []
@@ -96,6 +100,7 @@ class ChainItems:
         self._rows = self._table.data
         self._sums = np.empty((0, 6))
         self._source = self._rows
+        self._kept_n, self._kept_detours = np.zeros(0), np.zeros((0, 6))
 
     def add(self, k: Keyframe) -> None:
         metres, radians = TRANSLATION_STEP_M, ROTATION_STEP_RAD
@@ -125,7 +130,7 @@ class ChainItems:
         rows, known = table.copy(), self._rows
         # a segment never comes back, so each is one block of rows whatever its robot says
         rows[:, 1] = np.maximum.accumulate(rows[:, 1])
-        sums = growth(rows[:, 2:])
+        sums = growth(rows[:, 2:]) + self._detours(rows[:, 0])
         if len(known):
             # what came late in front of the known rows, or was dropped there, moves no sum
             at, there = _found(rows[:, 0], known[:, 0])
@@ -133,6 +138,23 @@ class ChainItems:
                 first = int(np.argmax(there))
                 sums += self._sums[first] - sums[at[first]]
         self._rows, self._sums, self._source = rows, sums, table
+
+    def keep(self, stays: NDArray[np.bool_]) -> None:
+        """Forget the rows (k,) that do not stay; the sums of the others do not change."""
+        rows = self.rows
+        self._rows, self._sums = rows[stays], self._sums[stays]
+        self._table.replace(self._rows)
+        self._source = self._table.data
+        # from now on straight links stand for the way that was gone
+        self._kept_n = self._rows[:, 0]
+        self._kept_detours = self._sums - growth(self._rows[:, 2:])
+
+    def _detours(self, n: Array) -> Array:
+        """(k, 6) what is missing of `growth` at keyframes n (k,) since rows were forgotten."""
+        if not len(self._kept_n):
+            return np.zeros((len(n), 6))
+        at = np.searchsorted(self._kept_n, n, side="right") - 1
+        return np.asarray(self._kept_detours[np.maximum(at, 0)])
 
     @property
     def sums(self) -> Array:
@@ -190,6 +212,15 @@ class PairItems:
     def ranges(self) -> Array:
         """(k, 8) a_n b_n qa_x qa_y qb_x qb_y range sigma, in the order of the owner's log."""
         return self._ranges.data[:, 1:]
+
+    @property
+    def keyed_ranges(self) -> Array:
+        """(k, 9) the same behind the key that orders them."""
+        return self._ranges.data
+
+    def replace_ranges(self, keyed: Array) -> None:
+        """Let these be all."""
+        self._ranges.replace(keyed)
 
     def kept(self) -> list[ClosureItem]:
         return [c for _, (_, c) in sorted(self.closures.items()) if c.kept]
