@@ -39,7 +39,7 @@ def quick() -> list[Piece]:
         Piece("table2/0", 12, lambda: table2.fill(trial(0), (10, 50), (None, 0.1, 0.5))),
         Piece("central/0", 1, partial(_central, 0)),
         Piece("team/0", 35, partial(_team, 0)),
-        Piece("table1/0", 15, lambda: window_columns.table1(trial(0), 30)),
+        Piece("table1/0", 15, lambda: window_columns.table1(trial(0), 30, 6)),
         Piece("sweeps/0", 15, lambda: window_columns.sweeps(trial(0), 60)),
     ]
 
