@@ -14,9 +14,9 @@ from lab.reproduce.window_columns import DELTAS, ODOMETRY_NOISE, RANGE_LIMITS, R
 
 INTRODUCTION = (
     "{seeds} seed(s). Errors are those of the pose of one robot in the frame of another, all "
-    "pairs, at each second: mean ± standard deviation. *printed*: what the paper prints; *paper*: its "
-    "algorithms as printed, on our data; *drslamd*: the daemons with their default configuration, "
-    "on the same data."
+    "pairs, at each second: mean ± standard deviation. *printed*: what the paper prints; "
+    "*paper*: its algorithms as printed, on our data; *drslamd*: the daemons with their default "
+    "configuration, on the same data."
 )
 WAYS = {"nls": "NLS alone", "coarse": "coarse search alone", "both": "coarse search + NLS"}
 
