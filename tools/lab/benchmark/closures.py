@@ -18,17 +18,19 @@ SIGMAS = np.array([0.15, 0.15, 0.05])
 REACH_M = 15.0
 
 
-def candidates(count: int, good: float, seed: int) -> Iterator[Candidate]:
+def candidates(count: int, good: float, seed: int, understated: float = 1.0) -> Iterator[Candidate]:
     """One closure a step while both robots wander; wrong ones are anywhere within reach.
 
     Args:
         good: share of closures that are right.
+        understated: by what the sigmas of the closures are larger than they say; then many good
+            ones disagree, and the largest clique is hard to find.
     """
     rng = np.random.default_rng(seed)
     truth = [_wander(rng, count) for _ in range(2)]
     odometry = [_drifted(rng, path) for path in truth]
     sums = [growth(path) for path in odometry]
-    covariance = np.diag(SIGMAS**2)
+    covariance = np.diag((SIGMAS / understated) ** 2)
     for k in range(count):
         a_T_b = se2.between(truth[0][k], truth[1][k]) + SIGMAS * rng.normal(size=3)
         if rng.random() >= good:

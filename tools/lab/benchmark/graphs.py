@@ -95,19 +95,6 @@ class Graph:
             np.exp(1j * theta), x + 1j * y, self.kappa, self.tau,
         )  # fmt: skip
 
-    @cached_property
-    def integrated(self) -> Array:
-        """(k, 3) by place: every robot's odometry, counted from the origin of its own frame."""
-        out = np.zeros((self.count, 3))
-        for a, b, (x, y, theta) in zip(
-            self.read.i.tolist(), self.read.j.tolist(), self.read.measured, strict=True
-        ):
-            if b == a + 1 and self.robot[a] == self.robot[b]:
-                at = out[self.place[a]]
-                cos, sin = np.cos(at[2]), np.sin(at[2])
-                out[self.place[b]] = at + [cos * x - sin * y, sin * x + cos * y, theta]
-        return out
-
 
 def load(name: str, robots: int | None = None) -> Graph:
     """Read one graph.
