@@ -52,7 +52,7 @@ def one_of_each_kind() -> list[Message]:
     return [
         Status(1, 3, True, 70_000, -5, -6, (Heard(4, 12, -700),), (4, 9),
                (LogState(3, 11, 0, 5, 6), LogState(4, 12, 2, 2, 2))),
-        OdometryBatch(38, 40, steps),
+        OdometryBatch(40, 40, steps),
         GraphEntry(
             2,
             (0.5, 0.25, 0.125, 0.0625, 0.5, -0.5),

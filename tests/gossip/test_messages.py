@@ -47,9 +47,9 @@ log_states = st.builds(
 statuses = st.builds(
     Status,
     st.integers(0, 1), robots, st.booleans(), st.integers(0, 2**32 - 1), i64, i64,
-    st.lists(st.builds(Heard, robots, i64, i64), max_size=31).map(tuple),
-    st.lists(robots, max_size=31).map(tuple),
-    st.lists(log_states, max_size=31).map(tuple),
+    st.lists(st.builds(Heard, robots, i64, i64, st.integers(-1, 2**31 - 1)), max_size=28).map(tuple),
+    st.lists(robots, max_size=28).map(tuple),
+    st.lists(log_states, max_size=28).map(tuple),
 )  # fmt: skip
 batches = st.builds(
     lambda start, later, first, steps: OdometryBatch(
