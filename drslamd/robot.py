@@ -216,7 +216,9 @@ class Robot:
         busy = [job.pair for job in self._jobs.values() if job.module == "relative_pose"]
         return [
             self._solve(_Job("relative_pose", pair, request), run)
-            for pair, request, run in self.front.module1(neighbours, self.back.graph, utime)
+            for pair, request, run in self.front.module1(
+                neighbours, self.back.graph, self.back.estimate, utime
+            )
             if pair not in busy
         ]
 

@@ -11,8 +11,9 @@ known the result is a `Motion` with ``gap``, which starts anew from the reading 
 
 start       the first reading;
 source      counts after speeds, or the other way round;
-jump        a counter moved faster than the base can and went on from there (a power cycle). One
-            odd reading between good ones is refused instead, and nothing is lost;
+jump        a counter moved faster than the base can, or the base turned faster than any does,
+            and went on from there (a power cycle, a tracker that lost itself). One odd reading
+            between good ones is refused instead, and nothing is lost;
 restart     after a silence a counter is near zero that was not: a power cycle;
 wrap        a silence in which a counter may have gone around unseen;
 silence     speeds: longer than `MAX_SILENCE_US`. Counters: longer than `MAX_BRIDGE_US` with more
@@ -46,6 +47,8 @@ MAX_SILENCE_US: Final = SECOND_US // 2
 MAX_BRIDGE_US: Final = 2 * SECOND_US
 BRIDGE_PATH_M: Final = 0.5
 """Less than this per wheel stays close to one arc, however long the silence was."""
+MAX_TURN_RADPS: Final = 2 * math.pi
+"""No base that carries a radio spins faster than once a second (most: half of that)."""
 STAMP_JITTER_US: Final = SECOND_US // 10
 """Stamps of arrival may bunch up by this much without a counter being suspected."""
 NEAR_ZERO_M: Final = 0.05
@@ -58,8 +61,8 @@ class ReadingRefusal(Enum):
     NOT_FINITE = "a value that is not a finite number"
     OUT_OF_ORDER = "older than the one before"
     SAME_STAMP = "same time as the one before, replaces it"
-    TOO_FAST = "a speed above max_speed_mps"
-    JUMP = "a counter moved faster than max_speed_mps"
+    TOO_FAST = "a speed above max_speed_mps, or a turn of more than one round a second"
+    JUMP = "a counter moved faster than max_speed_mps, or turned the base too fast"
 
 
 class Gap(Enum):
@@ -209,7 +212,12 @@ class WheelBase:
         return _Path(self._left_sign * left, self._right_sign * right)
 
     def _is_too_fast(self, path: _Path, elapsed_us: int) -> bool:
-        return path.longest_m > self._geometry.max_speed_mps * elapsed_us / SECOND_US
+        elapsed_s = elapsed_us / SECOND_US
+        turn = abs(path.right_m - path.left_m) / self._geometry.track_m
+        return (
+            path.longest_m > self._geometry.max_speed_mps * elapsed_s
+            or turn > MAX_TURN_RADPS * elapsed_s
+        )
 
     def _may_have_wrapped(self, bits: int | None, elapsed_us: int) -> bool:
         """Could the base have rolled half the range of its counter?"""

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from drslamd.slam import se2
-from drslamd.slam.normal_equations import Equations, System
+from drslamd.slam.normal_equations import Equations, Layout, System
 from drslamd.slam.problem import Calibration, Problem, Solution
 from drslamd.slam.se2 import Array
 
@@ -68,9 +68,12 @@ def solve(
         )
         poses, calibration, system, damping = trial, trial_calibration, new, damping / 10
     poses[:, 2] = se2.wrap(poses[:, 2])
-    blocks = _marginals(system, layout.poses[list(marginals)]) if marginals else ()
+    if not marginals:
+        return Solution(poses, calibration, system.cost, steps, converged)
+    blocks = _marginals(system, layout.poses[list(marginals)])
     covariances = dict(zip(marginals, blocks, strict=True))
-    return Solution(poses, calibration, system.cost, steps, converged, covariances)
+    spread = _spread(system, layout)
+    return Solution(poses, calibration, system.cost, steps, converged, covariances, spread)
 
 
 def _step(system: System, damping: float) -> Array | None:
@@ -106,3 +109,15 @@ def _marginals(system: System, wanted: Array) -> Array:
         return np.tile(UNKNOWN * np.eye(3), (len(wanted), 1, 1))
     blocks = inverse[wanted].reshape(len(wanted), 3, -1, 3)
     return np.stack([blocks[k, :, k] for k in range(len(wanted))])
+
+
+def _spread(system: System, layout: Layout) -> Calibration:
+    """Sigmas of the sensors' constants, all else being unknown too."""
+    sensors = np.concatenate([layout.bias, layout.scale, layout.yaw])
+    unit = np.zeros((len(system.gradient), len(sensors)))
+    unit[sensors, np.arange(len(sensors))] = 1
+    inverse = _solved(system.band, system.border, system.corner, unit)
+    variances = np.full(len(system.gradient), UNKNOWN)
+    if inverse is not None and np.isfinite(inverse[sensors]).all():
+        variances[sensors] = np.maximum(inverse[sensors, np.arange(len(sensors))], 0.0)
+    return layout.calibration(np.sqrt(variances))

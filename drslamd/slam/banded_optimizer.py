@@ -16,7 +16,7 @@ import numpy as np
 from drslamd.config import Config
 from drslamd.conventions import Chain
 from drslamd.slam import banded, graph_edges, team_frame
-from drslamd.slam.estimate import TeamEstimate, Trajectory
+from drslamd.slam.estimate import Learned, TeamEstimate, Trajectory
 from drslamd.slam.items import PublicPoses
 from drslamd.slam.optimizer import Job
 from drslamd.slam.pose_graph import TeamGraph
@@ -26,8 +26,8 @@ from drslamd.slam.team_frame import Group
 
 YAW_PRIOR_FLOOR = 1e-4
 """rad/m; a prior of zero width would make the system singular."""
-BIAS_TAILS = 3.0
-"""Half widths of Cauchy's distribution within which four of five biases lie."""
+CAUCHY_TAILS = 3.0
+"""Half widths of Cauchy's distribution within which four of five values lie."""
 HINT = 10.0**2
 """Variance, m^2 and rad^2, that closures get here. What they say is said better by the ranges that
 they came from; but where those are missing nothing else holds the group together."""
@@ -78,15 +78,15 @@ def stated(
     ranges, pairs = graph_edges.ranges(graph, numbers)
     chains = [graph.chains[robot] for robot in robots]
     priors = Priors(
-        np.full(len(pairs), bias_sigma / BIAS_TAILS),
-        np.array([items.noise.scale for items in chains]),
+        np.full(len(pairs), bias_sigma / CAUCHY_TAILS),
+        np.array([items.noise.scale for items in chains]) / CAUCHY_TAILS,
         np.array([max(items.noise.yaw_rad_per_m, YAW_PRIOR_FLOOR) for items in chains]),
     )
     start = Calibration.zero(priors)
     if previous:
         start = Calibration(
-            np.array([previous.bias_m.get(pair, 0.0) for pair in pairs]),
-            np.array([previous.scale.get(robot, 0.0) for robot in robots]),
+            np.array([previous.bias_m.get(pair, Learned()).value for pair in pairs]),
+            np.array([previous.scale.get(robot, Learned()).value for robot in robots]),
             np.array([previous.yaw_rad_per_m.get(robot, 0.0) for robot in robots]),
         )
     initial = np.zeros((len(numbers.n), 3))
@@ -114,7 +114,9 @@ def _solve(team: Stated, group: Group) -> TeamEstimate:
         mine[chain.robot] = at[np.argsort(problem.n[at], kind="stable")]
     last = {robot: int(at[-1]) for robot, at in mine.items()}
     solution = banded.solve(problem, team.start, tuple(last.values()))
-    robots, learned = [chain.robot for chain in team.chains], solution.calibration
+    robots = [chain.robot for chain in team.chains]
+    learned, spread, priors = solution.calibration, solution.spread, problem.priors
+    assert spread is not None
     return TeamEstimate(
         group.frame,
         {
@@ -124,10 +126,17 @@ def _solve(team: Stated, group: Group) -> TeamEstimate:
             for chain in team.chains
         },
         {robot: solution.covariances[at] for robot, at in last.items()},
-        dict(zip(team.pairs, learned.bias.tolist(), strict=True)),
-        dict(zip(robots, learned.scale.tolist(), strict=True)),
+        dict(zip(team.pairs, _measured(learned.bias, spread.bias, priors.bias), strict=True)),
+        dict(zip(robots, _measured(learned.scale, spread.scale, priors.scale), strict=True)),
         dict(zip(robots, learned.yaw.tolist(), strict=True)),
         solution.cost,
         solution.iterations,
         solution.converged,
     )
+
+
+def _measured(values: Array, sigmas: Array, prior: Array) -> list[Learned]:
+    """Values with the sigmas of what was measured of them, Cauchy's prior taken out."""
+    by_prior = 1 / (prior**2 * (1 + (values / prior) ** 2))
+    information = np.maximum(sigmas**-2.0 - by_prior, 1e-12)
+    return [Learned(*pair) for pair in zip(values.tolist(), information**-0.5, strict=True)]

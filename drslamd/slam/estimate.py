@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from drslamd.conventions import Chain, Segment
 from drslamd.slam.se2 import Array
@@ -33,6 +34,13 @@ class Lifted:
     carriers: Array
 
 
+class Learned(NamedTuple):
+    """A constant of a sensor, and the sigma of what was measured of it (infinite of nothing)."""
+
+    value: float = 0.0
+    sigma: float = float("inf")
+
+
 @dataclass(frozen=True)
 class TeamEstimate:
     """The last solution, in the frame of segment `frame`."""
@@ -41,8 +49,8 @@ class TeamEstimate:
     trajectories: dict[int, Trajectory]
     covariances: dict[int, Array] = field(default_factory=dict)
     """(3, 3) of each robot's last pose."""
-    bias_m: dict[tuple[int, int], float] = field(default_factory=dict)
-    scale: dict[int, float] = field(default_factory=dict)
+    bias_m: dict[tuple[int, int], Learned] = field(default_factory=dict)
+    scale: dict[int, Learned] = field(default_factory=dict)
     yaw_rad_per_m: dict[int, float] = field(default_factory=dict)
     cost: float = 0.0
     iterations: int = 0

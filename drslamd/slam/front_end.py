@@ -11,6 +11,7 @@ from drslamd.config import Config
 from drslamd.conventions import SECOND_US, Chain
 from drslamd.sensors.samples import Motion, RangeSample
 from drslamd.slam import relative_pose
+from drslamd.slam.estimate import TeamEstimate
 from drslamd.slam.items import ClosureItem, Keyframe, RangeItem
 from drslamd.slam.neighbour import Neighbour
 from drslamd.slam.odometry import STEPS, DeadReckoning, OdometryNoise
@@ -19,6 +20,7 @@ from drslamd.slam.pair_window import Request, Side, request
 from drslamd.slam.pose_graph import TeamGraph
 from drslamd.slam.range_buffer import RangeBuffer
 from drslamd.slam.relative_pose import Estimate
+from drslamd.slam.self_calibration import Sensors, calibrated
 from drslamd.slam.window_noise import RangeNoise
 
 KEYFRAME_M, KEYFRAME_RAD = 0.05, 0.05
@@ -128,19 +130,30 @@ class FrontEnd:
         return out
 
     def module1(
-        self, neighbours: list[Neighbour], graph: TeamGraph, utime: int
+        self,
+        neighbours: list[Neighbour],
+        graph: TeamGraph,
+        estimate: TeamEstimate | None,
+        utime: int,
     ) -> list[tuple[Pair, Request, Callable[[], Estimate]]]:
-        """The relative poses to be computed now: pair, window, computation."""
+        """The relative poses to be computed now: pair, window, computation.
+
+        Args:
+            estimate: the team's last solution, for what it learned of the sensors.
+        """
         out = []
         for pair, a, b in self._sides(neighbours, graph, utime):
             window = request(pair.ranges, a, b, self._config.relative_pose)
             if isinstance(window, str):
                 pair.count(window)
             else:
-                out.append((pair, window, self._computation(window, b.items.noise)))
+                sensors = Sensors.of(estimate, self._own.robot, pair.peer.robot)
+                out.append((pair, window, self._computation(window, b.items.noise, sensors)))
         return out
 
-    def _computation(self, what: Request, peer_noise: OdometryNoise) -> Callable[[], Estimate]:
+    def _computation(
+        self, what: Request, peer_noise: OdometryNoise, sensors: Sensors
+    ) -> Callable[[], Estimate]:
         section = self._config.relative_pose
         if section.algorithm == "paper":
             return partial(
@@ -148,7 +161,7 @@ class FrontEnd:
             )
         ranges = RangeNoise(section.range_sigma_m, section.range_bias_sigma_m)
         noise = relative_pose.Noise(ranges, self.noise, peer_noise)
-        return partial(relative_pose.solve, what.window, noise, section.delta)
+        return partial(relative_pose.solve, *calibrated(what.window, noise, sensors), section.delta)
 
     def module2(self, graph: TeamGraph) -> list[tuple[Pair, Callable[[], Checked]]]:
         """The consistency checks to be computed now: pair, computation."""

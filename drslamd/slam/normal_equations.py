@@ -203,7 +203,7 @@ class Equations:
         self._add_ranges(system, poses, calibration.bias)
         layout, priors = self.layout, self._problem.priors
         system.hold_loosely(layout.bias, calibration.bias, priors.bias)
-        system.hold(layout.scale, calibration.scale, priors.scale**-2.0)
+        system.hold_loosely(layout.scale, calibration.scale, priors.scale)
         system.hold(layout.yaw, calibration.yaw, priors.yaw**-2.0)
         gauge = self._problem.gauge
         moved = poses[gauge] - self._problem.initial[gauge]

@@ -87,7 +87,7 @@ class Priors:
     """(pairs,) metres, of Cauchy's distribution: most modules are calibrated to a decimetre, some
     by half a metre not at all, and few trajectories fix a bias well."""
     scale: Array
-    """(robots,) fraction."""
+    """(robots,) fraction, likewise."""
     yaw: Array
     """(robots,) rad/m."""
 
@@ -139,6 +139,8 @@ class Solution:
     converged: bool
     covariances: dict[int, Array] = field(default_factory=dict)
     """Marginals (3, 3) of x, y, theta in w, for the poses that were asked for."""
+    spread: Calibration | None = None
+    """Sigmas of the calibration, priors included, where marginals were asked for."""
 
 
 def pose_errors(poses: Array, edges: PoseEdges, measured: Array) -> Array:

@@ -23,6 +23,7 @@ from drslamd.sensors.wheel_base import (
     BRIDGE_PATH_M,
     MAX_BRIDGE_US,
     MAX_SILENCE_US,
+    MAX_TURN_RADPS,
     NEAR_ZERO_M,
     STAMP_JITTER_US,
     DriveGeometry,
@@ -148,6 +149,18 @@ def test_counters_that_go_on_from_elsewhere_are_a_gap_without_motion() -> None:
     assert base.add(counts(60, 6, 8)) == Motion(T0 + 60 * MS, 0.0, 0.0, gap=True)
     assert is_like(base.add(counts(80, 16, 18)), 80, 0.01, 0.0)
     assert base.gaps == {Gap.START: 1, Gap.JUMP: 1}
+
+
+@pytest.mark.parametrize(("share", "believed"), [(0.99, True), (1.01, False)])
+def test_a_turn_of_more_than_a_round_a_second_is_no_turn(share: float, believed: bool) -> None:
+    """Both wheels well below their speed; the stamps may be off by their jitter."""
+    elapsed_s = 0.1 + STAMP_JITTER_US / SECOND_US
+    path_mm = share * MAX_TURN_RADPS * elapsed_s * TRACK / 2 * 1000
+    base = WheelBase(replace(BASE, max_speed_mps=10.0))
+    base.add(counts(0, 1000, 1000))
+    motion = base.add(counts(100, round(1000 - path_mm), round(1000 + path_mm)))
+    assert (motion is not None) == believed
+    assert base.tally.refused[ReadingRefusal.JUMP] == (not believed)
 
 
 def test_one_odd_reading_between_good_ones_loses_nothing() -> None:

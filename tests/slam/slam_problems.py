@@ -116,8 +116,8 @@ def residual_vector(problem: Problem, x: Array, robust: bool = True) -> Array:
     """Whose sum of squares is the cost, one residual after the other.
 
     Args:
-        robust: ranges and biases by the root of Cauchy's cost; otherwise by the error itself,
-            which Gauss and Newton weigh by `range_weights`.
+        robust: ranges, biases and scales by the root of Cauchy's cost; otherwise by the error
+            itself, which Gauss and Newton weigh by `range_weights`.
     """
     poses, bias, scale, yaw = unpacked(problem, x)
     out: list[float] = []
@@ -136,10 +136,9 @@ def residual_vector(problem: Problem, x: Array, robust: bool = True) -> Array:
         i, j = (product(poses[k], (*q, 0)) for k, q in ((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m])))
         e = (math.hypot(*(j - i)[:2]) + bias[r.pair[m]] - r.measured[m]) / r.sigma[m]
         out.append(cauchy_root(e, ROBUST_SIGMAS) if robust else e)
-    for e in bias / problem.priors.bias:
+    for e in np.concatenate([bias / problem.priors.bias, scale / problem.priors.scale]):
         out.append(cauchy_root(e, 1.0) if robust else e)
-    for values, sigmas in ((scale, problem.priors.scale), (yaw, problem.priors.yaw)):
-        out += (values / sigmas).tolist()
+    out += (yaw / problem.priors.yaw).tolist()
     out += ((poses[problem.gauge] - problem.initial[problem.gauge]) / GAUGE_SIGMA).tolist()
     return np.array(out)
 
@@ -159,14 +158,15 @@ def whitened(
 
 
 def range_weights(problem: Problem, x: Array) -> Array:
-    """Cauchy's weight of every residual of `residual_vector`; 1 where it is no range or bias."""
+    """Cauchy's weight of every residual of `residual_vector`; 1 where there is none."""
     plain = residual_vector(problem, x, robust=False)
     first = 3 * (len(problem.links) + len(problem.closures))
     weights = np.ones(len(plain))
     part = slice(first, first + len(problem.ranges))
     weights[part] = 1 / (1 + (plain[part] / ROBUST_SIGMAS) ** 2)
-    biases = slice(part.stop, part.stop + len(problem.priors.bias))
-    weights[biases] = 1 / (1 + plain[biases] ** 2)
+    loose = len(problem.priors.bias) + len(problem.priors.scale)
+    sensors = slice(part.stop, part.stop + loose)
+    weights[sensors] = 1 / (1 + plain[sensors] ** 2)
     return weights
 
 

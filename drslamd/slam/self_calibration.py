@@ -1,0 +1,87 @@
+"""Self-calibration: what module 3 learned of the sensors serves module 1.
+
+A window alone hardly tells a range bias from distance, or a wheel's scale from speed; hours of
+driving do. Module 3 carries the bias of each pair and the scale of each robot's odometry as
+unknowns. Here a window is rid of what is known of them, and its noise says what is still unknown:
+
+    r' = r - bias        p' = (1 - scale) p        sigma'^-2 = sigma^-2 + (k sigma_measured)^-2
+
+k accounts for ranges that share their errors; nothing falls below what no constant can describe.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from drslamd.slam.estimate import Learned, TeamEstimate
+from drslamd.slam.odometry import OdometryNoise
+from drslamd.slam.relative_pose import Noise
+from drslamd.slam.se2 import Array
+from drslamd.slam.window import Window
+from drslamd.slam.window_noise import RangeNoise
+
+SHARED = 2.0
+"""k: ranges of one second and the next have a correlation of 0.3 to 0.7, so four of them say about
+as much as one would alone."""
+LEAST_BIAS_M = 0.05
+"""Biases move by so much with distance and bearing."""
+LEAST_SCALE = 0.01
+"""Floors and loads change wheels by so much."""
+
+
+class Sensors(NamedTuple):
+    """What is known of one pair's sensors."""
+
+    bias: Learned = Learned()
+    scale_a: Learned = Learned()
+    scale_b: Learned = Learned()
+
+    @staticmethod
+    def of(estimate: TeamEstimate | None, a: int, b: int) -> Sensors:
+        """Of robots a and b, as the team's last solution has them."""
+        if estimate is None:
+            return Sensors()
+        pair = (min(a, b), max(a, b))
+        return Sensors(
+            estimate.bias_m.get(pair, Learned()),
+            estimate.scale.get(a, Learned()),
+            estimate.scale.get(b, Learned()),
+        )
+
+
+def remaining(learned: Learned, before: float, least: float) -> float:
+    """Sigma of what is left of a constant when its learned value is taken out.
+
+    Args:
+        before: its sigma before anything was measured.
+        least: what no constant can describe.
+    """
+    spread = float(np.hypot(SHARED * learned.sigma, least))
+    return float((before**-2.0 + spread**-2.0) ** -0.5)
+
+
+def calibrated(window: Window, noise: Noise, sensors: Sensors) -> tuple[Window, Noise]:
+    """The window without its known errors, and the noise that is left."""
+    better = replace(
+        window,
+        ranges=window.ranges - sensors.bias.value,
+        a_poses=_scaled(window.a_poses, sensors.scale_a),
+        b_poses=_scaled(window.b_poses, sensors.scale_b),
+    )
+    bias = remaining(sensors.bias, noise.ranges.bias_sigma, LEAST_BIAS_M)
+    return better, Noise(
+        RangeNoise(noise.ranges.sigma, bias),
+        _narrowed(noise.a, sensors.scale_a),
+        _narrowed(noise.b, sensors.scale_b),
+    )
+
+
+def _scaled(poses: Array, scale: Learned) -> Array:
+    return np.asarray(poses * [1 - scale.value, 1 - scale.value, 1.0])
+
+
+def _narrowed(noise: OdometryNoise, scale: Learned) -> OdometryNoise:
+    return replace(noise, scale=remaining(scale, noise.scale, LEAST_SCALE))

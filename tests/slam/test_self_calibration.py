@@ -1,0 +1,82 @@
+"""Windows rid of what is known of the sensors."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from slam_scenes import NOISE, Array, same_pose, wander, window_of
+
+from drslamd.conventions import Segment
+from drslamd.slam.estimate import Learned, TeamEstimate
+from drslamd.slam.relative_pose import Noise, solve
+from drslamd.slam.self_calibration import (
+    LEAST_BIAS_M,
+    LEAST_SCALE,
+    SHARED,
+    Sensors,
+    calibrated,
+    remaining,
+)
+from drslamd.slam.window import Window
+from drslamd.slam.window_noise import RangeNoise
+
+SENSORS = Noise(RangeNoise(0.10, 0.30), NOISE, NOISE)
+KNOWN = Sensors(Learned(-0.4, 0.01), Learned(0.15, 0.001), Learned(-0.05, 0.001))
+
+
+def uncalibrated(seed: int) -> tuple[Window, Array]:
+    """A window whose ranges are 0.4 m short, whose odometries count 1 / 0.85 and 1 / 1.05."""
+    rng = np.random.default_rng(seed)
+    a, b = wander(rng, 60, 0.25), wander(rng, 60, 0.25) + [7.0, 0, 0]
+    window, true = window_of(a, b)
+    return replace(
+        window,
+        ranges=window.ranges - 0.4,
+        a_poses=window.a_poses / [0.85, 0.85, 1],
+        b_poses=window.b_poses / [1.05, 1.05, 1],
+    ), true
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_calibrated_window_gives_the_exact_pose(seed: int) -> None:
+    window, true = uncalibrated(seed)
+    better = solve(*calibrated(window, SENSORS, KNOWN), 0.1)
+    assert same_pose(better.hypotheses[0].a_T_b, true, 1e-6)
+    before = solve(window, SENSORS, 0.1)
+    assert not same_pose(before.hypotheses[0].a_T_b, true, 0.1)
+
+
+def test_what_was_never_measured_changes_nothing() -> None:
+    window, _ = uncalibrated(3)
+    same, noise = calibrated(window, SENSORS, Sensors.of(None, 0, 1))
+    assert np.array_equal(same.ranges, window.ranges)
+    assert np.array_equal(same.a_poses, window.a_poses)
+    assert noise.ranges.bias_sigma == pytest.approx(0.30)
+    assert noise.a.scale == pytest.approx(NOISE.scale)
+
+
+def test_what_is_left_is_never_below_what_no_constant_describes() -> None:
+    _, noise = calibrated(uncalibrated(4)[0], SENSORS, KNOWN)
+    assert noise.ranges.bias_sigma == pytest.approx(1 / math.hypot(1 / 0.3, 1 / 0.0539), rel=1e-3)
+    assert noise.ranges.bias_sigma > 0.98 * LEAST_BIAS_M
+    assert 0.9 * LEAST_SCALE < noise.b.scale < NOISE.scale
+    assert noise.a.yaw_rad_per_m == NOISE.yaw_rad_per_m
+
+
+@pytest.mark.parametrize("sigma", [0.01, 0.1, 10.0])
+def test_knowledge_adds_up_as_information(sigma: float) -> None:
+    left = remaining(Learned(0.2, sigma), before=0.3, least=0.0)
+    assert left**-2 == pytest.approx(0.3**-2 + (SHARED * sigma) ** -2)
+
+
+def test_a_pair_is_found_whoever_owns_it() -> None:
+    estimate = TeamEstimate(
+        Segment(0, 1, 0), {}, bias_m={(1, 2): Learned(0.3, 0.02)}, scale={2: Learned(0.1, 0.01)}
+    )
+    sensors = Sensors.of(estimate, 2, 1)
+    assert sensors.bias.value == 0.3
+    assert sensors.scale_a.value == 0.1
+    assert math.isinf(sensors.scale_b.sigma)
