@@ -54,7 +54,7 @@ def optimum() -> float:
     truth = np.random.default_rng(3).normal(0, 5, (COUNT, 3))
     for scale in (0.0, 0.01):
         start = truth + scale * np.random.default_rng(0).normal(size=truth.shape)
-        best = min(best, 2 * least_squares(errors, start.ravel(), xtol=1e-14, ftol=1e-14).cost)
+        best = min(best, 2 * least_squares(errors, start.ravel(), method="lm", xtol=1e-14).cost)
     return float(best)
 
 
