@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 PATIENCE_US = 3 * SECOND_US
 """How long an open port may be silent before that is worth a word."""
 
+LATE = 2
+"""A module that runs half as often as it should is worth a word."""
+
 Condition = tuple[str, "str | None"]
 """A key, and a sentence when something is wrong."""
 
@@ -26,6 +29,7 @@ def conditions(robot: Robot, utime: int) -> Iterator[Condition]:
     yield "network", None if network is None or network.up else network.detail
     yield from robot.team.conditions(utime)
     yield "pose", why_not_localised(robot, utime)
+    yield "load", _load(robot, utime)
 
 
 def _sensor(robot: Robot, name: str, advice: Callable[[int], str | None], utime: int) -> str | None:
@@ -36,6 +40,21 @@ def _sensor(robot: Robot, name: str, advice: Callable[[int], str | None], utime:
     if state.condition is not PortCondition.OPEN:
         return f"{name}: {state.condition.value}: {state.detail}"
     return advice(utime) if utime - state.utime > PATIENCE_US else None
+
+
+def _load(robot: Robot, utime: int) -> str | None:
+    """Modules that cannot run as often as they should."""
+    config = robot.config
+    rates = {"relative_pose": config.relative_pose.rate_hz, "optimizer": config.optimizer.rate_hz}
+    late = []
+    for module, rate in rates.items():
+        since, until = robot.cycles.get(module, (0, 0))
+        cycle = (until - since) / SECOND_US
+        if until + LATE * SECOND_US > utime and cycle > LATE / rate:
+            late.append(f"{module} runs every {cycle:.1f} s instead of every {1 / rate:.1f} s")
+    if not late:
+        return None
+    return f"{', '.join(late)}, to leave time for the sensors; the team is large for this computer"
 
 
 def why_not_localised(robot: Robot, utime: int) -> str | None:

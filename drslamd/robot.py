@@ -59,6 +59,9 @@ POLL_US = 10 * MILLISECOND_US
 """How finely the wheels that must be asked are asked; their driver knows its own rate."""
 REPEAT_US = 100 * MILLISECOND_US
 SAVE_US = 60 * SECOND_US
+REST = 4
+"""A module rests so many times as long as it computed: no team is so large that one of the three
+takes more than a fifth of a core."""
 GOODBYES = 3
 """Last messages of an orderly stop; at 30 % loss one gets through in 97 % of cases."""
 
@@ -100,6 +103,8 @@ class Robot:
         self.last_motion: int | None = None
         self._jobs: dict[int, _Job] = {}
         self._jobs_begun = 0
+        self.cycles: dict[str, tuple[int, int]] = {}
+        """By module: when it last began to compute, and until when it rests."""
         self._saved_epochs = dict(epochs)
         rate = (config.relative_pose, config.consistency, config.optimizer)
         module_us = [round(SECOND_US / section.rate_hz) for section in rate]
@@ -212,6 +217,8 @@ class Robot:
     # ---- the three modules ----
 
     def _module1(self, utime: int) -> list[Effect]:
+        if self._rests("relative_pose", utime):
+            return []
         neighbours = self.neighbours(utime)
         busy = [job.pair for job in self._jobs.values() if job.module == "relative_pose"]
         return [
@@ -229,7 +236,8 @@ class Robot:
         ]
 
     def _module3(self, utime: int) -> list[Effect]:
-        if any(job.module == "optimizer" for job in self._jobs.values()):
+        busy = any(job.module == "optimizer" for job in self._jobs.values())
+        if busy or self._rests("optimizer", utime):
             return []
         public = {k: peer.public for k, peer in self.team.peers.items() if peer.public}
         run = self.back.job(self.team.present(utime), self.team.shifts(utime), public)
@@ -242,6 +250,7 @@ class Robot:
 
     def _on_job(self, event: JobDone) -> list[Effect]:
         job = self._jobs.pop(event.job_id)
+        self._tire(job.module, event)
         if job.pair is not None and job.request is not None:
             job.pair.estimated(job.request, event.result)
             return []
@@ -252,6 +261,16 @@ class Robot:
         public = self.back.public_poses()
         sends = self.team.send_public(public, event.utime) if public else []
         return [*self.broadcast.pose(self.pose(), event.utime), *sends]
+
+    def _rests(self, module: str, utime: int) -> bool:
+        return module in self.cycles and utime < self.cycles[module][1]
+
+    def _tire(self, module: str, event: JobDone) -> None:
+        began = event.utime - event.elapsed_us
+        since, until = self.cycles.get(module, (began, began))
+        if until <= began:
+            since, until = began, event.utime
+        self.cycles[module] = since, max(until, event.utime) + REST * event.elapsed_us
 
     # ---- what we know of ourselves ----
 

@@ -34,9 +34,10 @@ class VirtualTeam:
         extra: str = "",
         on: tuple[int, ...] | None = None,
         secrets: dict[int, bytes] | None = None,
+        solve_us: int = 20_000,
     ) -> None:
         self.recording: Recording = world.simulate(scene, seed)
-        self.simulator = Simulator(seed, network)
+        self.simulator = Simulator(seed, network, solve_us)
         self.hardware: dict[int, Hardware] = equip(self.recording)
         self._rng = np.random.default_rng(seed)
         self._clocks = {robot: skewed_clock(self._rng) for robot in self.hardware}

@@ -1,0 +1,22 @@
+"""A computer that is too slow for its team: modules rest, and the robot says so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from teams import EASY, VirtualTeam
+
+from drslamd.conventions import SECOND_US
+
+
+@pytest.mark.parametrize(("solve_ms", "cycle_s", "said"), [(100, 1.0, False), (390, 2.0, False),
+                                                           (560, 3.0, True)])  # fmt: skip
+def test_a_module_takes_a_fifth_of_a_core_at_most_and_names_its_pace(
+    solve_ms: int, cycle_s: float, said: bool
+) -> None:
+    team = VirtualTeam(EASY, solve_us=1000 * solve_ms)
+    team.run(50.0)
+    poses = [t / SECOND_US for t, channel, _ in team.member(1).traces.sent if "POSE" in channel]
+    assert np.median(np.diff(poses[-8:])) == pytest.approx(cycle_s, abs=0.25)
+    sentence = f"optimizer runs every {5e-3 * solve_ms:.1f} s instead of every 1.0 s"
+    assert (sentence in team.problems(1)) == said
