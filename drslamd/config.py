@@ -200,7 +200,7 @@ class ConsistencySection(Section):
 class OptimizerSection(Section):
     """Module 3 (paper III-C)."""
 
-    algorithm: Literal["banded", "rbcd"] = "banded"
+    algorithm: Literal["banded", "closures", "rbcd"] = "banded"
     rate_hz: Rate = 1.0
     rank: Annotated[int, Field(ge=2, le=20)] = 5
     """Rank of the relaxation that `algorithm = "rbcd"` optimises."""

@@ -10,6 +10,7 @@ from drslamd.config import Config
 from drslamd.conventions import Chain, Segment
 from drslamd.slam import team_frame
 from drslamd.slam.banded_optimizer import Banded
+from drslamd.slam.closure_optimizer import Closures
 from drslamd.slam.estimate import TeamEstimate, Trajectory
 from drslamd.slam.history import History
 from drslamd.slam.items import GraphEntry, PublicPoses
@@ -19,7 +20,11 @@ from drslamd.slam.rbcd_optimizer import Rbcd
 from drslamd.slam.team_frame import Group
 from drslamd.slam.thinning import Thinning
 
-OPTIMIZERS: dict[str, Callable[[Config, Chain], Optimizer]] = {"banded": Banded, "rbcd": Rbcd}
+OPTIMIZERS: dict[str, Callable[[Config, Chain], Optimizer]] = {
+    "banded": Banded,
+    "closures": Closures,
+    "rbcd": Rbcd,
+}
 """By `optimizer.algorithm`."""
 
 

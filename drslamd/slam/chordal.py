@@ -25,6 +25,8 @@ may be indefinite, that of Gauss and Newton never is."""
 KEEP_BELOW = 1e-3
 """Relative gain of a step below which the next one takes the same factor, while each then expects
 so much less than the one before."""
+HOLD = 1e8
+"""How much stiffer than an edge the gauge is where its pose shall count as known."""
 LINEAR_TOLERANCE = 1e-9
 """Expected relative gain that is enough where a step is not Newton's."""
 LEAST_DAMPING, MOST_DAMPING = 1e-6, 1e6
@@ -59,16 +61,20 @@ class _Point:
 
 
 class PoseGraph:
-    """Edges between `count` poses that are all connected; the first pose is the gauge."""
+    """Edges between `count` poses that are all connected."""
 
-    def __init__(self, edges: ComplexEdges, count: int) -> None:
+    def __init__(self, edges: ComplexEdges, count: int, gauge: int = 0) -> None:
+        """
+        Args:
+            gauge: the pose that is held, which only `marginals` shows.
+        """
         self._edges, self._count = edges, count
         i, j = edges.i, edges.j
         x_i, x_j = 3 * i, 3 * j
         y_i, t_i, y_j, t_j = x_i + 1, x_i + 2, x_j + 1, x_j + 2
-        first = np.arange(3)
-        row = [x_i, y_i, x_j, y_j, x_j, y_j, t_i, t_i, x_j, y_j, t_i, t_j, t_j, first]
-        column = [x_i, y_i, x_j, y_j, x_i, y_i, x_i, y_i, t_i, t_i, t_i, t_j, t_i, first]
+        held = 3 * gauge + np.arange(3)
+        row = [x_i, y_i, x_j, y_j, x_j, y_j, t_i, t_i, x_j, y_j, t_i, t_j, t_j, held]
+        column = [x_i, y_i, x_j, y_j, x_i, y_i, x_i, y_i, t_i, t_i, t_i, t_j, t_i, held]
         self._system = Symmetric(3 * count, np.concatenate(row), np.concatenate(column))
         self._angle = np.angle(edges.turn)
         self._gauge = np.array([edges.tau.mean(), edges.tau.mean(), edges.kappa.mean()])
@@ -140,6 +146,22 @@ class PoseGraph:
             theta,
         ])  # fmt: skip
 
+    def marginals(self, poses: Array, wanted: list[int]) -> list[Array]:
+        """(3, 3) covariances of x, y, theta of some poses, while the gauge is held.
+
+        Args:
+            poses: (n, 3), of least cost.
+        """
+        point = self._at(poses[:, 2], poses[:, 0] + 1j * poses[:, 1])
+        factor = self._factor(point, newton=False, damping=0.0, hold=HOLD)
+        if factor is None:
+            raise AssertionError("the poses of a connected graph are determined")
+        unit = np.zeros((3 * self._count, 3 * len(wanted)))
+        at = 3 * np.array(wanted)[:, None] + np.arange(3)
+        unit[at.ravel(), np.arange(at.size)] = 1
+        inverse = factor.solve(unit)[at].reshape(len(wanted), 3, len(wanted), 3)
+        return [inverse[k, :, k] for k in range(len(wanted))]
+
     def cost(self, poses: Array) -> float:
         """Of poses (n, 3)."""
         return self._at(poses[:, 2], poses[:, 0] + 1j * poses[:, 1]).cost
@@ -166,7 +188,9 @@ class PoseGraph:
         out[:, 2] = _scatter(edges.j, twist, count) + _scatter(edges.i, lever - twist, count)
         return out.ravel()
 
-    def _factor(self, point: _Point, newton: bool, damping: float) -> Factor | None:
+    def _factor(
+        self, point: _Point, newton: bool, damping: float, hold: float = 1.0
+    ) -> Factor | None:
         """Half the Hessian, factorised; that of Gauss and Newton takes errors in frame i."""
         tau, kappa = self._edges.tau, self._edges.kappa
         if newton:
@@ -178,7 +202,7 @@ class PoseGraph:
         across, along = tau * arm.imag, tau * arm.real
         own = tau * (arm.real**2 + arm.imag**2 + bent) + stiff
         values = [tau, tau, tau, tau, -tau, -tau, -across, along, across, -along,
-                  own, stiff, -stiff, self._gauge]  # fmt: skip
+                  own, stiff, -stiff, hold * self._gauge]  # fmt: skip
         return self._system.factor(np.concatenate(values), damping)
 
 

@@ -186,5 +186,5 @@ class FrontEnd:
 
     def closure_items(self) -> list[ClosureItem]:
         """Closures to tell the team, and to withdraw."""
-        every = self._config.optimizer.algorithm == "rbcd"
+        every = self._config.optimizer.algorithm != "banded"
         return [item for pair in self.pairs.values() for item in pair.news(every)]

@@ -7,8 +7,7 @@ is solved meanwhile.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import chain as joined
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,48 +44,33 @@ def solve(graph: TeamGraph, own: Chain) -> SolvedPoses | None:
     Keyframes of one number are taken for poses of one time. That is only an order of elimination:
     where it is not so the answer is the same and takes longer.
     """
-    batches = [
-        (origin.chain, batch)
+    parts = [
+        _keyed(origin.chain, batch)
         for _, origin in sorted(graph.chains.items())
         for _, relative in sorted(origin.relative.items())
         for batch in relative
         if graph.chains.get(batch.chain.robot, origin).chain == batch.chain
     ]
-    if not batches:
+    if not parts:
         return None
-    keys, ends = np.unique(
-        np.concatenate([_keys(batches, origin=True), _keys(batches, origin=False)]),
-        return_inverse=True,
-    )
+    edges = ComplexEdges.joined(parts)
+    keys, ends = np.unique(np.concatenate([edges.i, edges.j]), return_inverse=True)
     i, j = np.split(ends, 2)
     label = components(i, j, len(keys))
     ours = np.flatnonzero(keys % ROBOTS == own.robot)
     if not len(ours):
         return None
     inside = label == label[ours[0]]
-    place = np.cumsum(inside) - 1
-    used = inside[i]
-    edges = _edges(batches, place[i], place[j]).chosen(used)
-    keys = keys[inside]
-    answer = PoseGraph(edges, len(keys)).solve()
+    place, keys = np.cumsum(inside) - 1, keys[inside]
+    numbered = replace(edges, i=place[i], j=place[j]).chosen(inside[i])
+    answer = PoseGraph(numbered, len(keys)).solve()
     return SolvedPoses(keys % ROBOTS, keys // ROBOTS, answer.poses, answer.cost, answer.converged)
 
 
-def _keys(batches: list[tuple[Chain, RelativePoses]], origin: bool) -> Index:
-    """(m,) one number for the keyframe at one end of each edge; they sort by n, then by robot."""
-    counts = [len(batch.a_n) for _, batch in batches]
-    robots = np.repeat([a.robot if origin else batch.chain.robot for a, batch in batches], counts)
-    n = joined.from_iterable(batch.a_n if origin else batch.b_n for _, batch in batches)
-    return np.asarray(np.fromiter(n, np.int64) * ROBOTS + robots)
-
-
-def _edges(batches: list[tuple[Chain, RelativePoses]], i: Index, j: Index) -> ComplexEdges:
-    x, y, theta, tau, kappa = (
-        np.fromiter(joined.from_iterable(getattr(batch, name) for _, batch in batches), float)
-        for name in ("x", "y", "theta", "tau", "kappa")
-    )
-    # the square of the complex difference is that of the angle, to first order
-    return ComplexEdges(i, j, np.exp(1j * theta), x + 1j * y, kappa, tau)
+def _keyed(origin: Chain, batch: RelativePoses) -> ComplexEdges:
+    """Ends are named by one number for each keyframe; these sort by n, then by robot."""
+    a, b = np.array(batch.a_n, dtype=np.int64), np.array(batch.b_n, dtype=np.int64)
+    return ComplexEdges.relative(a * ROBOTS + origin.robot, b * ROBOTS + batch.chain.robot, batch)
 
 
 def components(i: Index, j: Index, count: int) -> Index:

@@ -262,6 +262,15 @@ def test_the_papers_algorithms_bring_the_team_together_too(extra: str) -> None:
     assert "PUBLIC" in kinds_sent(team, 0)
 
 
+@pytest.mark.slow
+def test_closures_alone_bring_the_team_together_too() -> None:
+    team = VirtualTeam(extra='[optimizer]\nalgorithm = "closures"\n')
+    team.run(SETTLED)
+    assert team.frames() == {0: 0, 1: 0, 2: 0}
+    assert team.errors()["ate_rmse_m"] < 0.30
+    assert "PUBLIC" not in kinds_sent(team, 0)
+
+
 def test_a_robot_needs_none_of_its_modules_to_run_as_often_as_the_others() -> None:
     rates = (
         "[relative_pose]\nrate_hz = 0.5\n[consistency]\nrate_hz = 2\n[optimizer]\nrate_hz = 0.2\n"

@@ -109,6 +109,30 @@ def test_the_order_of_the_poses_does_not_change_the_cost() -> None:
     assert wide.cost == pytest.approx(narrow.cost, rel=1e-10)
 
 
+@pytest.mark.parametrize("gauge", [0, 17])
+@pytest.mark.parametrize("reach", [6, 38])
+def test_marginals_are_blocks_of_the_dense_inverse(gauge: int, reach: int) -> None:
+    """Information summed edge by edge, the gauge's rows and columns left out."""
+    edges = graph(40, 30, 0.0, 11, reach)
+    solver = PoseGraph(edges, 40, gauge)
+    poses = solver.solve().poses
+    information = np.zeros((120, 120))
+    for i, j, shift, kappa, tau in zip(
+        edges.i, edges.j, edges.shift, edges.kappa, edges.tau, strict=True
+    ):
+        arm = np.exp(1j * poses[i, 2]) * shift
+        j_i = np.array([[-1, 0, arm.imag], [0, -1, -arm.real], [0, 0, -1]])
+        jacobian = np.zeros((3, 120))
+        jacobian[:, 3 * i : 3 * i + 3], jacobian[:, 3 * j : 3 * j + 3] = j_i, np.eye(3)
+        information += jacobian.T @ np.diag([tau, tau, kappa]) @ jacobian
+    free = np.delete(np.arange(120), 3 * gauge + np.arange(3))
+    inverse = np.zeros((120, 120))
+    inverse[np.ix_(free, free)] = np.linalg.inv(information[np.ix_(free, free)])
+    for k, found in zip([3, 39], solver.marginals(poses, [3, 39]), strict=True):
+        block = slice(3 * k, 3 * k + 3)
+        np.testing.assert_allclose(found, inverse[block, block], rtol=1e-5, atol=1e-9)
+
+
 CERTIFIED = {
     "team3_400": 1992.71324672,
     "CSAIL": 31.4703316653,
