@@ -36,6 +36,9 @@ HOPELESS, HOPELESS_CHI2 = 5.0, 60.0
 """A minimum that is worse by this factor and sum cannot come back under correlated noise."""
 POOR_FIT = 4.0
 """Chi-squared per degree of freedom beyond which the model does not explain the window."""
+NEWEST, NEWEST_SIGMAS = 3, 2.0
+"""So many last measurements may not lie off the rest by so much in the median: a pose is that of
+the end of its window, and there a burst and odometry that has just failed look alike."""
 MAX_SIGMA_M, MAX_SIGMA_RAD = 1.5, 0.5
 """A pose known worse than this helps nobody."""
 LEAST_DAMPING = 1e-12
@@ -104,12 +107,18 @@ def solve(window: Window, noise: Noise, delta: float) -> Estimate:
     # under the full noise two candidates may have come to the same minimum
     judged = [judged[k] for k in _distinct(np.array([h.a_T_b for h in judged]))]
     best = judged[0]
-    if best.chi2 > POOR_FIT * (len(window) - 3):
+    if best.chi2 > POOR_FIT * (len(window) - 3) or _end_is_off(window, noise, best.a_T_b):
         return Estimate(Verdict.POOR_FIT)
     kept = [h for h in judged if h.chi2 < best.chi2 + EXCLUDED_CHI2][:HYPOTHESES]
     if not all(_observable(h.covariance) for h in kept):
         return Estimate(Verdict.UNOBSERVABLE)
     return Estimate(Verdict.UNIQUE if len(kept) == 1 else Verdict.AMBIGUOUS, tuple(kept))
+
+
+def _end_is_off(window: Window, noise: Noise, pose: Array) -> bool:
+    e = residuals(pose[None], window.a_points, window.b_points, window.ranges)[0][0]
+    off = np.abs(e[-NEWEST:] - np.median(e))
+    return bool(np.median(off) > NEWEST_SIGMAS * noise.ranges.sigma)
 
 
 def _observable(covariance: Array) -> bool:
