@@ -96,21 +96,22 @@ def table2(total: Tally) -> str:
             if f"{name}/after/m" not in total:
                 continue
             n, m0, deg0, m1, deg1 = printed.TABLE_2[tau, epsilon]
-            before, after = (
+            before, there, after = (
                 [total[f"{name}/{when}/{unit}"] for unit in ("m", "deg")]
-                for when in ("before", "after")
+                for when in ("before", "there", "after")
             )
             rows.append([
                 tau, "no PCM" if epsilon is None else epsilon, n, f"{m0}, {deg0}", f"{m1}, {deg1}",
-                f"{total[f'{name}/inliers'].mean:.0f}", *before, *after,
+                f"{total[f'{name}/inliers'].mean:.0f}", *before, *there, *after,
                 f"{total[f'{name}/ate'].mean:.2f}", *ours,
             ])  # fmt: skip
     head = ["tau", "epsilon", "printed inliers", "printed before", "printed after",
-            "paper inliers", "before m", "before °", "after m", "after °", "joint ATE m",
+            "paper inliers", "before m", "before °", "there m", "there °", "after m", "after °", "joint ATE m",
             "drslamd m", "drslamd °"]  # fmt: skip
     kept, seen = total["drslamd/kept/m"], total["drslamd/before/m"]
     note = (
-        f"drslamd does not depend on tau: one run per seed. Before optimisation {seen} m, "
+        "Before optimisation there is a pose only where a closure was kept; *there* is after it at "
+        f"the same times. drslamd does not depend on tau: one run per seed. Before optimisation {seen} m, "
         f"{total['drslamd/before/deg']}° (windows with one answer), of those kept {kept} m, "
         f"{total['drslamd/kept/deg']}°; after it {ours[0]} m, {ours[1]}°; "
         f"joint ATE {total['drslamd/ate'].mean:.3f} m; "

@@ -61,7 +61,10 @@ def _kept(found: Closures, lengths: list[Array], epsilon: float | None) -> Closu
 
 
 def fill(trial: Trial, taus: Sequence[int], epsilons: Sequence[float | None]) -> Tally:
-    """Errors before and after optimisation, and of odometry alone."""
+    """Errors before and after optimisation, and of odometry alone.
+
+    Before it there is a pose only where a closure was kept; "there" is after it at the same times.
+    """
     tally = Tally()
     tally.poses("odometry", odometry_errors(trial.recording))
     truth = [trial.truth[r] for r in sorted(trial.truth)]
@@ -73,6 +76,8 @@ def fill(trial: Trial, taus: Sequence[int], epsilons: Sequence[float | None]) ->
             tally.poses(f"{name}/before", pose_errors(closures.poses, true[closures.k]))
             after = metrics.relative(row.poses[pair[0]], row.poses[pair[1]])
             tally.poses(f"{name}/after", pose_errors(after, true))
+            there = closures.k
+            tally.poses(f"{name}/there", pose_errors(after[there], true[there]))
         tally.add(f"{name}/ate", joint_ate([row.poses[r] for r in sorted(row.poses)], truth))
     return tally
 
