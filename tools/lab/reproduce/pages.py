@@ -106,12 +106,13 @@ def table2(total: Tally) -> str:
                 f"{total[f'{name}/ate'].mean:.2f}", *ours,
             ])  # fmt: skip
     head = ["tau", "epsilon", "printed inliers", "printed before", "printed after",
-            "paper inliers", "before m", "before °", "there m", "there °", "after m", "after °", "joint ATE m",
-            "drslamd m", "drslamd °"]  # fmt: skip
+            "paper inliers", "before m", "before °", "there m", "there °", "after m", "after °",
+            "joint ATE m", "drslamd m", "drslamd °"]  # fmt: skip
     kept, seen = total["drslamd/kept/m"], total["drslamd/before/m"]
     note = (
         "Before optimisation there is a pose only where a closure was kept; *there* is after it at "
-        f"the same times. drslamd does not depend on tau: one run per seed. Before optimisation {seen} m, "
+        "the same times. drslamd does not depend on tau: one run per seed. "
+        f"Before optimisation {seen} m, "
         f"{total['drslamd/before/deg']}° (windows with one answer), of those kept {kept} m, "
         f"{total['drslamd/kept/deg']}°; after it {ours[0]} m, {ours[1]}°; "
         f"joint ATE {total['drslamd/ate'].mean:.3f} m; "
