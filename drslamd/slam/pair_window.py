@@ -19,6 +19,7 @@ from drslamd.slam.pose_graph import ChainItems
 from drslamd.slam.range_buffer import RangeBuffer
 from drslamd.slam.se2 import Array
 from drslamd.slam.window import Window, binned
+from drslamd.slam.window_noise import near_bias
 
 NEAR_US = 1_500_000
 """A keyframe stands for times so near; farther, only while its robot stands still."""
@@ -165,7 +166,8 @@ class RangeItems:
         self._utime, self._place = last, place
         q_a = se2.transform(held_a.keyframe_T_body, a.items.antenna).tolist()
         q_b = se2.transform(held_b.keyframe_T_body, b.items.antenna).tolist()
+        metres = float(np.median(table[:, 1]))
         return RangeItem(
             held_a.n, peer, held_b.n, (q_a[0], q_a[1]), (q_b[0], q_b[1]),
-            float(np.median(table[:, 1])), self._sigma_m,
+            metres, float(np.hypot(self._sigma_m, near_bias(metres))),
         )  # fmt: skip

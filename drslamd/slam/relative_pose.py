@@ -210,7 +210,7 @@ def _judge(window: Window, noise: Noise, pose: Array) -> Hypothesis:
         level = np.median(e)
         size = np.abs(e - level) / noise.ranges.sigma
         weights = np.minimum(1.0, ROBUST_SIGMAS / np.maximum(size, 1e-9)) ** 2
-        covariance = range_covariance(window.t, noise.ranges, weights)
+        covariance = range_covariance(window.t, window.ranges, noise.ranges, weights)
         covariance += odometry_covariance(a, window.a_poses[:, :2], u, noise.a)
         u_in_b = se2.rotate(-pose[2], u)
         covariance += odometry_covariance(b, window.b_poses[:, :2], u_in_b, noise.b)

@@ -58,7 +58,8 @@ def test_antennas_off_the_middle_are_taken_into_account(seed: int) -> None:
     window, true = curved(seed, a=(0.3, -0.2), b=(-0.25, 0.15))
     assert same_pose(solved(window).hypotheses[0].a_T_b, true, 1e-6)
     forgotten = replace(window, a_antenna=np.zeros(2), b_antenna=np.zeros(2))
-    assert not same_pose(solved(forgotten).hypotheses[0].a_T_b, true, 0.05)
+    wrong = solved(forgotten).hypotheses
+    assert not wrong or not same_pose(wrong[0].a_T_b, true, 0.05)
 
 
 @pytest.mark.parametrize("bias", [0.5, -0.5])
@@ -300,3 +301,23 @@ def test_absurd_odometry_of_a_peer_raises_nothing() -> None:
             assert estimate.verdict is not Verdict.UNIQUE
             relative_pose.solve_paper(strange, 0.1, DELTA)
     assert se2.wrap(0.0) == 0
+
+
+# ---- a pose is that of the end of its window ----
+
+
+@pytest.mark.parametrize(("off", "verdict"), [(0.15, Verdict.UNIQUE), (0.6, Verdict.POOR_FIT)])
+def test_ranges_that_leave_the_rest_at_the_end_name_no_pose(off: float, verdict: Verdict) -> None:
+    window, _ = curved(2)
+    ranges = window.ranges.copy()
+    ranges[-3:] += off
+    assert solved(with_ranges(window, ranges)).verdict is verdict
+
+
+def test_the_same_burst_in_the_middle_does_no_harm() -> None:
+    window, true = curved(2)
+    ranges = window.ranges.copy()
+    ranges[-20:-17] += 0.6
+    estimate = solved(with_ranges(window, ranges))
+    assert estimate.verdict is Verdict.UNIQUE
+    assert same_pose(estimate.hypotheses[0].a_T_b, true, 0.3)

@@ -15,6 +15,7 @@ from drslamd.slam.window_noise import (
     SLOW_SHARE,
     SLOW_TIME_S,
     RangeNoise,
+    near_bias,
     odometry_covariance,
     range_covariance,
 )
@@ -27,6 +28,9 @@ PARTS = {
     "random yaw": replace(QUIET, yaw_rad_per_sqrt_m=math.radians(0.5)),
     "everything": NOISE,
 }
+
+FAR = np.full(4, 50.0)
+"""Where the bias of short ranges is none."""
 
 
 def noisy_windows(
@@ -98,13 +102,25 @@ def test_ranges_share_a_bias_and_a_slow_part() -> None:
     errors = 0.1 * (SLOW_SHARE * slow + white * rng.normal(size=(count, 4)))
     errors += 0.3 * rng.normal(size=(count, 1))
     seen = errors.T @ errors / count
-    assert np.allclose(range_covariance(t, noise, np.ones(4)), seen, atol=1e-3)
+    assert np.allclose(range_covariance(t, FAR, noise, np.ones(4)), seen, atol=1e-3)
 
 
 def test_an_outlier_that_weighs_a_quarter_is_twice_as_uncertain() -> None:
     noise, t = RangeNoise(0.1, 0.3), np.array([-1.0, 0.0])
-    plain = range_covariance(t, noise, np.ones(2))
-    thinned = range_covariance(t, noise, np.array([1.0, 0.25]))
+    plain = range_covariance(t, FAR[:2], noise, np.ones(2))
+    thinned = range_covariance(t, FAR[:2], noise, np.array([1.0, 0.25]))
     assert plain[0, 0] == pytest.approx(0.1**2 + 0.3**2)
     assert np.allclose(thinned - plain, np.diag([0, 3 * 0.1**2]))
     assert thinned[1, 1] == pytest.approx(0.2**2 + 0.3**2)
+
+
+def test_short_ranges_share_a_bias_of_their_own() -> None:
+    """As LinkTrack modules were measured: 0.13 m more at 0.5 m, 0.07 m at 1.5 m, none beyond."""
+    assert near_bias(np.array([0.5, 1.5, 8.0])) == pytest.approx([0.14, 0.07, 0.0], abs=0.01)
+    assert near_bias(-0.3) == near_bias(0.0)
+    t, noise = np.array([-100.0, 0.0]), RangeNoise(0.1, 0.3)
+    near = range_covariance(t, np.array([0.5, 1.5]), noise, np.ones(2))
+    far = range_covariance(t, FAR[:2], noise, np.ones(2))
+    # at one short range as at the other, so their errors add to each other's covariance
+    assert near[0, 1] - far[0, 1] == pytest.approx(0.143 * 0.074, abs=1e-3)
+    assert near[1, 1] - far[1, 1] == pytest.approx(0.074**2, abs=1e-3)
