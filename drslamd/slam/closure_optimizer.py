@@ -87,7 +87,8 @@ def _edges(graph: TeamGraph, numbers: Numbering) -> ComplexEdges:
                 j = numbers.of(other, np.array(batch.b_n, dtype=float))
                 parts.append(ComplexEdges.relative(i, j, batch))
     edges = ComplexEdges.joined(parts)
-    return edges.chosen((edges.i >= 0) & (edges.j >= 0))
+    # a pose relative to itself says nothing
+    return edges.chosen((edges.i >= 0) & (edges.j >= 0) & (edges.i != edges.j))
 
 
 def _solve(stated: _Stated, group: Group) -> TeamEstimate:

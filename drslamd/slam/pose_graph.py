@@ -107,7 +107,8 @@ class ChainItems:
         self._table.add([k.n, k.segment, k.x * metres, k.y * metres, k.theta * radians])
 
     def add_relative(self, seq: int, relative: tuple[RelativePoses, ...]) -> None:
-        self.relative[seq] = relative
+        """The relative poses of one log entry; a batch with nonsense in it is left out."""
+        self.relative[seq] = tuple(batch for batch in relative if _sensible(batch))
         while len(self.relative) > MAX_RELATIVE:
             del self.relative[min(self.relative)]
 
@@ -183,6 +184,12 @@ def _found(ascending: Array, wanted: Array) -> tuple[Index, NDArray[np.bool_]]:
     at = np.minimum(np.searchsorted(ascending, wanted), max(len(ascending) - 1, 0))
     there = ascending[at] == wanted if len(ascending) else np.zeros(len(wanted), bool)
     return at, there
+
+
+def _sensible(batch: RelativePoses) -> bool:
+    best, worst = (sigma**-2.0 for sigma in CLOSURE_SIGMAS)
+    near = all(abs(value) < FARTHEST_M for value in (*batch.x, *batch.y, *batch.theta))
+    return near and all(worst < weight < best for weight in (*batch.tau, *batch.kappa))
 
 
 @dataclass

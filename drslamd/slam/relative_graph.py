@@ -62,7 +62,9 @@ def solve(graph: TeamGraph, own: Chain) -> SolvedPoses | None:
         return None
     inside = label == label[ours[0]]
     place, keys = np.cumsum(inside) - 1, keys[inside]
-    numbered = replace(edges, i=place[i], j=place[j]).chosen(inside[i])
+    numbered = replace(edges, i=place[i], j=place[j])
+    # a pose relative to itself says nothing
+    numbered = numbered.chosen(inside[i] & (i != j))
     answer = PoseGraph(numbered, len(keys)).solve()
     return SolvedPoses(keys % ROBOTS, keys // ROBOTS, answer.poses, answer.cost, answer.converged)
 

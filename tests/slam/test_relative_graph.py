@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -102,6 +105,43 @@ def test_edges_to_an_earlier_start_of_a_peer_no_longer_count() -> None:
     solved = solve(graph, A)
     assert solved is not None
     assert set(solved.robot.tolist()) == {2}
+
+
+@pytest.mark.parametrize(
+    "harm",
+    [{"x": 1e9}, {"theta": -1e300}, {"tau": 1e12}, {"tau": 1e-9}, {"kappa": 1e12}, {"kappa": 1e-9}],
+)
+def test_a_batch_with_nonsense_in_it_moves_nobody(harm: dict[str, float]) -> None:
+    graph = filled(entries(0.1))
+    before = solve(graph, A)
+    wild = batch(A, B, [2, 6], [2, 6])
+    columns: dict[str, Any] = {
+        name: (value, getattr(wild, name)[1]) for name, value in harm.items()
+    }
+    graph.insert(A, GraphEntry(7, relative=(replace(wild, **columns),)))
+    after = solve(graph, A)
+    assert before is not None
+    assert after is not None
+    assert after.poses.tolist() == before.poses.tolist()
+
+
+def test_the_largest_noise_and_the_smallest_are_still_believed() -> None:
+    graph = filled(entries(0.1))
+    for seq, weight in enumerate((1.2e-5, 0.9e8), start=8):
+        stiff = replace(batch(A, B, [2], [2]), tau=(weight,), kappa=(weight,))
+        graph.insert(A, GraphEntry(seq, relative=(stiff,)))
+        assert graph.chains[A.robot].relative[seq]
+
+
+def test_a_pose_relative_to_itself_says_nothing() -> None:
+    graph = filled(entries(0.1))
+    before = solve(graph, A)
+    ring = replace(batch(A, A, [3], [3]), x=(5.0,), theta=(1.0,))
+    graph.insert(A, GraphEntry(7, relative=(ring,)))
+    after = solve(graph, A)
+    assert before is not None
+    assert after is not None
+    assert after.poses.tolist() == before.poses.tolist()
 
 
 def test_components_are_those_of_a_flood() -> None:
