@@ -146,7 +146,9 @@ def _graph(robot: Robot) -> dict[str, Any]:
             "frame": estimate.frame.robot,
             "iterations": estimate.iterations,
             "converged": estimate.converged,
-            "range_bias_m": {f"{a}-{b}": round(v.value, 4) for (a, b), v in estimate.bias_m.items()},
+            "range_bias_m": {
+                f"{a}-{b}": round(v.value, 4) for (a, b), v in estimate.bias_m.items()
+            },
             "wheel_scale": {str(k): round(v.value, 5) for k, v in estimate.scale.items()},
         }
     return out
@@ -177,7 +179,7 @@ def closures(robot: Robot) -> dict[str, Any]:
     """What module 1 answered and what module 2 made of it, window by window."""
     out = []
     for peer, pair in sorted(robot.front.pairs.items()):
-        kept = {item.number for item in pair.kept()}
+        kept = pair.accepted()
         for answer in pair.history:
             poses = [h.a_T_b.tolist() for h in answer.estimate.hypotheses]
             out.append({

@@ -82,6 +82,7 @@ class Pair:
         self._segments: tuple[Segment, Segment] | None = None
         self._pending: deque[tuple[int, Request, Estimate]] = deque(maxlen=PENDING)
         self._said: dict[int, ClosureItem] = {}
+        self._kept_before: set[int] = set()
         self._number = 0
 
     def count(self, verdict: str) -> None:
@@ -113,6 +114,7 @@ class Pair:
             )
             if segments != self._segments:
                 # odometry broke: what was kept stays in the graph, a new set begins
+                self._kept_before = self.accepted() if self.established else self._kept_before
                 self._segments, self.checked, self.established, work = segments, None, False, []
             work += self._candidates(number, request, estimate, own, peer)
         if not work or self._segments is None:
@@ -158,6 +160,12 @@ class Pair:
         elif not self.established or kept < AGREEING:
             # the rivals are searched last: that takes a while
             self.established = kept >= AGREEING and kept >= OUTNUMBER * checked.consistency.rivals()
+
+    def accepted(self) -> set[int]:
+        """Numbers of all closures that are kept, of earlier segments too, back to `history`."""
+        oldest = self.history[0].number if self.history else 0
+        now = {item.number for item in self.kept()}
+        return {number for number in self._kept_before | now if number >= oldest}
 
     def kept(self) -> list[ClosureItem]:
         """Closures of the consistent set."""
