@@ -10,14 +10,14 @@ costs no more here than that of Gauss and Newton. Poses in the order of time mak
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drslamd.slam import se2
 from drslamd.slam.rbcd import ComplexEdges
 from drslamd.slam.se2 import Array
-from drslamd.slam.symmetric import Factor, Symmetric
+from drslamd.slam.symmetric import Factor, Symmetric, elimination_order
 
 NEWTON_BELOW = 0.3
 """Relative gain of a step below which the next one is Newton's; far from the minimum his Hessian
@@ -68,11 +68,13 @@ class PoseGraph:
         Args:
             gauge: the pose that is held, which only `marginals` shows.
         """
-        self._edges, self._count = edges, count
-        i, j = edges.i, edges.j
+        self._order = elimination_order(edges.i, edges.j, count)
+        self._place = np.argsort(self._order)
+        i, j = self._place[edges.i], self._place[edges.j]
+        self._edges, self._count = replace(edges, i=i, j=j), count
         x_i, x_j = 3 * i, 3 * j
         y_i, t_i, y_j, t_j = x_i + 1, x_i + 2, x_j + 1, x_j + 2
-        held = 3 * gauge + np.arange(3)
+        held = 3 * self._place[gauge] + np.arange(3)
         row = [x_i, y_i, x_j, y_j, x_j, y_j, t_i, t_i, x_j, y_j, t_i, t_j, t_j, held]
         column = [x_i, y_i, x_j, y_j, x_i, y_i, x_i, y_i, t_i, t_i, t_i, t_j, t_i, held]
         self._system = Symmetric(3 * count, np.concatenate(row), np.concatenate(column))
@@ -86,8 +88,7 @@ class PoseGraph:
             tolerance: expected relative gain of a step of Newton's after which no other one is
                 taken; as his method squares its error, what is missing then is far smaller.
         """
-        poses = self.chordal_start() if start is None else start
-        point = self._at(poses[:, 2], poses[:, 0] + 1j * poses[:, 1])
+        point = self._point(self.chordal_start() if start is None else start)
         newton, damping, steps, converged = start is not None, 0.0, 0, False
         factor: Factor | None = None
         before = np.inf
@@ -112,7 +113,7 @@ class PoseGraph:
             newton, before = gain <= NEWTON_BELOW, expected
             point, damping = trial, damping / 10 if damping > LEAST_DAMPING else 0.0
         poses = np.stack([point.place.real, point.place.imag, se2.wrap(point.theta)], axis=-1)
-        return Answer(poses, point.cost, steps, converged)
+        return Answer(poses[self._place], point.cost, steps, converged)
 
     def _stepped(self, point: _Point, factor: Factor) -> tuple[_Point, float]:
         """The point after a full step, and by how much the cost was expected to fall."""
@@ -140,11 +141,11 @@ class PoseGraph:
         if factor is None:
             raise AssertionError("positions of a connected graph are determined")
         pull = edges.tau * np.exp(1j * theta[i]) * edges.shift
-        return np.column_stack([
-            factor.solve(_scatter(j, pull.real, count) - _scatter(i, pull.real, count)),
-            factor.solve(_scatter(j, pull.imag, count) - _scatter(i, pull.imag, count)),
-            theta,
-        ])  # fmt: skip
+        x, y = (
+            factor.solve(_scatter(j, part, count) - _scatter(i, part, count))
+            for part in (pull.real, pull.imag)
+        )
+        return np.column_stack([x, y, theta])[self._place]
 
     def marginals(self, poses: Array, wanted: list[int]) -> list[Array]:
         """(3, 3) covariances of x, y, theta of some poses, while the gauge is held.
@@ -152,19 +153,23 @@ class PoseGraph:
         Args:
             poses: (n, 3), of least cost.
         """
-        point = self._at(poses[:, 2], poses[:, 0] + 1j * poses[:, 1])
-        factor = self._factor(point, newton=False, damping=0.0, hold=HOLD)
+        factor = self._factor(self._point(poses), newton=False, damping=0.0, hold=HOLD)
         if factor is None:
             raise AssertionError("the poses of a connected graph are determined")
         unit = np.zeros((3 * self._count, 3 * len(wanted)))
-        at = 3 * np.array(wanted)[:, None] + np.arange(3)
+        at = 3 * self._place[wanted][:, None] + np.arange(3)
         unit[at.ravel(), np.arange(at.size)] = 1
         inverse = factor.solve(unit)[at].reshape(len(wanted), 3, len(wanted), 3)
         return [inverse[k, :, k] for k in range(len(wanted))]
 
     def cost(self, poses: Array) -> float:
         """Of poses (n, 3)."""
-        return self._at(poses[:, 2], poses[:, 0] + 1j * poses[:, 1]).cost
+        return self._point(poses).cost
+
+    def _point(self, poses: Array) -> _Point:
+        """At poses (n, 3), as others number them."""
+        x, y, theta = poses[self._order].T
+        return self._at(theta, x + 1j * y)
 
     def _at(self, theta: Array, place: Array) -> _Point:
         edges = self._edges

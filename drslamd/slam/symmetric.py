@@ -1,12 +1,13 @@
 """Sparse symmetric positive definite systems: a band where the pattern is one, else SuperLU.
 
 The pattern is given once, as places in the lower or upper triangle that may repeat; each
-factorisation then takes the values for those places and sums them.
+factorisation then takes the values for those places and sums them. Unknowns are eliminated in their
+order, so whoever numbers them decides how fast that is (`elimination_order`).
 """
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.linalg import get_lapack_funcs
@@ -15,7 +16,9 @@ from drslamd.slam.problem import Index
 from drslamd.slam.se2 import Array
 
 NARROW = 96
-"""Diagonals up to which a band is worth it: 24 robots in the order of time."""
+"""Diagonals up to which a band is worth it: 30 robots in the order of time."""
+BLOCK = 3
+"""Unknowns of a pose."""
 
 
 class Factor(Protocol):
@@ -91,7 +94,7 @@ class _Band:
 
 
 class _Sparse:
-    """SuperLU without pivoting, columns by minimum degree."""
+    """SuperLU without pivoting, unknowns eliminated in their order."""
 
     def __init__(self, size: int, row: Index, column: Index) -> None:
         """
@@ -109,21 +112,38 @@ class _Sparse:
         self._diagonal = np.flatnonzero(places % size == places // size)
 
     def factor(self, values: Array, damping: float) -> Factor | None:
-        # only graphs with loops in space come here; the others need not load scipy.sparse
-        from scipy.sparse import csc_matrix
-        from scipy.sparse.linalg import splu
-
         both = np.concatenate([values, values[self._off].conj()])
         data = _sums(self._sum_at, both, len(self._rows))
         data[self._diagonal] *= 1 + damping
-        matrix = csc_matrix((data, self._rows, self._starts), (self._size, self._size))
-        try:
-            factor: Factor = splu(
-                matrix,
-                permc_spec="MMD_AT_PLUS_A",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True},
-            )
-        except RuntimeError:
-            return None
+        factor: Factor | None = _factorised(data, self._rows, self._starts, "NATURAL")
         return factor
+
+
+def _factorised(data: Array, rows: Array, starts: Array, order: str) -> Any:
+    """SuperLU's object for a symmetric matrix by columns, None where it is singular."""
+    # only graphs with loops in space come here; the others need not load scipy.sparse
+    from scipy.sparse import csc_matrix
+    from scipy.sparse.linalg import splu
+
+    matrix = csc_matrix((data, rows, starts), (len(starts) - 1, len(starts) - 1))
+    options = {"SymmetricMode": True}
+    try:
+        return splu(matrix, permc_spec=order, diag_pivot_thresh=0.0, options=options)
+    except RuntimeError:
+        return None
+
+
+def elimination_order(i: Index, j: Index, count: int) -> Index:
+    """(count,) vertices of a graph with edges (m,), in an order that leaves factors sparse.
+
+    As they are where that is a band; otherwise by minimum degree.
+    """
+    if np.abs(i - j).max(initial=0) < NARROW // BLOCK:
+        return np.arange(count)
+    diagonal = np.arange(count)
+    places = np.unique(np.concatenate([i * count + j, j * count + i, diagonal * (count + 1)]))
+    rows, columns = places % count, places // count
+    starts = np.searchsorted(columns, np.arange(count + 1))
+    data = np.where(rows == columns, np.bincount(columns, minlength=count)[columns], -1.0)
+    factor = _factorised(data, rows.astype(np.int32), starts.astype(np.int32), "MMD_AT_PLUS_A")
+    return np.asarray(np.argsort(factor.perm_c))

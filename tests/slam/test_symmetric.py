@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drslamd.slam.symmetric import NARROW, Symmetric
+from drslamd.slam.symmetric import NARROW, Symmetric, elimination_order
 
 Parts = tuple[Symmetric, np.ndarray, np.ndarray]
 
@@ -59,3 +59,20 @@ def test_an_indefinite_band_is_none() -> None:
 def test_a_singular_sparse_matrix_is_none() -> None:
     matrix, values, _ = system(200, 150, False)
     assert matrix.factor(np.zeros_like(values)) is None
+
+
+def test_an_order_of_elimination_is_kept_where_it_is_a_band() -> None:
+    i = np.arange(100)
+    assert elimination_order(i, i + 1, 101).tolist() == list(range(101))
+    # up to 31 poses apart three unknowns of each still fit the band
+    reach = np.array([NARROW // 3 - 1])
+    assert elimination_order(np.zeros(1, dtype=np.int64), reach, 101).tolist() == list(range(101))
+
+
+def test_an_order_of_elimination_keeps_factors_sparse() -> None:
+    """A star: its middle first would join all the others, its middle last joins nobody."""
+    count = 200
+    i, j = np.zeros(count - 1, dtype=np.int64), np.arange(1, count)
+    order = elimination_order(i, j, count)
+    assert sorted(order.tolist()) == list(range(count))
+    assert 0 in order[-2:]
