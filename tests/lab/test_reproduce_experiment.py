@@ -98,8 +98,7 @@ def test_true_pairs_are_poses_of_the_second_in_the_first(perfect: Trial) -> None
 
 @pytest.mark.slow
 def test_odometry_alone_is_as_wrong_as_the_papers_over_twenty_seeds() -> None:
-    quiet = replace(SCENE, ranges=world.RangeModel(lost=1.0))
-    errors = [experiment.odometry_errors(world.simulate(quiet, seed)) for seed in range(20)]
+    errors = [experiment.odometry_errors(experiment.trial(seed).recording) for seed in range(20)]
     metres = np.concatenate([e[0] for e in errors]).mean()
     degrees = np.concatenate([e[1] for e in errors]).mean()
     assert metres == pytest.approx(0.85, rel=0.15)

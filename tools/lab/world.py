@@ -61,6 +61,12 @@ def simulate(scene: Scene, seed: int) -> Recording:
     """One recording of a scene; the same seed gives the same recording."""
     rng = np.random.default_rng(seed)
     truths = [drive(rng, scene) for _ in range(scene.robots)]
+    name = f"simulated {scene.robots} robots, {scene.seconds:.0f} s, seed {seed}"
+    return recorded(name, rng, scene, truths)
+
+
+def recorded(name: str, rng: np.random.Generator, scene: Scene, truths: list[Array]) -> Recording:
+    """What sensors say of true trajectories (n, 3), one sample per STEP_S."""
     t = np.arange(len(truths[0])) * STEP_S
     every = round(1 / STEP_S / scene.odometry_hz)
     trails = {
@@ -75,7 +81,6 @@ def simulate(scene: Scene, seed: int) -> Recording:
         for row in _pair_ranges(rng, scene, t, truths, a, b)
     ]
     table = np.concatenate(rows)
-    name = f"simulated {scene.robots} robots, {scene.seconds:.0f} s, seed {seed}"
     return Recording(name, trails, table[np.lexsort((table[:, 2], table[:, 1], table[:, 0]))])
 
 
