@@ -15,13 +15,24 @@ from typing import Any
 import numpy as np
 import scipy
 
-from lab.benchmark import graphs, module1, module2, module3, pipeline, rows, timing
+from lab.benchmark import (
+    graphs,
+    growth,
+    module1,
+    module2,
+    module3,
+    pipeline,
+    rows,
+    timing,
+    traffic,
+)
 from lab.benchmark.rows import Row
 from lab.progress import Progress
 from lab.recording import BadRecording
 
 WORSE, NO_INPUT = 1, 66
-PARTS = {"1": module1, "2": module2, "3": module3, "all": pipeline}
+PARTS = {"1": module1, "2": module2, "3": module3, "all": pipeline, "traffic": traffic,
+         "growth": growth}  # fmt: skip
 EXAMPLES = """\
 examples:
   tools/benchmark                              all of it, some minutes
