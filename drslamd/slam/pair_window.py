@@ -32,6 +32,9 @@ MIN_SIGMA_M = 1e-3
 POINTS = 60
 """Measurements of one window after binning; more would only repeat the slow range bias."""
 FEWEST = 6
+CONFIRM_US = 2 * SECOND_US
+"""A pose is named for so long ago: odometry that fails just now fits its past as well as ever, and
+only ranges that come after tell."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,7 @@ class Anchored:
 
 @dataclass(frozen=True)
 class Request:
-    """A window, when it ends on our clock, and what its answer will be attached to."""
+    """A window, its reference time on our clock, and what its answer will be attached to."""
 
     window: Window
     utime: int
@@ -97,21 +100,22 @@ def request(ranges: RangeBuffer, a: Side, b: Side, section: RelativePoseSection)
     table = ranges.between(max(last - span, a.first_us, b.first_us), last)
     if len(table) < FEWEST:
         return "too few ranges"
+    at = last if paper else max(last - CONFIRM_US, a.first_us, b.first_us)
     width = GRID_US if paper else max(GRID_US, span // POINTS)
-    t, distances, _ = binned((table[:, 0] - last) / 1e6, table[:, 1], width / 1e6)
-    held = anchored(a, last), anchored(b, last)
+    t, distances, _ = binned((table[:, 0] - at) / 1e6, table[:, 1], width / 1e6)
+    held = anchored(a, at), anchored(b, at)
     if held[0] is None or held[1] is None:
         return "no keyframe near the window yet"
-    when = last + t * 1e6
+    when = at + t * 1e6
     window = Window(
         t,
         distances,
-        se2.between(a.poses(last), a.poses(when)),
-        se2.between(b.poses(last), b.poses(when)),
+        se2.between(a.poses(at), a.poses(when)),
+        se2.between(b.poses(at), b.poses(when)),
         a.items.antenna,
         b.items.antenna,
     )
-    return Request(window, last, held[0], held[1])
+    return Request(window, at, held[0], held[1])
 
 
 def anchored(side: Side, utime: int) -> Anchored | None:

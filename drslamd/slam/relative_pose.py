@@ -37,8 +37,8 @@ HOPELESS, HOPELESS_CHI2 = 5.0, 60.0
 POOR_FIT = 4.0
 """Chi-squared per degree of freedom beyond which the model does not explain the window."""
 NEWEST, NEWEST_SIGMAS = 3, 2.0
-"""So many last measurements may not lie off the rest by so much in the median: a pose is that of
-the end of its window, and there a burst and odometry that has just failed look alike."""
+"""So many last measurements may not lie off the rest by so much in the median: near the end of a
+window a burst and odometry that has just failed look alike."""
 MAX_SIGMA_M, MAX_SIGMA_RAD = 1.5, 0.5
 """A pose known worse than this helps nobody."""
 LEAST_DAMPING = 1e-12
@@ -99,7 +99,8 @@ def solve(window: Window, noise: Noise, delta: float) -> Estimate:
     if len(window) < 6:
         return Estimate(Verdict.TOO_FEW)
     a, b = window.a_points, window.b_points
-    rho = max(0.1, float(np.median(window.ranges[-3:])))
+    nearest = np.argsort(np.abs(window.t), kind="stable")[:3]
+    rho = max(0.1, float(np.median(window.ranges[nearest])))
     candidates = coarse_search.seeds(a, b, window.ranges, rho, delta, SEEDS)
     candidates = refine(a, b, window.ranges, candidates, noise.ranges)
     judged = [_judge(window, noise, candidates[k]) for k in _distinct(candidates)]
@@ -211,9 +212,10 @@ def _judge(window: Window, noise: Noise, pose: Array) -> Hypothesis:
         size = np.abs(e - level) / noise.ranges.sigma
         weights = np.minimum(1.0, ROBUST_SIGMAS / np.maximum(size, 1e-9)) ** 2
         covariance = range_covariance(window.t, window.ranges, noise.ranges, weights)
-        covariance += odometry_covariance(a, window.a_poses[:, :2], u, noise.a)
+        before = window.before
+        covariance += odometry_covariance(a, window.a_poses[:, :2], u, noise.a, before)
         u_in_b = se2.rotate(-pose[2], u)
-        covariance += odometry_covariance(b, window.b_poses[:, :2], u_in_b, noise.b)
+        covariance += odometry_covariance(b, window.b_poses[:, :2], u_in_b, noise.b, before)
         # absurd odometry of a peer could round the smallest eigenvalue below zero
         covariance[np.diag_indices(len(e))] *= 1 + 1e-12
         factor = cho_factor(covariance, lower=True, check_finite=False)

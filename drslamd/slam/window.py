@@ -1,7 +1,8 @@
 """What module 1 sees: the ranges of one pair over a few seconds, and both odometries under them.
 
-Everything is expressed from the latest poses of both robots (equation 1 of the paper uses
-``x_t^-1 x_i``): measurement i was taken while a stood at ``a_T_ai`` and b at ``b_T_bi``.
+Everything is expressed from the poses of both robots at one reference time: the latest in the paper
+(equation 1 uses ``x_t^-1 x_i``), a little earlier by default, so that what comes after it can
+contradict it. Measurement i was taken while a stood at ``a_T_ai`` and b at ``b_T_bi``.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ class Window:
     """n measurements, oldest first.
 
     Attributes:
-        t: (n,) seconds before the reference time, not positive.
+        t: (n,) seconds after the reference time, ascending; mostly negative.
         ranges: (n,) metres, antenna to antenna.
         a_poses: (n, 3) a_T_ai, body of a at measurement i in its body at the reference time.
         b_poses: (n, 3) b_T_bi.
@@ -36,6 +37,11 @@ class Window:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    @property
+    def before(self) -> int:
+        """How many measurements lie before the reference time, or at it."""
+        return int(np.searchsorted(self.t, 0.0, side="right"))
 
     @property
     def a_points(self) -> Array:

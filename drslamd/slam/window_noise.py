@@ -56,19 +56,37 @@ def range_covariance(t: Array, ranges: Array, noise: RangeNoise, weights: Array)
 
 
 def odometry_covariance(
-    points: Array, path: Array, directions: Array, noise: OdometryNoise
+    points: Array, path: Array, directions: Array, noise: OdometryNoise, before: int | None = None
 ) -> Array:
     """(n, n): what the noise of one robot's odometry does to the residuals.
 
     Args:
-        points: (n, 2) antenna at each measurement, in the body frame at the last one.
+        points: (n, 2) antenna at each measurement, in the body frame at the reference time.
         path: (n, 2) body positions in the same frame, between which the noise arises.
         directions: (n, 2) unit vectors along the line of sight, in the same frame.
+        before: how many of them lie before the reference time; all of them when left out.
     """
     n = len(points)
-    step = np.hypot(*np.diff(path, axis=0, append=path[-1:]).T)
-    middle = (path + np.roll(path, -1, axis=0)) / 2
-    middle[-1] = path[-1]
+    k = n if before is None else before
+    covariance, bend = np.zeros((n, n)), np.zeros(n)
+    # what is random before the reference time is another noise than what is random after it, where
+    # the same holds backwards and a yaw error turns the other way
+    for side, sign in ((np.arange(k), 1.0), (np.arange(n - 1, k - 1, -1), -1.0)):
+        if len(side):
+            random, turn = _one_side(points[side], path[side], directions[side], noise)
+            covariance[np.ix_(side, side)], bend[side] = random, sign * turn
+    stretch = np.sum(directions * path, axis=1) * noise.scale
+    return np.asarray(covariance + np.outer(stretch, stretch) + np.outer(bend, bend))
+
+
+def _one_side(
+    points: Array, path: Array, directions: Array, noise: OdometryNoise
+) -> tuple[Array, Array]:
+    """Random part (n, n), and the effect (n,) of one sigma of the yaw rate; reference last."""
+    n = len(points)
+    following = np.concatenate([path[1:], np.zeros((1, 2))])
+    step = np.hypot(*(following - path).T)
+    middle = (path + following) / 2
     # a yaw error on step j swings every earlier point about the middle of that step
     earlier = np.tri(n).T
     across = np.stack([directions[:, 1], -directions[:, 0]], axis=-1)
@@ -77,6 +95,4 @@ def odometry_covariance(
     to_go = np.cumsum(step[::-1])[::-1]
     later = np.minimum(to_go[:, None], to_go[None, :])
     shift = later * (directions @ directions.T) * noise.translation_per_sqrt_m**2
-    stretch = np.sum(directions * path, axis=1) * noise.scale
-    bend = swing @ step * noise.yaw_rad_per_m
-    return np.asarray(yaw + shift + np.outer(stretch, stretch) + np.outer(bend, bend))
+    return np.asarray(yaw + shift), np.asarray(swing @ step * noise.yaw_rad_per_m)

@@ -321,3 +321,19 @@ def test_the_same_burst_in_the_middle_does_no_harm() -> None:
     estimate = solved(with_ranges(window, ranges))
     assert estimate.verdict is Verdict.UNIQUE
     assert same_pose(estimate.hypotheses[0].a_T_b, true, 0.3)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
+def test_the_pose_is_that_of_the_reference_time_and_later_ranges_count(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    a, b = wander(rng, 60, 0.25), wander(rng, 60, 0.25) + [9.0, 0, 0]
+    window, _ = window_of(a, b)
+    earlier = replace(
+        window,
+        t=window.t - window.t[-5],
+        a_poses=se2.between(window.a_poses[-5], window.a_poses),
+        b_poses=se2.between(window.b_poses[-5], window.b_poses),
+    )
+    assert (window.before, earlier.before) == (60, 56)
+    true = se2.between(a[-5], b[-5])
+    assert same_pose(solved(earlier).hypotheses[0].a_T_b, true, 1e-6)

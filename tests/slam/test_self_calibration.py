@@ -45,8 +45,8 @@ def test_a_calibrated_window_gives_the_exact_pose(seed: int) -> None:
     window, true = uncalibrated(seed)
     better = solve(*calibrated(window, SENSORS, KNOWN), 0.1)
     assert same_pose(better.hypotheses[0].a_T_b, true, 1e-6)
-    before = solve(window, SENSORS, 0.1)
-    assert not same_pose(before.hypotheses[0].a_T_b, true, 0.1)
+    before = solve(window, SENSORS, 0.1).hypotheses
+    assert not before or not same_pose(before[0].a_T_b, true, 0.1)
 
 
 def test_what_was_never_measured_changes_nothing() -> None:
