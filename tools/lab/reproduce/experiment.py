@@ -30,7 +30,7 @@ PAIRS = ((0, 1), (0, 2), (1, 2))
 POSE_TIMES = np.arange(20.0, 353.0)
 """Seconds at which poses are scored: as many as the paper has (333 per pair), each with the longest
 window of table I behind it."""
-TYPICAL_SEED = 7
+TYPICAL_SEED = 2
 """Of the first twenty the one whose odometry is nearest to the paper's: shown in pictures and where
 there is time for one only."""
 GRID_S = 0.1

@@ -72,7 +72,8 @@ def heat_maps(data: Trial, path: Path) -> None:
         window, (angles, cost) = windows[at], maps[at]
         axes[row, 0].plot(*window.a_points.T, label="robot a, in its own frame")
         axes[row, 0].plot(*window.b_points.T, label="robot b, in its own frame")
-        axes[row, 0].set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title=f"{words}: odometry")
+        axes[row, 0].set_aspect("equal", adjustable="datalim")
+        axes[row, 0].set(xlabel="x [m]", ylabel="y [m]", title=f"{words}: odometry")
         axes[row, 0].legend()
         span = (angles[0], angles[-1], angles[0], angles[-1])
         image = axes[row, 1].imshow(cost.T, origin="lower", extent=span, aspect="auto")
