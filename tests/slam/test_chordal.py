@@ -77,6 +77,30 @@ def test_a_start_that_is_far_off_ends_in_a_minimum_as_well() -> None:
     assert answer.cost == pytest.approx(solver.solve().cost, rel=1e-8)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_no_start_is_so_wild_that_the_cost_rises(seed: int) -> None:
+    edges = graph(30, 30, 0.05, seed)
+    solver = PoseGraph(edges, 30)
+    start = np.random.default_rng(seed).normal(0, 4, (30, 3))
+    answer = solver.solve(start, most=500)
+    assert answer.converged
+    assert answer.cost < solver.cost(start)
+    # a minimum, though perhaps not the least: no direction leads down
+    slopes = [solver.cost(answer.poses + step.reshape(30, 3)) for step in 1e-4 * np.eye(90)]
+    assert min(slopes) > answer.cost * (1 - 1e-7)
+
+
+def test_near_the_minimum_a_few_steps_are_enough_however_large_the_noise() -> None:
+    """Newton's Hessian takes five from here, that of Gauss and Newton many more."""
+    edges = graph(100, 100, 0.3, 4)
+    solver = PoseGraph(edges, 100)
+    there = solver.solve(tolerance=1e-12)
+    start = there.poses + np.random.default_rng(1).normal(0, 0.02, (100, 3))
+    answer = solver.solve(start)
+    assert answer.steps <= 5
+    assert answer.cost == pytest.approx(there.cost, rel=1e-9)
+
+
 def test_a_cost_that_is_stated_falls_with_every_pose_that_moves() -> None:
     edges = graph(30, 20, 0.05, 5)
     solver = PoseGraph(edges, 30)

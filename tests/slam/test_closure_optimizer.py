@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from slam_scenes import Array, closure, config, inverted, product, small_team
+from slam_scenes import (
+    NOISE,
+    Array,
+    closure,
+    config,
+    driven,
+    inverted,
+    keyframes,
+    product,
+    small_team,
+    traits_of,
+    wander,
+)
 
-from drslamd.conventions import GRID_US, Segment
+from drslamd.conventions import GRID_US, Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.closure_optimizer import Closures
 from drslamd.slam.estimate import TeamEstimate
+from drslamd.slam.graph_edges import chain_links
 from drslamd.slam.items import GraphEntry, RelativePoses
 from drslamd.slam.pose_graph import TeamGraph
 from drslamd.slam.team_frame import Group
@@ -70,8 +85,39 @@ def test_from_the_last_estimate_it_is_the_same_and_sooner_there() -> None:
     team.close(900, 1, 20, team.true(1, 20), 0.02)
     again, warm = team.solved(), team.solved(cold)
     assert warm.cost == pytest.approx(again.cost, rel=1e-6)
+    assert warm.iterations < again.iterations
     for robot, trajectory in again.trajectories.items():
         assert np.allclose(warm.trajectories[robot].poses, trajectory.poses, atol=1e-4)
+
+
+def test_an_estimate_that_went_astray_as_a_whole_comes_back_into_its_frame() -> None:
+    team = Team(6)
+    there = team.solved()
+    astray = {
+        r: replace(t, poses=se2.compose(np.array([[3.0, -1.0, 0.5]]), t.poses))
+        for r, t in there.trajectories.items()
+    }
+    again = team.solved(replace(there, trajectories=astray))
+    for robot, trajectory in there.trajectories.items():
+        off = again.trajectories[robot].poses - trajectory.poses
+        assert np.abs(off[:, :2]).max() < 1e-3
+        assert np.abs(se2.wrap(off[:, 2])).max() < 1e-3
+
+
+def test_beside_a_single_closure_a_heading_is_as_uncertain_as_its_odometry() -> None:
+    rng = np.random.default_rng(7)
+    graph, n = TeamGraph(), 10 * np.arange(COUNT)
+    one, other = Chain(0, 1), Chain(1, 1)
+    for chain in (one, other):
+        odometry = driven(rng, wander(rng, COUNT, 0.4), NOISE)
+        graph.insert(chain, GraphEntry(0, traits_of(NOISE), keyframes(n, odometry)))
+    only = closure(0, 100, other, 100, np.array([1.0, 2.0, 0.5]))
+    graph.insert(one, GraphEntry(1, closures=(only,)))
+    members = {Segment(*one, 0), Segment(*other, 0)}
+    job = Closures(config(), one).job(graph, Group(members, min(members), {}), None, {})
+    assert job is not None
+    links = chain_links(graph.chains[0], calibrated=False).covariance[:, 2, 2].sum()
+    assert job().covariances[0][2, 2] == pytest.approx(links, rel=1e-4)
 
 
 def test_two_closures_between_the_same_keyframes_both_count() -> None:
