@@ -48,7 +48,7 @@ def by_scipy(edges: ComplexEdges, start: Array) -> float:
         return np.concatenate([turn.real, turn.imag, move.real, move.imag])
 
     x = start[:, [2, 0, 1]].ravel()
-    found = least_squares(residuals, x, xtol=1e-14, ftol=1e-14, gtol=1e-12)
+    found = least_squares(residuals, x, method="lm", xtol=1e-14, ftol=1e-14)
     return float(2 * found.cost)
 
 
@@ -77,17 +77,18 @@ def test_a_start_that_is_far_off_ends_in_a_minimum_as_well() -> None:
     assert answer.cost == pytest.approx(solver.solve().cost, rel=1e-8)
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_no_start_is_so_wild_that_the_cost_rises(seed: int) -> None:
+@pytest.mark.parametrize("seed", range(4))
+def test_no_start_is_so_wild_that_the_cost_ever_rises(seed: int) -> None:
     edges = graph(30, 30, 0.05, seed)
     solver = PoseGraph(edges, 30)
     start = np.random.default_rng(seed).normal(0, 4, (30, 3))
+    costs = [solver.cost(start)] + [solver.solve(start, most=k).cost for k in range(1, 40)]
+    assert np.diff(costs).max() <= 1e-9 * costs[0]
     answer = solver.solve(start, most=500)
     assert answer.converged
-    assert answer.cost < solver.cost(start)
     # a minimum, though perhaps not the least: no direction leads down
-    slopes = [solver.cost(answer.poses + step.reshape(30, 3)) for step in 1e-4 * np.eye(90)]
-    assert min(slopes) > answer.cost * (1 - 1e-7)
+    around = [solver.cost(answer.poses + step.reshape(30, 3)) for step in 1e-4 * np.eye(90)]
+    assert min(around) > answer.cost * (1 - 1e-7)
 
 
 def test_near_the_minimum_a_few_steps_are_enough_however_large_the_noise() -> None:
