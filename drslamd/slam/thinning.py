@@ -1,13 +1,13 @@
 """Old keyframes are thinned, so that a graph stays bounded however long the team drives.
 
-The last minutes keep every keyframe. Before them, each time the age doubles the keyframes stand four
-times farther apart: all that is older than `recent` adds at most half as many again. What was
+The last minutes keep every keyframe. Before them, each time the age doubles the keyframes stand
+four times farther apart: all that is older than `recent` adds at most half as many again. What was
 measured at a keyframe that goes is carried to the one before it by odometry, and is as much more
-uncertain as the way was long. So later closures still move old times, as stiff pieces that grow with
-their age.
+uncertain as the way was long. So later closures still move old times, as stiff pieces that grow
+with their age.
 
-Which keyframes stay follows from their numbers and the age of the newest alone: robots that hold the
-same items thin them to the same.
+Which keyframes stay follows from their numbers and the age of the newest alone: robots that hold
+the same items thin them to the same.
 """
 
 from __future__ import annotations

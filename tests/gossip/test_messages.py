@@ -44,10 +44,11 @@ log_states = st.builds(
     lambda robot, epoch, numbers: LogState(robot, epoch, *sorted(numbers)),
     robots, i64, st.tuples(n32, n32, n32),
 )  # fmt: skip
+heard = st.builds(Heard, robots, i64, i64, st.integers(-1, 2**31 - 1))
 statuses = st.builds(
     Status,
     st.integers(0, 1), robots, st.booleans(), st.integers(0, 2**32 - 1), i64, i64,
-    st.lists(st.builds(Heard, robots, i64, i64, st.integers(-1, 2**31 - 1)), max_size=28).map(tuple),
+    st.lists(heard, max_size=28).map(tuple),
     st.lists(robots, max_size=28).map(tuple),
     st.lists(log_states, max_size=28).map(tuple),
 )  # fmt: skip

