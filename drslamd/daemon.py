@@ -21,7 +21,7 @@ import structlog
 
 from drslamd import report
 from drslamd.config import Config, ConfigError, DbcSection, SerialWheelSection
-from drslamd.conventions import SECOND_US
+from drslamd.conventions import MILLISECOND_US, SECOND_US
 from drslamd.events import (
     Effect,
     Event,
@@ -85,7 +85,7 @@ class Daemon:
             socket_path(config),
             {
                 "status": lambda: {**report.status(self.robot, self._clock.now()),
-                                   "ms": self._milliseconds()},
+                                   "ms": self._milliseconds(), "loop_lag_ms": self._lag()},
                 "trajectory": lambda: report.trajectories(self.robot),
                 "closures": lambda: report.closures(self.robot),
             },
@@ -95,7 +95,10 @@ class Daemon:
         self._jobs_waiting = 0
         self._solver_moved = 0
         self._timings: dict[str, deque[float]] = defaultdict(lambda: deque(maxlen=TIMINGS))
+        self._lags: deque[float] = deque(maxlen=TIMINGS)
+        """How late ticks were, ms."""
         self._timer: asyncio.TimerHandle | None = None
+        self._due = 0
         self._stop = asyncio.Event()
         self._failure: BaseException | None = None
         self._carry_out: dict[type[Any], Callable[[Any], None]] = {
@@ -153,13 +156,19 @@ class Daemon:
 
     def _wake(self) -> None:
         """Tick when the robot wants to be woken."""
-        loop = asyncio.get_running_loop()
+        due = self.robot.next_tick
+        if self._timer is not None and self._due == due:
+            return
         if self._timer is not None:
             self._timer.cancel()
-        wait_us = max(0, self.robot.next_tick - self._clock.now())
-        self._timer = loop.call_later(
-            wait_us / SECOND_US, lambda: self.handle(Tick(self._clock.now()))
-        )
+        wait_us = max(0, due - self._clock.now())
+        self._due = due
+        self._timer = asyncio.get_running_loop().call_later(wait_us / SECOND_US, self._tick)
+
+    def _tick(self) -> None:
+        self._timer, now = None, self._clock.now()
+        self._lags.append((now - self._due) / MILLISECOND_US)
+        self.handle(Tick(now))
 
     # ---- effects ----
 
@@ -279,6 +288,10 @@ class Daemon:
             return SerialPort("wheels", section.port, section.baud, self._clock, self.handle)
         require_python_can()
         return CanBus(section.can, self._clock, self.handle)
+
+    def _lag(self) -> dict[str, float]:
+        lags = self._lags or [0.0]
+        return {"median": float(np.median(lags)), "p99": float(np.percentile(lags, 99))}
 
     def _milliseconds(self) -> dict[str, dict[str, Any]]:
         return {

@@ -16,6 +16,7 @@ import numpy as np
 import scipy
 
 from lab.benchmark import (
+    daemon,
     graphs,
     growth,
     module1,
@@ -31,8 +32,8 @@ from lab.progress import Progress
 from lab.recording import BadRecording
 
 WORSE, NO_INPUT = 1, 66
-PARTS = {"1": module1, "2": module2, "3": module3, "all": pipeline, "traffic": traffic,
-         "growth": growth}  # fmt: skip
+PARTS = {"1": module1, "2": module2, "3": module3, "all": pipeline, "daemon": daemon,
+         "traffic": traffic, "growth": growth}  # fmt: skip
 EXAMPLES = """\
 examples:
   tools/benchmark                              all of it, some minutes
