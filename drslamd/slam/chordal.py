@@ -97,8 +97,10 @@ class PoseGraph:
             kept = factor is not None
             factor = factor or self._factor(point, newton, damping)
             trial, expected = self._stepped(point, factor) if factor else (point, 0.0)
-            if factor is None or not trial.cost <= point.cost * (1 + 1e-9) + 1e-12:
-                # an old factor, then Newton's Hessian, then too little damping is to blame
+            rises = not trial.cost <= point.cost * (1 + 1e-9) + 1e-12
+            if factor is None or rises or expected < -1e-12:
+                # an old factor, then Newton's Hessian (which a sparse factor does not tell to be
+                # indefinite), then too little damping is to blame
                 if not kept:
                     damping = damping if newton else max(10 * damping, LEAST_DAMPING)
                     newton = False
