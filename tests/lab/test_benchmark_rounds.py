@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lab.benchmark import distributed, graphs
+from lab.benchmark import distributed, graphs, module3
 from lab.benchmark.graphs import Graph, Known
 from scipy.optimize import least_squares
 
 from drslamd.slam import se2
+from drslamd.slam.chordal import PoseGraph
 
 Array = np.ndarray
 EACH, ROBOTS = 13, 3
@@ -92,3 +93,31 @@ def test_poses_of_one_time_are_neighbours(team: Graph) -> None:
     assert team.place[:2].tolist() == [0, ROBOTS]
     assert team.place[EACH] == 1
     assert np.abs(team.edges.i - team.edges.j).max() == ROBOTS
+
+
+def test_gtsam_solves_the_same_graph(team: Graph) -> None:
+    gtsam = pytest.importorskip("gtsam")
+    start = PoseGraph(team.edges, team.count).chordal_start()
+    found = module3.gtsam_solver(team, start)[module3.GTSAM]()
+    assert isinstance(found, gtsam.Values)
+    poses = [found.atPose2(k) for k in range(team.count)]
+    cost = PoseGraph(team.edges, team.count).cost(
+        np.array([(p.x(), p.y(), p.theta()) for p in poses])
+    )
+    # it weighs an angle once where the benchmark's cost counts it twice
+    assert -1e-9 < team.gap(cost) < 0.05
+
+
+def test_where_there_is_no_gtsam_the_rows_are_without_it(
+    team: Graph, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    rows = list(module3.in_space(team))
+    assert [row.peers for row in rows] == [(), ()]
+    assert rows[1].is_met
+
+
+def test_block_descent_comes_down_slowly(team: Graph) -> None:
+    few, many = (next(module3.block_descent(team, k)).value for k in (5, 200))
+    assert 0 < many < few / 10
+    assert many > 1e-12
