@@ -42,15 +42,17 @@ def play(
     extra: str = "",
     hardware: dict[int, Hardware] | None = None,
     progress: Callable[[float], None] | None = None,
+    solve_us: int | None = 20_000,
 ) -> Simulator:
     """Play the whole recording.
 
     Args:
         extra: TOML sections that every robot's configuration gets.
         progress: told the seconds that have passed.
+        solve_us: how long a computation takes there; None as long as it takes here.
     """
     rng = np.random.default_rng(seed)
-    simulator = Simulator(seed, network)
+    simulator = Simulator(seed, network, solve_us)
     for device in (hardware or equip(recording)).values():
         member = simulator.add(robot_config(device, extra), skewed_clock(rng), device)
         simulator.play(member, device.chunks())
