@@ -10,13 +10,11 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-from collections import defaultdict, deque
 from collections.abc import Callable, Coroutine
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import structlog
 
 from drslamd import report
@@ -40,6 +38,7 @@ from drslamd.io.can_bus import CanBus, require_python_can
 from drslamd.io.clock import Clock, MonotonicClock, wall_epoch
 from drslamd.io.liblcm import Liblcm, require_lcm
 from drslamd.io.multicast import Multicast
+from drslamd.io.pace import Pace
 from drslamd.io.serial_port import SerialPort
 from drslamd.io.state_store import StateStore, next_epoch, read_key
 from drslamd.io.status_socket import StatusSocket
@@ -52,8 +51,6 @@ JOB_STUCK_US = 20 * SECOND_US
 """A computation that takes longer is no progress, and the watchdog is not fed."""
 SERVICE_RUNTIME = Path("/run/drslamd")
 """RuntimeDirectory= of systemd/drslamd@.service."""
-TIMINGS = 1_000
-"""Durations that are kept for each module."""
 
 log = structlog.get_logger()
 
@@ -81,11 +78,13 @@ class Daemon:
         self._transport = self._make_transport()
         self._wheels = self._make_wheels()
         self._uwb = SerialPort("uwb", config.uwb.port, config.uwb.baud, self._clock, self.handle)
+        self._pace = Pace()
         self._status = StatusSocket(
             socket_path(config),
             {
                 "status": lambda: {**report.status(self.robot, self._clock.now()),
-                                   "ms": self._milliseconds(), "loop_lag_ms": self._lag()},
+                                   "ms": self._pace.milliseconds(),
+                                   "loop_lag_ms": self._pace.lag()},
                 "trajectory": lambda: report.trajectories(self.robot),
                 "closures": lambda: report.closures(self.robot),
             },
@@ -94,9 +93,6 @@ class Daemon:
         self._worker = Worker()
         self._jobs_waiting = 0
         self._solver_moved = 0
-        self._timings: dict[str, deque[float]] = defaultdict(lambda: deque(maxlen=TIMINGS))
-        self._lags: deque[float] = deque(maxlen=TIMINGS)
-        """How late ticks were, ms."""
         self._timer: asyncio.TimerHandle | None = None
         self._due = 0
         self._stop = asyncio.Event()
@@ -167,7 +163,7 @@ class Daemon:
 
     def _tick(self) -> None:
         self._timer, now = None, self._clock.now()
-        self._lags.append((now - self._due) / MILLISECOND_US)
+        self._pace.lags.append((now - self._due) / MILLISECOND_US)
         self.handle(Tick(now))
 
     # ---- effects ----
@@ -189,7 +185,7 @@ class Daemon:
             if finished.error is not None:
                 raise finished.error
             if robot is self.robot:
-                self._timings[effect.name].append(1e3 * finished.seconds)
+                self._pace.took(effect.name, 1e3 * finished.seconds)
                 elapsed = round(finished.seconds * SECOND_US)
                 self.handle(JobDone(self._clock.now(), effect.job_id, finished.result, elapsed))
 
@@ -288,20 +284,6 @@ class Daemon:
             return SerialPort("wheels", section.port, section.baud, self._clock, self.handle)
         require_python_can()
         return CanBus(section.can, self._clock, self.handle)
-
-    def _lag(self) -> dict[str, float]:
-        lags = self._lags or [0.0]
-        return {"median": float(np.median(lags)), "p99": float(np.percentile(lags, 99))}
-
-    def _milliseconds(self) -> dict[str, dict[str, Any]]:
-        return {
-            name: {
-                "median": float(np.median(ms)),
-                "p99": float(np.percentile(ms, 99)),
-                "all": [round(value, 3) for value in ms],
-            }
-            for name, ms in self._timings.items()
-        }
 
 
 def _note(note: Note) -> None:
