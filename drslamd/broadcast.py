@@ -2,7 +2,7 @@
 
 Most of a small datagram is its envelope, so what nobody needs is not said: odometry goes only to
 who makes closures with it and from the first sample that is lacked there, a heartbeat without news
-comes half as often, and a pose that moved less than it is uncertain waits for its second.
+comes a third as often, and a pose that moved less than it is uncertain waits for its second.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.neighbour import Neighbour
 from drslamd.slam.se2 import Array
 
-QUIET_US = 2 * SECOND_US
+QUIET_US = 3 * SECOND_US
 """Between heartbeats of a robot that is localised, lacks nothing and hears the same as before."""
 POSE_US = SECOND_US
 """Longest silence about the pose of a localised robot."""

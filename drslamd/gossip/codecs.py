@@ -89,20 +89,18 @@ def _fill_odometry(out: Any, m: OdometryBatch) -> None:
     change = np.diff(m.steps.astype(int), axis=0)
     too_long = np.flatnonzero((np.abs(change) > LONGEST_STEP).any(axis=1))
     first = int(too_long[-1]) + 1 if len(too_long) else 0
-    out.segment_start, out.n0, out.n = m.segment_start, m.n0 + first, len(m.steps) - first
+    out.segment_start, out.n0, out.n = m.segment_start, m.n0 + first, len(change) - first
     out.x0, out.y0, out.theta0 = (int(v) for v in m.steps[first])
-    out.dx, out.dy, out.dtheta = ([*column, 0] for column in change[first:].T.tolist())
+    out.dx, out.dy, out.dtheta = change[first:].T.tolist()
 
 
 def _read_odometry(raw: Any) -> OdometryBatch:
-    _bounded("samples", raw.n, 1, MAX_BATCH)
+    _bounded("differences", raw.n, 0, MAX_BATCH - 1)
     change = np.array([raw.dx, raw.dy, raw.dtheta], dtype=float).T
-    if change[-1].any():
-        raise ValueError("difference behind the last sample")
     if not 0 <= raw.segment_start <= raw.n0:
         raise ValueError("segment starts after its samples")
     first = np.array([[raw.x0, raw.y0, raw.theta0]], dtype=float)
-    steps = np.cumsum(np.concatenate([first, change[:-1]]), axis=0)
+    steps = np.cumsum(np.concatenate([first, change]), axis=0)
     return OdometryBatch(raw.segment_start, raw.n0, steps)
 
 

@@ -34,7 +34,7 @@ other and each only if nobody before it did."""
 PATIENCE = 3
 """Statuses in a row that may ask for the same entry; then the order moves on by one, because
 whoever has the first turn may be heard by the others and not by the one who asks."""
-OVERDUE_US = 2_500 * MILLISECOND_US
+OVERDUE_US = 3_500 * MILLISECOND_US
 """A status that is so late was lost; its sender then still lacks what it lacked before ..."""
 BELIEVED_US = 5 * SECOND_US
 """... for so long."""

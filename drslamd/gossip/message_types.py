@@ -17,12 +17,12 @@ UNKNOWN_CLOCK = -(2**63)
 NOTHING_WANTED = -1
 
 MAX_HEARD = 28
-"""Peers named in one status, which with as many logs has 1,365 bytes. Robots that hear more than
+"""Peers named in one status, which with as many logs has 1,361 bytes. Robots that hear more than
 this many others do not all learn that they are heard."""
 MAX_LOGS = 28
 """Logs named in one status; whoever holds more names them in turn."""
 MAX_BATCH = 150
-"""Odometry samples in one message: 15 s, 965 bytes."""
+"""Odometry samples in one message: 15 s, 955 bytes."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ VERSION = 1
 KEY_BYTES = 32
 TAG_BYTES = 8
 """A forger needs 2^63 tries, each of them a datagram."""
-_HEADER = struct.Struct(f">8sbhqqq{TAG_BYTES}s")
+_HEADER = struct.Struct(f">8sbhqiq{TAG_BYTES}s")
 """LCM's fingerprint, then header_t in LCM's order (big-endian, packed)."""
 _TAG_AT = _HEADER.size - TAG_BYTES
 _PUBLIC_KEY = b"drslamd without a team key      "

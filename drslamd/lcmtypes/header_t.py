@@ -15,7 +15,7 @@ class header_t(object):
 
     __slots__ = ["version", "origin", "epoch", "counter", "utime", "tag"]
 
-    __typenames__ = ["int8_t", "int16_t", "int64_t", "int64_t", "int64_t", "byte"]
+    __typenames__ = ["int8_t", "int16_t", "int64_t", "int32_t", "int64_t", "byte"]
 
     __dimensions__ = [None, None, None, None, None, [8]]
 
@@ -41,7 +41,7 @@ class header_t(object):
         self.counter = 0
         """
         of all messages of that epoch, from 1
-        LCM Type: int64_t
+        LCM Type: int32_t
         """
 
         self.utime = 0
@@ -64,7 +64,7 @@ class header_t(object):
         return buf.getvalue()
 
     def _encode_one(self, buf):
-        buf.write(struct.pack(">bhqqq", self.version, self.origin, self.epoch, self.counter, self.utime))
+        buf.write(struct.pack(">bhqiq", self.version, self.origin, self.epoch, self.counter, self.utime))
         buf.write(bytearray(self.tag[:8]))
 
     @staticmethod
@@ -80,14 +80,14 @@ class header_t(object):
     @staticmethod
     def _decode_one(buf):
         self = header_t()
-        self.version, self.origin, self.epoch, self.counter, self.utime = struct.unpack(">bhqqq", buf.read(27))
+        self.version, self.origin, self.epoch, self.counter, self.utime = struct.unpack(">bhqiq", buf.read(23))
         self.tag = buf.read(8)
         return self
 
     @staticmethod
     def _get_hash_recursive(parents):
         if header_t in parents: return 0
-        tmphash = (0xf3122206b645fa6f) & 0xffffffffffffffff
+        tmphash = (0x1dedddf949ba0731) & 0xffffffffffffffff
         tmphash  = (((tmphash<<1)&0xffffffffffffffff) + (tmphash>>63)) & 0xffffffffffffffff
         return tmphash
     _packed_fingerprint = None

@@ -12,7 +12,7 @@ import drslamd.lcmtypes
 class odometry_t(object):
     """
     Dead reckoning on the 10 Hz grid, from the first sample that a robot in range lacks and needs.
-    Sample k is pose (x0, y0, theta0) plus the first k differences; its time on the clock of
+    Sample k of n + 1 is pose (x0, y0, theta0) plus the first k differences; its time on the clock of
     the origin is (n0 + k) * 100 ms. Lengths in 0.1 mm, angles in 0.1 mrad, odometry frame.
     """
 

@@ -10,7 +10,7 @@ import struct
 import drslamd.lcmtypes
 
 class status_t(object):
-    """ Heartbeat, every second or two: who I am, whom I hear, what I hold. """
+    """ Heartbeat, every second, or every third without news: who I am, whom I hear, what I hold. """
 
     __slots__ = ["header", "state", "frame", "leaving", "uwb_id", "uwb_clock_us", "graph_hash", "n_heard", "heard", "n_ranged", "ranged", "n_logs", "logs"]
 

@@ -84,9 +84,9 @@ def resealed(
     """
     origin = struct.unpack_from(">h", payload, 9)[0] if origin_of_key is None else origin_of_key
     origin_key = blake2b(struct.pack(">h", origin), key=key, person=b"drslamd origin").digest()
-    untagged = payload[:35] + bytes(8) + payload[43:]
+    untagged = payload[:31] + bytes(8) + payload[39:]
     tag = blake2b(channel.encode() + b"\0" + untagged, digest_size=8, key=origin_key).digest()
-    return payload[:35] + tag + payload[43:]
+    return payload[:31] + tag + payload[39:]
 
 
 def forged(

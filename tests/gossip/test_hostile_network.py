@@ -80,10 +80,10 @@ def hostile(events: list[ChannelMessage]) -> Iterator[Datagram]:
             at = draw.choice([*range(4), *range(8, len(data))])
             flipped[at] ^= 1 << draw.randrange(8)
             yield Datagram(T0 + 1, bytes(flipped), "10.0.0.66")
-        for counter in (1, 100, 2**62, 2**63 - 1):
+        for counter in (1, 100, 2**30, 2**31 - 1):
             for epoch in (0, 11, 12, 2**63 - 1):
                 altered = bytearray(event.payload)
-                struct.pack_into(">qq", altered, 11, epoch, counter)
+                struct.pack_into(">qi", altered, 11, epoch, counter)
                 fake = resealed(event.channel, bytes(altered), OTHER_SECRET)
                 yield Datagram(T0 + 1, data[:header] + bytes(altered), "10.0.0.66")
                 yield Datagram(T0 + 1, data[:header] + fake, "10.0.0.66")

@@ -78,10 +78,6 @@ REFUSED: list[tuple[Any, ...]] = [
     ("STATUS", "logs", 0, "newest", 4),
     ("ODOMETRY", "segment_start", 41),
     ("ODOMETRY", "segment_start", -1),
-    ("ODOMETRY", "n", 2),
-    ("ODOMETRY", "n", 0),
-    ("ODOMETRY", "dx", (1, 2, 3)),
-    ("ODOMETRY", "dtheta", (0, 0, 1)),
     ("GRAPH", "seq", -1),
     ("GRAPH", "traits", (0.0, 1.0, 1.0, 1.0, 0.0, 0.0)),
     ("GRAPH", "traits", (1.0, 1.0, 1.0, 10.0, 0.0, 0.0)),
@@ -140,17 +136,17 @@ def test_a_value_beyond_its_bound_is_refused_with_a_phrase(case: tuple[Any, ...]
 
 
 COUNTS = {
-    "heard": ("STATUS", 43 + 28, ">h"),
-    "ranged": ("STATUS", 43 + 28 + 2 + 22, ">h"),
-    "logs": ("STATUS", 43 + 28 + 2 + 22 + 2 + 4, ">h"),
-    "samples": ("ODOMETRY", 43 + 20, ">h"),
-    "traits": ("GRAPH", 43 + 4, ">b"),
-    "keyframes": ("GRAPH", 43 + 5 + 24, ">h"),
-    "peers": ("GRAPH", 43 + 5 + 24 + 2 + 18, ">h"),
-    "ranges": ("GRAPH", 43 + 5 + 24 + 2 + 18 + 2 + 10, ">h"),
-    "closures": ("GRAPH", 43 + 5 + 24 + 2 + 18 + 2 + 10 + 2 + 23, ">h"),
-    "public poses": ("PUBLIC", 43 + 12, ">h"),
-    "values": ("PUBLIC", 43 + 14 + 8, ">i"),
+    "heard": ("STATUS", 39 + 28, ">h"),
+    "ranged": ("STATUS", 39 + 28 + 2 + 22, ">h"),
+    "logs": ("STATUS", 39 + 28 + 2 + 22 + 2 + 4, ">h"),
+    "samples": ("ODOMETRY", 39 + 20, ">h"),
+    "traits": ("GRAPH", 39 + 4, ">b"),
+    "keyframes": ("GRAPH", 39 + 5 + 24, ">h"),
+    "peers": ("GRAPH", 39 + 5 + 24 + 2 + 18, ">h"),
+    "ranges": ("GRAPH", 39 + 5 + 24 + 2 + 18 + 2 + 10, ">h"),
+    "closures": ("GRAPH", 39 + 5 + 24 + 2 + 18 + 2 + 10 + 2 + 23, ">h"),
+    "public poses": ("PUBLIC", 39 + 12, ">h"),
+    "values": ("PUBLIC", 39 + 14 + 8, ">i"),
 }
 """Where the counts stand in the messages of `kinds`, by the .lcm files."""
 
@@ -224,7 +220,7 @@ def is_judged(kind: str, payload: bytes) -> bool:
     head = CODECS[kind].struct.decode(payload).header
     header = Header(head.version, head.origin, head.epoch, head.counter, head.utime)
     again = messages.encode(header, message)
-    return bool(again[:35] + head.tag + again[43:] == payload)
+    return bool(again[:31] + head.tag + again[39:] == payload)
 
 
 @pytest.mark.parametrize("kind", CODECS)
@@ -239,7 +235,7 @@ def test_a_message_with_any_bit_flipped_is_refused_or_says_what_it_says(kind: st
 @pytest.mark.parametrize("kind", CODECS)
 def test_random_bytes_behind_a_fingerprint_are_judged(kind: str) -> None:
     draw = random.Random(kind)
-    head = messages.encode(HEADER, kinds()[kind])[:43]
+    head = messages.encode(HEADER, kinds()[kind])[:39]
     for _ in range(3_000):
-        kept = draw.choice([0, 8, 43])
+        kept = draw.choice([0, 8, 39])
         assert is_judged(kind, head[:kept] + draw.randbytes(draw.randrange(200)))

@@ -30,7 +30,7 @@ def test_in_a_crowd_nobody_measures_beyond_the_reach_of_the_radio(
 
 
 def test_traffic_is_counted_by_kind_and_is_what_the_robots_sent() -> None:
-    kinds, _ = traffic.sent(1, 45.0)
+    kinds, _ = traffic.sent(1, 60.0)
     assert set(kinds) == {"graph", "odometry", "pose", "status"}
     # a heartbeat a second or two of three robots, with the framing of LCM
-    assert 3 * 22 * 100 < kinds["status"] < 3 * 50 * 300
+    assert 3 * 20 * 100 < kinds["status"] < 3 * 65 * 300

@@ -52,11 +52,11 @@ def test_every_sample_of_odometry_is_said_once_while_nothing_is_lost(team: Virtu
         assert batch.n0 == before.n0 + len(before.steps)
 
 
-def test_a_heartbeat_without_news_comes_every_other_second(team: VirtualTeam) -> None:
+def test_a_heartbeat_without_news_comes_every_third_second(team: VirtualTeam) -> None:
     times = np.array([t for t, _ in sent(team, 1, "STATUS")])
     early, late = np.diff(times[times < 8]), np.diff(times[times > 30])
     assert early == pytest.approx(1.0, abs=0.05)
-    assert np.median(late) == pytest.approx(2.0, abs=0.05)
+    assert np.median(late) == pytest.approx(3.0, abs=0.05)
 
 
 def test_a_localised_robot_says_where_it_is_every_second(team: VirtualTeam) -> None:
