@@ -12,10 +12,13 @@ import os
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SUPPORTED = ("3.10", "3.11", "3.12", "3.13")
+SHOWN = 4_000
+"""Characters of the end of what another interpreter says."""
 
 EXAMPLES = """\
 examples:
@@ -64,30 +67,47 @@ def _run(name: str, *command: str) -> int:
     began = time.monotonic()
     print(f"== {name}", flush=True)
     code = subprocess.run(command, cwd=ROOT, check=False).returncode
-    print(f"== {name}: {'ok' if code == 0 else 'FAILED'}, {time.monotonic() - began:.0f} s",
-          flush=True)  # fmt: skip
+    _ended(name, code, began)
     return code
 
 
+def _ended(name: str, code: int, began: float) -> None:
+    verdict, seconds = "ok" if code == 0 else "FAILED", time.monotonic() - began
+    print(f"== {name}: {verdict}, {seconds:.0f} s", flush=True)
+
+
 def _other_interpreters() -> list[str]:
-    """The quick tests on every other supported interpreter; the names of those that failed."""
+    """The quick tests on every other supported interpreter, side by side; those that failed."""
     own = f"{sys.version_info.major}.{sys.version_info.minor}"
-    failed, absent = [], []
-    for version in SUPPORTED:
-        if version == own:
-            continue
-        found = _find(version)
-        if found is None:
-            absent.append(version)
-            continue
-        python = _environment(version, found)
-        if python is None or _run(
-            f"quick tests on Python {version}", python, "-m", "pytest", "-q", "-m", "not slow",
-            "-p", "no:cacheprovider",
-        ):  # fmt: skip
-            failed.append(f"Python {version}")
-    print(f"interpreters not found, so not tested: {', '.join(absent) or 'none'}")
-    return failed
+    others = {version: _find(version) for version in SUPPORTED if version != own}
+    found = {version: python for version, python in others.items() if python is not None}
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        codes = list(pool.map(_quick_tests_on, found, found.values()))
+    absent = ", ".join(version for version in others if version not in found)
+    print(f"interpreters not found, so not tested: {absent or 'none'}")
+    return [f"Python {v}" for v, code in zip(found, codes, strict=True) if code]
+
+
+def _quick_tests_on(version: str, python: str) -> int:
+    """In an environment of its own; what is said is printed at the end."""
+    began, folder = time.monotonic(), ROOT / ".venvs" / version
+    inside = str(folder / "bin" / "python")
+    steps = [
+        [inside, "-m", "pip", "install", "--quiet", "--disable-pip-version-check",
+         "--editable", f"{ROOT}[test]"],
+        [inside, "-m", "pytest", "-q", "-m", "not slow", "-p", "no:cacheprovider"],
+    ]  # fmt: skip
+    if not Path(inside).exists():
+        steps.insert(0, [python, "-m", "venv", str(folder)])
+    code = 0
+    for step in steps:
+        done = subprocess.run(step, cwd=ROOT, check=False, text=True, capture_output=True)
+        code = done.returncode
+        if code:
+            break
+    print(done.stdout[-SHOWN:] + (done.stderr[-SHOWN:] if code else ""))
+    _ended(f"quick tests on Python {version}", code, began)
+    return code
 
 
 def _find(version: str) -> str | None:
@@ -111,18 +131,6 @@ def _says(python: str) -> str:
     except (OSError, subprocess.TimeoutExpired):
         return ""
     return answer.stdout.strip()
-
-
-def _environment(version: str, python: str) -> str | None:
-    """An environment of its own for another interpreter; its python, or None."""
-    folder = ROOT / ".venvs" / version
-    inside = folder / "bin" / "python"
-    if not inside.exists() and _run(f"venv {version}", python, "-m", "venv", str(folder)):
-        return None
-    install = [str(inside), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    if _run(f"install for Python {version}", *install, "--editable", f"{ROOT}[test]"):
-        return None
-    return str(inside)
 
 
 if __name__ == "__main__":
