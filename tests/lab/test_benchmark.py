@@ -178,3 +178,12 @@ def test_missing_graphs_are_said_in_one_sentence(
     monkeypatch.setattr(timing, "pin", lambda: None)
     assert command.main(["--quick", "--module", "3"]) == 66
     assert "DRSLAMD_POSEGRAPHS" in capsys.readouterr().err
+
+
+def test_without_graphs_all_but_module_3_is_measured(
+    part: Fake, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(graphs, "FOLDER", tmp_path / "none")
+    monkeypatch.setattr(command, "PARTS", {"1": part, "3": None})
+    assert command.main(["--quick"]) == 0
+    assert "module 3 is left out" in capsys.readouterr().err
