@@ -24,6 +24,7 @@ from lab.benchmark import (
     module3,
     pipeline,
     rows,
+    sdp,
     timing,
     traffic,
 )
@@ -32,7 +33,7 @@ from lab.progress import Progress
 from lab.recording import BadRecording
 
 WORSE, NO_INPUT = 1, 66
-PARTS = {"1": module1, "2": module2, "3": module3, "all": pipeline, "daemon": daemon,
+PARTS = {"1": module1, "sdp": sdp, "2": module2, "3": module3, "all": pipeline, "daemon": daemon,
          "traffic": traffic, "growth": growth}  # fmt: skip
 EXAMPLES = """\
 examples:
