@@ -4,6 +4,11 @@ Ranges of one pair share a constant bias and a slowly varying part; what odometr
 way bends all earlier positions at once. With the covariance of the whole residual vector the pose
 is a generalised least-squares problem in three unknowns, its covariance is honest, and a longer
 window is never worse than a shorter one, because old measurements lose weight by themselves.
+
+What odometry adds up between the reference time and a measurement is a twist, and the nearer of two
+measurements shares all of its twist with the farther one. So the covariance of two residuals is a
+product of one vector of the farther and one of the nearer: the lower triangle of all of it is one
+matrix product of rank ten.
 """
 
 from __future__ import annotations
@@ -12,8 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drslamd.slam.odometry import OdometryNoise
+from drslamd.slam.odometry import OdometryNoise, growth
 from drslamd.slam.se2 import Array
+from drslamd.slam.window import Window
 
 SLOW_TIME_S = 2.5
 """Correlation time of the slow range bias (0.7 at 1 s, 0.45 at 2 s in LinkTrack recordings)."""
@@ -38,61 +44,120 @@ def near_bias(ranges: Array | float) -> Array:
     return np.asarray(NEAR_BIAS_M * np.exp(-np.maximum(ranges, 0.0) / NEAR_REACH_M))
 
 
-def range_covariance(t: Array, ranges: Array, noise: RangeNoise, weights: Array) -> Array:
+def range_covariance(t: Array, ranges: Array, noise: RangeNoise) -> Array:
     """(n, n): white, slow and constant parts, and what the bias does at short range.
 
     Args:
         t: (n,) s.
         ranges: (n,) m.
-        weights: (n,) in (0, 1], thin out outliers.
+        noise: sigmas.
     """
     slow = (SLOW_SHARE * noise.sigma) ** 2
     white = noise.sigma**2 - slow
-    lag = np.abs(t[:, None] - t[None, :]) / SLOW_TIME_S
     near = near_bias(ranges)
-    covariance = slow * np.exp(-lag) + noise.bias_sigma**2 + np.outer(near, near)
-    covariance[np.diag_indices(len(t))] += white + noise.sigma**2 * (1 / weights - 1)
+    covariance = np.exp(np.abs(t[:, None] - t) * (-1 / SLOW_TIME_S))
+    covariance *= slow
+    covariance += near[:, None] * near + noise.bias_sigma**2
+    covariance.ravel()[:: len(t) + 1] += white
     return np.asarray(covariance)
 
 
-def odometry_covariance(
-    points: Array, path: Array, directions: Array, noise: OdometryNoise, before: int | None = None
-) -> Array:
-    """(n, n): what the noise of one robot's odometry does to the residuals.
+def twists(path: Array, noise: OdometryNoise, before: int) -> Array:
+    """What the noise of one robot's odometry adds up to between measurements and reference time.
 
     Args:
-        points: (n, 2) antenna at each measurement, in the body frame at the reference time.
-        path: (n, 2) body positions in the same frame, between which the noise arises.
-        directions: (n, 2) unit vectors along the line of sight, in the same frame.
-        before: how many of them lie before the reference time; all of them when left out.
+        path: (n, 2) body positions in the body frame at the reference time, m; between them, and
+            between them and the origin, the noise arises.
+        noise: sigmas.
+        before: how many of them lie before the reference time.
+
+    Returns:
+        (5, 3, n): covariance (3, 3) of the random part of the twist [x, y, theta], the twist of one
+        sigma of the yaw rate, and that of one sigma of the scale. (A twist is the same from one
+        end to the other as back, but for its sign.)
     """
-    n = len(points)
-    k = n if before is None else before
-    covariance, bend = np.zeros((n, n)), np.zeros(n)
-    # what is random before the reference time is another noise than what is random after it, where
-    # the same holds backwards and a yaw error turns the other way
-    for side, sign in ((np.arange(k), 1.0), (np.arange(n - 1, k - 1, -1), -1.0)):
-        if len(side):
-            random, turn = _one_side(points[side], path[side], directions[side], noise)
-            covariance[np.ix_(side, side)], bend[side] = random, sign * turn
-    stretch = np.sum(directions * path, axis=1) * noise.scale
-    return np.asarray(covariance + np.outer(stretch, stretch) + np.outer(bend, bend))
+    track = np.concatenate([path[:before], np.zeros((1, 2)), path[before:]])
+    sums = growth(track).T
+    s, y, x_neg, yy, xy_neg, xx = np.delete(sums, before, axis=1) - sums[:, before : before + 1]
+    turn = np.where(s < 0, -1.0, 1.0) * noise.yaw_rad_per_sqrt_m**2
+    shift = np.abs(s) * noise.translation_per_sqrt_m**2
+    nothing = np.zeros(len(path))
+    return np.array(
+        [[turn * yy + shift, turn * xy_neg, turn * y],
+         [turn * xy_neg, turn * xx + shift, turn * x_neg],
+         [turn * y, turn * x_neg, turn * s],
+         [noise.yaw_rad_per_m * y, noise.yaw_rad_per_m * x_neg, noise.yaw_rad_per_m * s],
+         [noise.scale * path[:, 0], noise.scale * path[:, 1], nothing]]
+    )  # fmt: skip
 
 
-def _one_side(
-    points: Array, path: Array, directions: Array, noise: OdometryNoise
-) -> tuple[Array, Array]:
-    """Random part (n, n), and the effect (n,) of one sigma of the yaw rate; reference last."""
-    n = len(points)
-    following = np.concatenate([path[1:], np.zeros((1, 2))])
-    step = np.hypot(*(following - path).T)
-    middle = (path + following) / 2
-    # a yaw error on step j swings every earlier point about the middle of that step
-    earlier = np.tri(n).T
-    across = np.stack([directions[:, 1], -directions[:, 0]], axis=-1)
-    swing = (np.sum(across * points, axis=1)[:, None] - across @ middle.T) * earlier
-    yaw = (swing * (step * noise.yaw_rad_per_sqrt_m**2)) @ swing.T
-    to_go = np.cumsum(step[::-1])[::-1]
-    later = np.minimum(to_go[:, None], to_go[None, :])
-    shift = later * (directions @ directions.T) * noise.translation_per_sqrt_m**2
-    return np.asarray(yaw + shift), np.asarray(swing @ step * noise.yaw_rad_per_m)
+def moments(points: Array, directions: Array) -> Array:
+    """(..., 3, n): how a twist [x, y, theta] moves points along directions (complex, (..., n))."""
+    turned = (points.conj() * directions).imag
+    return np.stack([directions.real, directions.imag, turned], axis=-2)
+
+
+def odometry_covariance(twist: Array, moment: Array, before: int) -> Array:
+    """(k, n, n): what odometry noise does to the residuals; only the lower triangles are meant.
+
+    Args:
+        twist: (m, 5, 3, n) `twists` of m robots.
+        moment: (k, m, 3, n) `moments` of the antennas along the lines of sight.
+        before: how many measurements lie before the reference time.
+    """
+    k, n = len(moment), moment.shape[-1]
+    far = (twist * moment[:, :, None]).sum(axis=3)
+    near = far.copy()
+    # of two measurements before the reference time the first is the farther one; after it the
+    # noise is another, and the last is
+    near[:, :, :3, :before] = moment[..., :before]
+    constant = far[:, :, 3:].reshape(k, -1, n)
+    far[:, :, :3, before:] = moment[..., before:]
+    lower = far.reshape(k, -1, n).transpose(0, 2, 1) @ near.reshape(k, -1, n)
+    across = constant[:, :, before:].transpose(0, 2, 1) @ constant[:, :, :before]
+    lower[:, before:, :before] = across
+    return np.asarray(lower)
+
+
+class WindowNoise:
+    """The covariance of the residuals of one window, for any relative pose."""
+
+    def __init__(
+        self,
+        window: Window,
+        a_points: Array,
+        b_points: Array,
+        ranges: RangeNoise,
+        a: OdometryNoise,
+        b: OdometryNoise,
+    ) -> None:
+        """Noise of a window with antennas at a_points, b_points (n, 2), of its sensors."""
+        self.sigma = ranges.sigma
+        self._before = window.before
+        self._ranges = range_covariance(window.t, window.ranges, ranges)
+        self._points = np.stack([_complex(a_points), _complex(b_points)])
+        self._twists = np.stack(
+            [
+                twists(poses[:, :2], noise, self._before)
+                for poses, noise in ((window.a_poses, a), (window.b_poses, b))
+            ]
+        )
+
+    def covariance(self, u: Array, heading: Array, weights: Array) -> Array:
+        """(k, n, n), of which only the lower triangles are meant.
+
+        Args:
+            u: (k, n) unit lines of sight in frame a, complex.
+            heading: (k,) of b in frame a, complex.
+            weights: (k, n) in (0, 1], thin out outliers.
+        """
+        directions = np.stack([u, u * heading[:, None].conj()], axis=1)
+        moment = moments(self._points, directions)
+        covariance = odometry_covariance(self._twists, moment, self._before)
+        covariance += self._ranges
+        np.einsum("kii->ki", covariance)[:] += self.sigma**2 * (1 / weights - 1)
+        return covariance
+
+
+def _complex(points: Array) -> Array:
+    return np.asarray(points[:, 0] + 1j * points[:, 1])

@@ -10,7 +10,8 @@ import pytest
 from scipy.optimize import least_squares, minimize_scalar
 from slam_scenes import EXACT, NOISE, Array, matrix, same_pose, straight, wander, window_of
 
-from drslamd.slam import coarse_search, relative_pose, se2
+from drslamd.slam import coarse_search, range_fit, relative_pose, se2
+from drslamd.slam.range_fit import RangeFit, refine
 from drslamd.slam.relative_pose import Estimate, Noise, Verdict, residuals, solve
 from drslamd.slam.window import Window
 from drslamd.slam.window_noise import RangeNoise
@@ -242,7 +243,7 @@ def huber(window: Window, x: Array) -> Array:
 
 def cost_of(window: Window, x: Array) -> float:
     size = np.abs(huber(window, x))
-    limit = relative_pose.ROBUST_SIGMAS
+    limit = range_fit.ROBUST_SIGMAS
     return float(np.sum(np.where(size < limit, size**2, limit * (2 * size - limit))))
 
 
@@ -254,12 +255,17 @@ def minpack(window: Window, seeds: Array) -> Array:
     """The best pose and bias that scipy finds from the same seeds."""
     results = [
         least_squares(lambda x: huber(window, x), np.append(seed, 0.0), loss="huber",
-                      f_scale=relative_pose.ROBUST_SIGMAS)
+                      f_scale=range_fit.ROBUST_SIGMAS)
         for seed in seeds
     ]  # fmt: skip
     best = min(results, key=lambda result: float(result.cost))
     assert 2 * best.cost == pytest.approx(cost_of(window, best.x))
     return np.asarray(best.x)
+
+
+def refined(window: Window, seeds: Array) -> Array:
+    fit = RangeFit(window.a_points, window.b_points, window.ranges)
+    return fit.poses(refine(fit, fit.centred(seeds), SENSORS.ranges))
 
 
 def test_the_refinement_reaches_the_minima_of_minpack() -> None:
@@ -273,7 +279,7 @@ def test_the_refinement_reaches_the_minima_of_minpack() -> None:
         noisy = with_ranges(window, ranges)
         a, b = noisy.a_points, noisy.b_points
         seeds = coarse_search.seeds(a, b, ranges, max(0.1, float(ranges[-1])), DELTA, 8)
-        ours = relative_pose.refine(a, b, ranges, seeds, SENSORS.ranges)[0]
+        ours = refined(noisy, seeds)[0]
         theirs = minpack(noisy, seeds)
         assert cost_at_the_best_bias(noisy, ours) < cost_of(noisy, theirs) + 0.1
         near += same_pose(ours, theirs[:3], 0.02)
@@ -283,11 +289,9 @@ def test_the_refinement_reaches_the_minima_of_minpack() -> None:
 def test_a_seed_from_which_nothing_can_come_is_dropped() -> None:
     window, true = curved(0)
     seeds = np.array([true + [0.1, 0, 0], true * [-1, -1, 1] + [0, 0, 2.0]])
-    refined = relative_pose.refine(
-        window.a_points, window.b_points, window.ranges, seeds, SENSORS.ranges
-    )
-    assert len(refined) == 1
-    assert same_pose(refined[0], true, 1e-2)
+    minima = refined(window, seeds)
+    assert len(minima) == 1
+    assert same_pose(minima[0], true, 1e-2)
 
 
 def test_absurd_odometry_of_a_peer_raises_nothing() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from drslamd.slam import coarse_search, relative_pose
+from drslamd.slam.range_fit import RangeFit, refine
 from drslamd.slam.window import Window
 from lab.benchmark import timing, windows
 from lab.benchmark.rows import Peer, Row
@@ -67,7 +68,8 @@ def _refined(window: Window, seeds: int) -> Array:
     a, b = window.a_points, window.b_points
     rho = float(np.median(window.ranges[-3:]))
     found = coarse_search.seeds(a, b, window.ranges, rho, DELTA, seeds)
-    return relative_pose.refine(a, b, window.ranges, found, windows.NOISE.ranges)
+    fit = RangeFit(a, b, window.ranges)
+    return fit.poses(refine(fit, fit.centred(found), windows.NOISE.ranges))
 
 
 def grid(window: Window) -> Array:
