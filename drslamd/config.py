@@ -187,6 +187,9 @@ class RelativePoseSection(Section):
     range_sigma_m: Annotated[float, Field(gt=0, le=5)] = 0.10
     range_bias_sigma_m: Annotated[float, Field(gt=0, le=5)] = 0.30
     """How far the constant bias of a pair may be from zero before anything is measured."""
+    self_calibration: bool = True
+    """Take out what module 3 has learned of biases and odometry, now and before the last start;
+    `algorithm = "paper"` does not."""
 
 
 class ConsistencySection(Section):

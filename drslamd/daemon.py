@@ -46,6 +46,7 @@ from drslamd.io.systemd import Notifier
 from drslamd.io.transport import Transport
 from drslamd.io.worker import Finished, Worker
 from drslamd.robot import Robot
+from drslamd.slam.kept_calibration import Constants
 
 JOB_STUCK_US = 20 * SECOND_US
 """A computation that takes longer is no progress, and the watchdog is not fed."""
@@ -70,8 +71,9 @@ class Daemon:
         state = self._store.load()
         self._start_faults = [self._store.fault]
         epochs = {int(robot): int(epoch) for robot, epoch in state.get("epochs", {}).items()}
+        kept = Constants.of_state(state.get("calibration", {}))
         self._new_robot = partial(Robot, config, team_key(secret), dbc_text=_dbc_text(config))
-        self.robot = self._new_robot(next_epoch(state, wall_epoch()), epochs)
+        self.robot = self._new_robot(next_epoch(state, wall_epoch()), epochs, kept)
         # the new epoch is on disk before anything is sent under it
         self._store.save(self.robot.state())
         self._start_faults.append(self._store.fault)
@@ -194,7 +196,7 @@ class Daemon:
     def _restart(self, effect: Restart) -> None:
         """A new robot in the place of the old one; ports and network stay as they are."""
         old = self.robot
-        self.robot = self._new_robot(effect.epoch, old.team.seal.epochs)
+        self.robot = self._new_robot(effect.epoch, old.team.seal.epochs, old.memory.latest)
         for state in (*old.ports.values(), old.network):
             if state is not None:
                 self.handle(state)

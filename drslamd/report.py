@@ -136,7 +136,7 @@ def _pair(pair: Pair) -> dict[str, Any]:
 
 
 def _graph(robot: Robot) -> dict[str, Any]:
-    estimate = robot.back.estimate
+    estimate, learned, own = robot.back.estimate, robot.memory.latest, robot.own.robot
     out: dict[str, Any] = {
         "group": sorted({segment.robot for segment in robot.back.group}),
         "keyframes": {str(k): len(c.rows) for k, c in sorted(robot.back.graph.chains.items())},
@@ -147,9 +147,10 @@ def _graph(robot: Robot) -> dict[str, Any]:
             "iterations": estimate.iterations,
             "converged": estimate.converged,
             "range_bias_m": {
-                f"{a}-{b}": round(v.value, 4) for (a, b), v in estimate.bias_m.items()
+                f"{min(own, peer)}-{max(own, peer)}": round(bias.value, 4)
+                for peer, bias in learned.bias.items()
             },
-            "wheel_scale": {str(k): round(v.value, 5) for k, v in estimate.scale.items()},
+            "wheel_scale": {str(own): round(learned.scale.value, 5)},
         }
     return out
 

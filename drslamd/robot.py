@@ -50,6 +50,7 @@ from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.items import GraphEntry
+from drslamd.slam.kept_calibration import UNLEARNED, Constants, Memory
 from drslamd.slam.neighbour import Neighbour
 from drslamd.slam.pair import Pair
 from drslamd.slam.pair_window import Request
@@ -79,13 +80,15 @@ class Robot:
     """One robot of a team."""
 
     def __init__(
-        self, config: Config, key: bytes, epoch: int, epochs: dict[int, int], dbc_text: str = ""
-    ) -> None:
+        self, config: Config, key: bytes, epoch: int, epochs: dict[int, int],
+        kept: Constants = UNLEARNED, dbc_text: str = "",
+    ) -> None:  # fmt: skip
         """
         Args:
             key: of `seal.team_key`.
             epoch: of this start, above all earlier ones.
             epochs: last known epoch of each peer, from before this start.
+            kept: what the last start learned of our sensors.
             dbc_text: content of `wheels.dbc_file`, where there is one.
         """
         self.config = config
@@ -93,7 +96,8 @@ class Robot:
         self.uwb = LinkTrackInput(config.uwb_id, config.uwb.max_range_m)
         self.wheels = WheelInput(config.wheels, dbc_text)
         self.team = Team(Seal(key, config.robot.id, epoch, epochs))
-        self.front = FrontEnd(config, self.own)
+        self.memory = Memory(kept, config.relative_pose)
+        self.front = FrontEnd(config, self.own, self.memory.used)
         self.back = BackEnd(config, self.own)
         self.broadcast = Broadcast(config, self.team, self.front, self.back)
         self.health = Health()
@@ -258,6 +262,7 @@ class Robot:
             job.pair.settle(event.result)
             return []
         self.back.solved(event.result)
+        self.memory.update(self.back.estimate, self.own.robot, self.front.pairs)
         public = self.back.public_poses()
         sends = self.team.send_public(public, event.utime) if public else []
         return [*self.broadcast.pose(self.pose(), event.utime), *sends]
@@ -321,11 +326,13 @@ class Robot:
 
     def state(self) -> dict[str, Any]:
         """What must outlive this start."""
-        return {"epoch": self.own.epoch, "epochs": self.team.seal.epochs}
+        state = {"epoch": self.own.epoch, "epochs": self.team.seal.epochs}
+        return {**state, "calibration": self.memory.latest.state()}
 
     def _save(self, utime: int) -> list[Effect]:
-        if self.team.seal.epochs == self._saved_epochs:
+        if self.team.seal.epochs == self._saved_epochs and not self.memory.is_news():
             return []
+        self.memory.saved()
         self._saved_epochs = dict(self.team.seal.epochs)
         return [Save(self.state())]
 

@@ -1,4 +1,4 @@
-"""What a robot keeps over a restart: its epoch, the epochs of its peers, the team key.
+"""What a robot keeps over a restart: epochs, what it learned of its sensors, the team key.
 
 The file is replaced whole or not at all, so a power cut leaves the old one or the new one.
 """
@@ -14,6 +14,7 @@ from typing import Any
 
 from drslamd.config import ConfigError
 from drslamd.gossip.seal import KEY_BYTES
+from drslamd.slam import kept_calibration
 
 SCHEMA = 1
 
@@ -70,6 +71,7 @@ def _is_sound(state: dict[str, Any]) -> bool:
         isinstance(state.get("epoch", 0), int)
         and isinstance(epochs, dict)
         and all(robot.isdecimal() and isinstance(n, int) for robot, n in epochs.items())
+        and kept_calibration.is_sound(state.get("calibration", {}))
     )
 
 

@@ -87,7 +87,7 @@ def stated(
         start = Calibration(
             np.array([previous.bias_m.get(pair, Learned()).value for pair in pairs]),
             np.array([previous.scale.get(robot, Learned()).value for robot in robots]),
-            np.array([previous.yaw_rad_per_m.get(robot, 0.0) for robot in robots]),
+            np.array([previous.yaw.get(robot, Learned()).value for robot in robots]),
         )
     initial = np.zeros((len(numbers.n), 3))
     for segment, poses in team_frame.placed(graph, group, previous).items():
@@ -126,17 +126,22 @@ def _solve(team: Stated, group: Group) -> TeamEstimate:
             for chain in team.chains
         },
         {robot: solution.covariances[at] for robot, at in last.items()},
-        dict(zip(team.pairs, _measured(learned.bias, spread.bias, priors.bias), strict=True)),
-        dict(zip(robots, _measured(learned.scale, spread.scale, priors.scale), strict=True)),
-        dict(zip(robots, learned.yaw.tolist(), strict=True)),
+        dict(zip(team.pairs, _loosely(learned.bias, spread.bias, priors.bias), strict=True)),
+        dict(zip(robots, _loosely(learned.scale, spread.scale, priors.scale), strict=True)),
+        dict(zip(robots, _measured(learned.yaw, spread.yaw, priors.yaw**-2.0), strict=True)),
         solution.cost,
         solution.iterations,
         solution.converged,
     )
 
 
-def _measured(values: Array, sigmas: Array, prior: Array) -> list[Learned]:
-    """Values with the sigmas of what was measured of them, Cauchy's prior taken out."""
-    by_prior = 1 / (prior**2 * (1 + (values / prior) ** 2))
+def _loosely(values: Array, sigmas: Array, prior: Array) -> list[Learned]:
+    """`_measured` of what Cauchy's prior held."""
+    return _measured(values, sigmas, 1 / (prior**2 * (1 + (values / prior) ** 2)))
+
+
+def _measured(values: Array, sigmas: Array, by_prior: Array) -> list[Learned]:
+    """Values with the sigmas of what was measured of them, the information of priors taken out."""
     information = np.maximum(sigmas**-2.0 - by_prior, 1e-12)
-    return [Learned(*pair) for pair in zip(values.tolist(), information**-0.5, strict=True)]
+    sigma = (information**-0.5).tolist()
+    return [Learned(*pair) for pair in zip(values.tolist(), sigma, strict=True)]

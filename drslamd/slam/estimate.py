@@ -51,7 +51,8 @@ class TeamEstimate:
     """(3, 3) of each robot's last pose."""
     bias_m: dict[tuple[int, int], Learned] = field(default_factory=dict)
     scale: dict[int, Learned] = field(default_factory=dict)
-    yaw_rad_per_m: dict[int, float] = field(default_factory=dict)
+    yaw: dict[int, Learned] = field(default_factory=dict)
+    """rad/m"""
     cost: float = 0.0
     iterations: int = 0
     converged: bool = True

@@ -13,6 +13,7 @@ from drslamd.sensors.samples import Motion, RangeSample
 from drslamd.slam import relative_pose
 from drslamd.slam.estimate import TeamEstimate
 from drslamd.slam.items import ClosureItem, Keyframe, RangeItem
+from drslamd.slam.kept_calibration import UNLEARNED, Constants
 from drslamd.slam.neighbour import Neighbour
 from drslamd.slam.odometry import STEPS, DeadReckoning, OdometryNoise
 from drslamd.slam.pair import Checked, Pair
@@ -33,10 +34,15 @@ RANGES_FRESH_US = 3 * SECOND_US
 class FrontEnd:
     """What this robot measures, prepared for the graph."""
 
-    def __init__(self, config: Config, own: Chain) -> None:
+    def __init__(self, config: Config, own: Chain, known: Constants = UNLEARNED) -> None:
+        """
+        Args:
+            known: of our sensors, from before this start; it is taken out of what they say.
+        """
         self._config = config
         self._own = own
-        self.noise = OdometryNoise.from_config(config.odometry)
+        self._known = known
+        self.noise = self._known.narrowed(OdometryNoise.from_config(config.odometry))
         self.reckoning = DeadReckoning()
         self.ranges: dict[int, RangeBuffer] = {}
         self.pairs: dict[int, Pair] = {}
@@ -45,7 +51,7 @@ class FrontEnd:
         self._last: Keyframe | None = None
 
     def on_motion(self, motion: Motion) -> None:
-        self.reckoning.add(motion)
+        self.reckoning.add(self._known.corrected(motion))
 
     def on_range(self, sample: RangeSample) -> None:
         if sample.peer_uwb_id not in self.ranges:
@@ -123,6 +129,7 @@ class FrontEnd:
             if pair is None or pair.peer != peer.chain:
                 pair = self.pairs[robot] = Pair(self._config, peer.chain, ranges)
             pair.ranges = ranges
+            ranges.bias_m = self._known.bias_to(robot).value
             if peer.ahead_us is None:
                 pair.count("clock of the peer not known well enough")
             else:
@@ -147,20 +154,21 @@ class FrontEnd:
             if isinstance(window, str):
                 pair.count(window)
             else:
-                sensors = Sensors.of(estimate, self._own.robot, pair.peer.robot)
-                out.append((pair, window, self._computation(window, b.items.noise, sensors)))
+                out.append((pair, window, self._computation(pair, window, b, estimate)))
         return out
 
     def _computation(
-        self, what: Request, peer_noise: OdometryNoise, sensors: Sensors
+        self, pair: Pair, what: Request, b: Side, estimate: TeamEstimate | None
     ) -> Callable[[], Estimate]:
-        section = self._config.relative_pose
+        section, peer = self._config.relative_pose, pair.peer.robot
         if section.algorithm == "paper":
             return partial(
                 relative_pose.solve_paper, what.window, section.range_sigma_m, section.delta
             )
-        ranges = RangeNoise(section.range_sigma_m, section.range_bias_sigma_m)
-        noise = relative_pose.Noise(ranges, self.noise, peer_noise)
+        bias_sigma = self._known.bias_sigma(peer, section.range_bias_sigma_m)
+        ranges = RangeNoise(section.range_sigma_m, bias_sigma)
+        noise = relative_pose.Noise(ranges, self.noise, b.items.noise)
+        sensors = Sensors.of(estimate if section.self_calibration else None, self._own.robot, peer)
         return partial(relative_pose.solve, *calibrated(what.window, noise, sensors), section.delta)
 
     def module2(self, graph: TeamGraph) -> list[tuple[Pair, Callable[[], Checked]]]:

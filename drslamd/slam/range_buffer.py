@@ -24,6 +24,8 @@ class RangeBuffer:
         self._bin: list[tuple[int, float]] = []
         self.count = 0
         self.newest: int | None = None
+        self.bias_m = 0.0
+        """Known from an earlier start, and taken out of what is asked for."""
 
     def add(self, utime: int, range_m: float) -> None:
         if self._bin and utime // GRID_US != self._bin[0][0] // GRID_US:
@@ -41,7 +43,7 @@ class RangeBuffer:
     def between(self, first: int, last: int) -> Array:
         """(n, 2) utime and range with first < utime <= last."""
         rows = [*self._done, *((float(t), r) for t, r in self._bin)]
-        table = np.array(rows).reshape(-1, 2)
+        table = np.array(rows).reshape(-1, 2) - [0.0, self.bias_m]
         return np.asarray(table[(table[:, 0] > first) & (table[:, 0] <= last)])
 
     def is_fresh(self, utime: int, within_us: int) -> bool:

@@ -166,6 +166,11 @@ def test_an_epoch_from_a_clock_that_ran_ahead_is_not_reused(tmp_path: Path) -> N
         '{"schema": 1, "epoch": "seven"}',
         '{"schema": 1, "epoch": 7, "epochs": {"two": 3}}',
         '{"schema": 1, "epoch": 7, "epochs": [3]}',
+        '{"schema": 1, "epoch": 7, "calibration": 3}',
+        '{"schema": 1, "epoch": 7, "calibration": {"scale": [NaN, 0.01]}}',
+        '{"schema": 1, "epoch": 7, "calibration": {"scale": [0.9, 0.01]}}',
+        '{"schema": 1, "epoch": 7, "calibration": {"bias_m": {"2": [0.1]}}}',
+        '{"schema": 1, "epoch": 7, "calibration": {"bias_m": {"300": [0.1, 0.1]}}}',
     ],
 )
 def test_a_damaged_or_foreign_state_file_is_named_and_replaced(

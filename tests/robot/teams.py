@@ -12,6 +12,8 @@ from lab.recording import Recording
 from lab.simulator import Member, Network, Simulator
 from lab.virtual_team import outcome, skewed_clock
 
+from drslamd.slam.kept_calibration import UNLEARNED, Constants
+
 EASY = world.Scene(
     robots=3,
     seconds=60.0,
@@ -48,7 +50,13 @@ class VirtualTeam:
         for robot in on if on is not None else tuple(self.hardware):
             self.start(robot)
 
-    def start(self, robot: int, epoch: int = 1, epochs: dict[int, int] | None = None) -> Member:
+    def start(
+        self,
+        robot: int,
+        epoch: int = 1,
+        epochs: dict[int, int] | None = None,
+        kept: Constants = UNLEARNED,
+    ) -> Member:
         """Switch a robot on, now; its devices print from now on."""
         device = self.hardware[robot]
         secret = self._secrets.get(robot)
@@ -56,7 +64,7 @@ class VirtualTeam:
         if secret is not None:
             extra += '[team]\nkey_file = "team.key"\n'
         member = self.simulator.add(
-            robot_config(device, extra), self._clocks[robot], device, secret, epoch, epochs
+            robot_config(device, extra), self._clocks[robot], device, secret, epoch, epochs, kept
         )
         now = self.simulator.now / 1e6
         chunks = [c for c in device.chunks() if c.t >= now]

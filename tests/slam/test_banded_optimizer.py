@@ -78,7 +78,7 @@ def test_biases_are_named_by_their_pairs_and_scales_by_their_robots() -> None:
     assert estimate.bias_m[0, 1].value == pytest.approx(0.4, abs=0.2)
     assert estimate.bias_m[0, 2].value == pytest.approx(0.0, abs=0.2)
     assert estimate.bias_m[1, 2].value == pytest.approx(-0.3, abs=0.2)
-    assert set(estimate.scale) == set(estimate.yaw_rad_per_m) == {0, 1, 2}
+    assert set(estimate.scale) == set(estimate.yaw) == {0, 1, 2}
 
 
 def test_priors_are_those_of_the_robots_and_of_the_configuration() -> None:

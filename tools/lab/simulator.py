@@ -36,6 +36,7 @@ from drslamd.events import (
 from drslamd.gossip import lc02
 from drslamd.gossip.seal import team_key
 from drslamd.robot import Robot
+from drslamd.slam.kept_calibration import UNLEARNED, Constants
 from lab.playback import Chunk, Hardware
 
 
@@ -125,11 +126,12 @@ class Simulator:
         secret: bytes | None = None,
         epoch: int = 1,
         epochs: dict[int, int] | None = None,
+        kept: Constants = UNLEARNED,
     ) -> Member:
         """Switch a robot on, now."""
 
         def renew(fresh: int) -> Robot:
-            return Robot(config, team_key(secret), fresh, dict(epochs or {}))
+            return Robot(config, team_key(secret), fresh, dict(epochs or {}), kept)
 
         member = Member(renew(epoch), renew, clock or Clock(), hardware, Traces())
         self.members[config.robot.id] = member
