@@ -16,6 +16,7 @@ import numpy as np
 import scipy
 
 from lab.benchmark import (
+    curves,
     daemon,
     graphs,
     growth,
@@ -67,6 +68,8 @@ def main(arguments: list[str] | None = None) -> int:
     if options.json:
         written = {"machine": _machine(), "quick": options.quick, "rows": rows.to_json(found)}
         options.json.write_text(json.dumps(written, indent=1) + "\n")
+    if options.picture:
+        curves.draw(found, options.picture)
     worse = rows.regressions(found, stored)
     for sentence in worse:
         print(f"worse: {sentence}", file=sys.stderr)
@@ -90,6 +93,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--quick", action="store_true", help="fewer repetitions and graphs")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw what grows (.png, .svg)")
     parser.add_argument("--check", type=Path, metavar="FILE", help="compare with an earlier --json")
     parser.add_argument("--module", action="append", choices=list(PARTS), help="only this one")
     return parser

@@ -43,7 +43,8 @@ def by_hours(quick: bool) -> Iterator[Row]:
     first = 0.0
     for name, (ms, held) in _driven(marks).items():
         first = first or ms
-        yield Row(3, f"one more second after {name} of driving, {held} keyframes held", ms, "ms")
+        work = f"one more second after {name} of driving, {held} keyframes held"
+        yield Row(3, work, ms, "ms", curve=("hours of driving", marks[name] / 3600))
     yield Row(3, f"the same, {list(marks)[-1]} over {next(iter(marks))}", ms / first, "ratio",
               GOAL_RATIO)  # fmt: skip
 
@@ -159,8 +160,10 @@ def by_team_size(quick: bool) -> Iterator[Row]:
             for _, channel, payload in member.traces.sent
         )
         of = f"one of {robots} robots with {neighbours:.1f} neighbours each"
-        yield Row(0, f"{of}, share of a core", share, "ratio", MOST_OF_A_CORE)
-        yield Row(0, f"{of}, sent in a minute", sent / 1e6 / robots, "MB")
+        yield Row(0, f"{of}, share of a core", share, "ratio", MOST_OF_A_CORE,
+                  curve=("robots", robots))  # fmt: skip
+        yield Row(0, f"{of}, sent in a minute", sent / 1e6 / robots, "MB",
+                  curve=("robots in the team", robots))  # fmt: skip
 
 
 def crowd(robots: int) -> Recording:

@@ -36,6 +36,7 @@ class Row:
         unit: "ms", "s", "rounds", "MB", "ratio", "gap", or "share" and "closures", of which more
             is better.
         goal: to reach, None where the row only informs.
+        curve: the curve of `--picture` that the row is a point of, and its place on the axis.
     """
 
     module: int
@@ -45,6 +46,7 @@ class Row:
     goal: float | None = None
     p99: float | None = None
     peers: tuple[Peer, ...] = ()
+    curve: tuple[str, float] | None = None
 
     @property
     def name(self) -> str:
@@ -97,7 +99,14 @@ def from_json(data: list[dict[str, Any]]) -> list[Row]:
         KeyError, TypeError: it is not what `to_json` writes.
     """
     return [
-        Row(**{**item, "peers": tuple(Peer(**peer) for peer in item["peers"])}) for item in data
+        Row(
+            **{
+                **item,
+                "peers": tuple(Peer(**peer) for peer in item["peers"]),
+                "curve": tuple(item["curve"]) if item.get("curve") else None,
+            }
+        )
+        for item in data
     ]
 
 
