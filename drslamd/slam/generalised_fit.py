@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.linalg import get_lapack_funcs
 
@@ -9,53 +11,79 @@ from drslamd.slam.range_fit import PRIOR, ROBUST_SIGMAS, RangeFit, stepped
 from drslamd.slam.se2 import Array
 from drslamd.slam.window_noise import WindowNoise
 
-ROUNDS, STEPS = 3, 4
-"""The covariance hardly changes on the way: it is made anew after so many steps at most."""
-SETTLED = 1e-3
-"""A step below this (m, rad) is the last one."""
-SAME_NOISE = 0.1
-"""Nor does it change when a pose has moved by less than this (m, rad)."""
+STEPS, MADE = 8, 3
+"""At most, and how many times at most the covariance is made anew on the way."""
+SAME_SIGMAS, SAME_SIGHT = 0.5, 0.1
+"""It is the same while no residual and no line of sight (rad) has moved by more than this."""
+SETTLED, SETTLED_CHI2 = 1e-3, 1e-3
+"""A step below this (m, rad), or that promises less (2 log-likelihood), is the last one."""
 LONGEST = 0.5
 """m, rad: what one step may do."""
 
 _factorise, _solve = get_lapack_funcs(("potrf", "potrs"), dtype=np.float64)
 
 
-def judge(fit: RangeFit, noise: WindowNoise, centred: Array) -> tuple[Array, Array, Array]:
-    """Poses (k, 2), centred (see `RangeFit`), where the noise of the window puts them.
+class Judged(NamedTuple):
+    """k minima under the noise of the whole window.
 
-    Returns:
-        Poses (k, 2), their covariances (k, 3, 3) in parts of a step, and chi-squared (k,);
-        infinite where the covariance of the window is not one, which absurd odometry can bring
-        about.
+    Attributes:
+        centred: (k, 2) see `RangeFit`.
+        covariance: (k, 3, 3) in parts of a step.
+        chi2: (k,); infinite where the covariance of the window is not one, which absurd odometry
+            can bring about.
+        e: (k, n) predicted minus measured ranges.
     """
-    x = centred
-    for _ in range(ROUNDS):
+
+    centred: Array
+    covariance: Array
+    chi2: Array
+    e: Array
+
+    def best_first(self) -> Judged:
+        order = np.argsort(self.chi2, kind="stable")
+        return Judged(*(values[order] for values in self))
+
+
+def judge(fit: RangeFit, noise: WindowNoise, centred: Array) -> Judged:
+    """Where the noise of the window puts some minima (k, 2)."""
+    x, made = centred, 0
+    made_at: tuple[Array, Array] | None = None
+    for _ in range(STEPS):
         u, rows = fit.linear(x)
-        factors, sound = _factors(noise.covariance(u, x[:, 1], _weights(rows[:, 4], noise.sigma)))
-        moved = np.zeros(len(x))
-        for _ in range(STEPS):
-            normal = np.stack([r @ _solve(f, r.T)[0] for r, f in zip(rows, factors, strict=True)])
-            information = normal[:, :3, :3] + PRIOR * np.eye(3)
-            step = -np.linalg.solve(information, normal[:, :3, 4:])[..., 0]
-            size = np.abs(step).max(axis=1)
-            x = stepped(x, step * np.minimum(1.0, LONGEST / (size + 1e-12))[:, None])
-            moved += size
-            if (size < SETTLED).all():
-                break
-            rows = fit.linear(x)[1]
-        if (moved < SAME_NOISE).all():
+        e = rows[:, 4]
+        if made_at is None or (made < MADE and not _same(e, u, made_at, noise.sigma)):
+            factors, sound = _factors(noise.covariance(u, x[:, 1], _weights(e, noise.sigma)))
+            made_at, made = (e, u), made + 1
+        weighted = [_solve(f, r.T)[0] for r, f in zip(rows, factors, strict=True)]
+        normal = rows @ np.stack(weighted)
+        information = normal[:, :3, :3] + PRIOR * np.eye(3)
+        step = -np.linalg.solve(information, normal[:, :3, 4:])[..., 0]
+        promise = -(normal[:, 4, :3] * step).sum(axis=1)
+        size = np.abs(step).max(axis=1)
+        x = stepped(x, step * np.minimum(1.0, LONGEST / (size + 1e-12))[:, None])
+        if ((size < SETTLED) | (promise < SETTLED_CHI2)).all():
             break
-    chi2 = normal[:, 4, 4] + (normal[:, 4, :3] * step).sum(axis=1)
-    return x, np.linalg.inv(information), np.where(sound, chi2, np.inf)
+    chi2 = np.where(sound, normal[:, 4, 4] - promise, np.inf)
+    return Judged(x, np.linalg.inv(information), chi2, e)
+
+
+def _same(e: Array, u: Array, before: tuple[Array, Array], sigma: float) -> bool:
+    same = np.abs(e - before[0]) < SAME_SIGMAS * sigma
+    same &= np.abs(u - before[1]) < SAME_SIGHT
+    return bool(same.all())
+
+
+def middle(values: Array) -> Array:
+    """Median along the last axis."""
+    n = values.shape[-1]
+    ordered = np.sort(values, axis=-1)
+    return np.asarray((ordered[..., (n - 1) // 2] + ordered[..., n // 2]) / 2)
 
 
 def _weights(e: Array, sigma: float) -> Array:
     """(k, n): ranges lose weight that are far from the middle of all."""
-    n = e.shape[1]
-    middle = np.sort(e, axis=1)[:, (n - 1) // 2 : n // 2 + 1].mean(axis=1)
     beyond = ROBUST_SIGMAS * sigma
-    return np.asarray((beyond / np.maximum(np.abs(e - middle[:, None]), beyond)) ** 2)
+    return np.asarray((beyond / np.maximum(np.abs(e - middle(e)[:, None]), beyond)) ** 2)
 
 
 def _factors(covariance: Array) -> tuple[list[Array], Array]:

@@ -180,21 +180,24 @@ def growth(poses: Array) -> Array:
     """Sums along a chain from which the covariance between any two of its poses follows.
 
     Args:
-        poses: (k, 3) o_T_a, one chain without holes.
+        poses: (..., k, 3) o_T_a, chains without holes.
 
     Returns:
-        (k, 6): path length s, then the integrals over s of y, -x, y*y, -x*y and x*x.
+        (..., k, 6): path length s, then the integrals over s of y, -x, y*y, -x*y and x*x.
     """
-    place = poses[:, :2]
-    terms = _integrals(np.diff(place, axis=0), (place[1:] + place[:-1]) / 2)
-    return np.concatenate([np.zeros((1, 6)), np.cumsum(terms, axis=0)])
+    place = poses[..., :2]
+    before, after = place[..., :-1, :], place[..., 1:, :]
+    sums = np.zeros((*place.shape[:-1], 6))
+    np.cumsum(_integrals(after - before, (after + before) / 2), axis=-2, out=sums[..., 1:, :])
+    return sums
 
 
 def _integrals(way: Array, middle: Array) -> Array:
-    """(m, 6) the terms of `growth` over straight steps `way` (m, 2) about `middle` (m, 2)."""
-    x, y = middle[:, 0], middle[:, 1]
-    length = np.hypot(way[:, 0], way[:, 1])
-    return np.stack([np.ones_like(x), y, -x, y * y, -x * y, x * x], axis=-1) * length[:, None]
+    """(..., 6) the terms of `growth` over straight steps `way` (..., 2) about `middle` (..., 2)."""
+    x, y = middle[..., 0], middle[..., 1]
+    length = np.hypot(way[..., 0], way[..., 1])
+    terms = np.stack([np.ones_like(x), y, -x, y * y, -x * y, x * x], axis=-1)
+    return np.asarray(terms * length[..., None])
 
 
 def covariance_between(

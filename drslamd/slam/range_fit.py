@@ -15,7 +15,7 @@ from drslamd.slam.window_noise import RangeNoise
 
 STEPS = 14
 """Of the refinement at most; what is not settled then lies in a valley without an end."""
-SETTLED_CHI2 = 0.1
+SETTLED_CHI2 = 0.3
 """A step that promises less than this (2 log-likelihood) is not worth the next one."""
 HOPELESS, HOPELESS_CHI2 = 5.0, 60.0
 """A minimum that is worse by this factor and sum cannot come back under correlated noise."""
@@ -130,7 +130,7 @@ def refine(fit: RangeFit, seeds: Array, noise: RangeNoise) -> Array:
         bias = np.where(better, trial_bias, bias)
         cost = np.where(better, trial_cost, cost)
         normal = np.where(better[:, None, None], trial_normal, normal)
-        damping = damping * np.where(better, 0.2, 8.0)
+        damping *= np.where(better, 0.2, 8.0)
         hopeful = cost < cost.min() * HOPELESS + HOPELESS_CHI2
         if (settled | ~hopeful).all():
             break

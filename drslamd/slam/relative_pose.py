@@ -15,7 +15,7 @@ from enum import Enum
 import numpy as np
 
 from drslamd.slam import coarse_search, se2
-from drslamd.slam.generalised_fit import judge
+from drslamd.slam.generalised_fit import judge, middle
 from drslamd.slam.odometry import OdometryNoise
 from drslamd.slam.range_fit import LEAST_DAMPING, RangeFit, refine
 from drslamd.slam.se2 import Array
@@ -94,15 +94,13 @@ def solve(window: Window, noise: Noise, delta: float) -> Estimate:
     seeds = coarse_search.seeds(a, b, window.ranges, rho, delta, SEEDS)
     candidates = refine(fit, fit.centred(seeds), noise.ranges)
     candidates = candidates[_distinct(fit.poses(candidates))]
-    minima, spreads, chi2 = judge(
-        fit, WindowNoise(window, a, b, noise.ranges, noise.a, noise.b), candidates
-    )
-    order = np.argsort(chi2, kind="stable")
-    minima, spreads, chi2 = minima[order], spreads[order], chi2[order]
-    if chi2[0] > POOR_FIT * (len(window) - 3) or _end_is_off(fit, noise, minima[:1]):
+    window_noise = WindowNoise(window, a, b, noise.ranges, noise.a, noise.b)
+    judged = judge(fit, window_noise, candidates).best_first()
+    minima, chi2 = judged.centred, judged.chi2
+    if chi2[0] > POOR_FIT * (len(window) - 3) or _end_is_off(judged.e[0], noise):
         return Estimate(Verdict.POOR_FIT)
     poses, by_step = fit.poses(minima), fit.by_step(minima)
-    covariances = by_step @ spreads @ by_step.transpose(0, 2, 1)
+    covariances = by_step @ judged.covariance @ by_step.transpose(0, 2, 1)
     # under the full noise two candidates may have come to the same minimum
     kept = [k for k in _distinct(poses) if chi2[k] < chi2[0] + EXCLUDED_CHI2][:HYPOTHESES]
     if not all(_observable(covariances[k]) for k in kept):
@@ -111,10 +109,9 @@ def solve(window: Window, noise: Noise, delta: float) -> Estimate:
     return Estimate(Verdict.UNIQUE if len(kept) == 1 else Verdict.AMBIGUOUS, hypotheses)
 
 
-def _end_is_off(fit: RangeFit, noise: Noise, pose: Array) -> bool:
-    e = fit.linear(pose)[1][0, 4]
-    off = np.abs(e[-NEWEST:] - np.median(e))
-    return bool(np.median(off) > NEWEST_SIGMAS * noise.ranges.sigma)
+def _end_is_off(e: Array, noise: Noise) -> bool:
+    newest = np.abs(e[-NEWEST:] - middle(e))
+    return bool(middle(newest) > NEWEST_SIGMAS * noise.ranges.sigma)
 
 
 def _observable(covariance: Array) -> bool:
@@ -140,13 +137,12 @@ def residuals(poses: Array, a: Array, b: Array, ranges: Array) -> tuple[Array, A
 
 def _distinct(poses: Array) -> list[int]:
     """Which of the poses (k, 3), best first, are not near a better one."""
+    off = poses[:, None] - poses
+    near = np.hypot(off[..., 0], off[..., 1]) < MERGE_M
+    near &= np.abs(se2.wrap(off[..., 2])) < MERGE_RAD
     kept: list[int] = []
-    for k, pose in enumerate(poses):
-        off = poses[kept] - pose
-        near = (np.hypot(off[:, 0], off[:, 1]) < MERGE_M) & (
-            np.abs(se2.wrap(off[:, 2])) < MERGE_RAD
-        )
-        if not near.any():
+    for k, row in enumerate(near.tolist()):
+        if not any(row[other] for other in kept):
             kept.append(k)
     return kept
 

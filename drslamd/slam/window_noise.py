@@ -13,6 +13,7 @@ matrix product of rank ten.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,9 @@ SLOW_SHARE = 0.8
 NEAR_BIAS_M, NEAR_REACH_M = 0.20, 1.5
 """Modules misjudge strong signals: over 2 m and more their bias hardly moves, below 1 m it was off
 by 0.13 m in LinkTrack recordings (0.07 m at 1.5 m)."""
+
+_TERMS = np.array([[3, 4, 1], [4, 5, 2], [1, 2, 0], [1, 2, 0]])
+"""Where `growth` has the covariance of the twist that random yaw adds up to, and a twist of yaw."""
 
 
 @dataclass(frozen=True)
@@ -62,33 +66,38 @@ def range_covariance(t: Array, ranges: Array, noise: RangeNoise) -> Array:
     return np.asarray(covariance)
 
 
-def twists(path: Array, noise: OdometryNoise, before: int) -> Array:
-    """What the noise of one robot's odometry adds up to between measurements and reference time.
+def twists(paths: Array, noises: Sequence[OdometryNoise], before: int) -> Array:
+    """What the noise of odometry adds up to between measurements and reference time.
 
     Args:
-        path: (n, 2) body positions in the body frame at the reference time, m; between them, and
-            between them and the origin, the noise arises.
-        noise: sigmas.
-        before: how many of them lie before the reference time.
+        paths: (m, n, 2) body positions of m robots, each in its body frame at the reference time,
+            m; between them, and between them and the origin, the noise arises.
+        noises: sigmas of each robot.
+        before: how many measurements lie before the reference time.
 
     Returns:
-        (5, 3, n): covariance (3, 3) of the random part of the twist [x, y, theta], the twist of one
-        sigma of the yaw rate, and that of one sigma of the scale. (A twist is the same from one
+        (m, 5, 3, n): covariance (3, 3) of the random part of the twist [x, y, theta], the twist of
+        one sigma of the yaw rate, and that of one sigma of the scale. (A twist is the same from one
         end to the other as back, but for its sign.)
     """
-    track = np.concatenate([path[:before], np.zeros((1, 2)), path[before:]])
-    sums = growth(track).T
-    s, y, x_neg, yy, xy_neg, xx = np.delete(sums, before, axis=1) - sums[:, before : before + 1]
-    turn = np.where(s < 0, -1.0, 1.0) * noise.yaw_rad_per_sqrt_m**2
-    shift = np.abs(s) * noise.translation_per_sqrt_m**2
-    nothing = np.zeros(len(path))
-    return np.array(
-        [[turn * yy + shift, turn * xy_neg, turn * y],
-         [turn * xy_neg, turn * xx + shift, turn * x_neg],
-         [turn * y, turn * x_neg, turn * s],
-         [noise.yaw_rad_per_m * y, noise.yaw_rad_per_m * x_neg, noise.yaw_rad_per_m * s],
-         [noise.scale * path[:, 0], noise.scale * path[:, 1], nothing]]
-    )  # fmt: skip
+    m, n = paths.shape[:2]
+    track, there = np.zeros((m, n + 1, 2)), np.arange(n)
+    there[before:] += 1
+    track[:, there] = paths
+    sums = growth(track)
+    sums = (sums[:, there] - sums[:, before, None]).transpose(0, 2, 1)
+    of_robot = [(v.scale, v.yaw_rad_per_m, v.translation_per_sqrt_m, v.yaw_rad_per_sqrt_m)
+                for v in noises]  # fmt: skip
+    scale, bend, shift, turn = np.array(of_robot).T[..., None]
+    out = np.zeros((m, 5, 3, n))
+    out[:, :4] = sums[:, _TERMS]
+    out[:, :3] *= np.copysign(turn**2, sums[:, 0])[:, None, None]
+    shift = shift**2 * np.abs(sums[:, 0])
+    out[:, 0, 0] += shift
+    out[:, 1, 1] += shift
+    out[:, 3] *= bend[:, None]
+    out[:, 4, :2] = scale[:, None] * paths.transpose(0, 2, 1)
+    return out
 
 
 def moments(points: Array, directions: Array) -> Array:
@@ -136,12 +145,8 @@ class WindowNoise:
         self._before = window.before
         self._ranges = range_covariance(window.t, window.ranges, ranges)
         self._points = np.stack([_complex(a_points), _complex(b_points)])
-        self._twists = np.stack(
-            [
-                twists(poses[:, :2], noise, self._before)
-                for poses, noise in ((window.a_poses, a), (window.b_poses, b))
-            ]
-        )
+        paths = np.stack([window.a_poses[:, :2], window.b_poses[:, :2]])
+        self._twists = twists(paths, (a, b), self._before)
 
     def covariance(self, u: Array, heading: Array, weights: Array) -> Array:
         """(k, n, n), of which only the lower triangles are meant.

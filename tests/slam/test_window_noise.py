@@ -46,8 +46,8 @@ def of_one_robot(
     points: Array, path: Array, directions: Array, noise: OdometryNoise, before: int
 ) -> Array:
     moment = moments(points @ [1, 1j], directions @ [1, 1j])
-    twist = twists(path, noise, before)
-    return from_lower(odometry_covariance(twist[None], moment[None, None], before)[0])
+    twist = twists(path[None], [noise], before)
+    return from_lower(odometry_covariance(twist, moment[None, None], before)[0])
 
 
 def noisy_windows(

@@ -9,8 +9,9 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from drslamd.slam import coarse_search, relative_pose
+from drslamd.slam.pair_window import POINTS
 from drslamd.slam.range_fit import RangeFit, refine
-from drslamd.slam.window import Window
+from drslamd.slam.window import Window, binned
 from lab.benchmark import timing, windows
 from lab.benchmark.rows import Peer, Row
 from lab.recording import Array
@@ -60,8 +61,15 @@ def one_seed(window: Window) -> Array:
 
 
 def full(window: Window) -> relative_pose.Estimate:
-    """What the daemon asks of every window."""
-    return relative_pose.solve(window, windows.NOISE, DELTA)
+    """What the daemon does with every window: into bins, solved with a verdict."""
+    width = max(1.0 / windows.HZ, np.ptp(window.t) / POINTS)
+    t, ranges, _ = binned(window.t, window.ranges, float(width))
+    poses = [
+        np.stack([np.interp(t, window.t, values) for values in track.T], axis=-1)
+        for track in (window.a_poses, window.b_poses)
+    ]
+    thin = Window(t, ranges, poses[0], poses[1], window.a_antenna, window.b_antenna)
+    return relative_pose.solve(thin, windows.NOISE, DELTA)
 
 
 def _refined(window: Window, seeds: int) -> Array:
