@@ -11,8 +11,11 @@ connected group it stays below the cost of linearising.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
-from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.linalg import cholesky_banded
+from scipy.linalg.lapack import dtbtrs
 
 from drslamd.slam import se2
 from drslamd.slam.normal_equations import Equations, Layout, System
@@ -70,54 +73,101 @@ def solve(
     poses[:, 2] = se2.wrap(poses[:, 2])
     if not marginals:
         return Solution(poses, calibration, system.cost, steps, converged)
-    blocks = _marginals(system, layout.poses[list(marginals)])
+    factors = _Factors.of(system)
+    blocks = _marginals(factors, layout.poses[list(marginals)])
     covariances = dict(zip(marginals, blocks, strict=True))
-    spread = _spread(system, layout)
+    spread = _spread(factors, layout)
     return Solution(poses, calibration, system.cost, steps, converged, covariances, spread)
 
 
 def _step(system: System, damping: float) -> Array | None:
     """Step of all unknowns; None where rounding has made the system indefinite."""
-    band, corner = system.band.copy(), system.corner.copy()
-    band[0] *= 1 + damping
-    corner[np.diag_indices(len(corner))] *= 1 + damping
-    step = _solved(band, system.border, corner, -system.gradient[:, None])
-    return None if step is None else step[:, 0]
+    factors = _Factors.of(system, damping)
+    step = None if factors is None else factors.solved(-system.gradient)
+    return step if step is not None and np.isfinite(step).all() else None
 
 
-def _solved(band: Array, border: Array, corner: Array, right: Array) -> Array | None:
-    """Solution (n + b, c) for right-hand sides (n + b, c)."""
-    n = len(border)
+@dataclass(frozen=True)
+class _Factors:
+    """A system [A B; B' C] taken apart: A = L L', and what is left for the border.
+
+    Attributes:
+        lower: L in lower banded form.
+        halfway: (n, b) L^-1 B: half of the way is enough, since B' A^-1 B = (L^-1 B)' (L^-1 B).
+        schur: (b, b) C - B' A^-1 B, whose inverse is the covariance of the border.
+    """
+
+    lower: Array
+    halfway: Array
+    schur: Array
+
+    @staticmethod
+    def of(system: System, damping: float = 0.0) -> _Factors | None:
+        """None where the system is not positive definite."""
+        band, corner = system.band.copy(), system.corner.copy()
+        band[0] *= 1 + damping
+        corner[np.diag_indices(len(corner))] *= 1 + damping
+        try:
+            lower = cholesky_banded(band, lower=True, check_finite=False)
+        except np.linalg.LinAlgError:
+            return None
+        halfway, _ = dtbtrs(lower, system.border, uplo="L")
+        schur = corner - halfway.T @ halfway
+        # a tiny pivot of A can leave nothing of the border but rounding
+        definite = np.isfinite(schur).all() and bool((np.diag(schur) > 0).all())
+        return _Factors(lower, halfway, schur) if definite else None
+
+    def solved(self, right: Array) -> Array | None:
+        """(n + b,) the solution for a right-hand side (n + b,)."""
+        n = len(self.halfway)
+        middle = self.forward(right[:n, None])[:, 0]
+        try:
+            outer = np.linalg.solve(self.schur, right[n:] - self.halfway.T @ middle)
+        except np.linalg.LinAlgError:
+            return None
+        rest = (middle - self.halfway @ outer)[:, None]
+        inner, _ = dtbtrs(self.lower, rest, uplo="L", trans="T")
+        return np.concatenate([inner[:, 0], outer])
+
+    def forward(self, columns: Array) -> Array:
+        """L^-1 times columns (n, c)."""
+        solved, _ = dtbtrs(self.lower, columns, uplo="L")
+        return np.asarray(solved)
+
+
+def _marginals(factors: _Factors | None, wanted: Array) -> Array:
+    """(k, 3, 3) blocks of the inverse of the whole system for the unknowns (k, 3) of k poses."""
+    nothing = np.tile(UNKNOWN * np.eye(3), (len(wanted), 1, 1))
+    border = None if factors is None else _inverse(factors.schur)
+    if factors is None or border is None:
+        return nothing
+    n = len(factors.halfway)
+    inside = wanted[:, 0] < n
+    at = wanted[inside]
+    unit = np.zeros((n, at.size))
+    unit[at.ravel(), np.arange(at.size)] = 1
+    own = factors.forward(unit).reshape(n, len(at), 3)
+    bound = np.einsum("nb,nki->kbi", factors.halfway, own)
+    out = nothing
+    out[inside] = np.einsum("nki,nkj->kij", own, own)
+    out[inside] += np.swapaxes(bound, 1, 2) @ border @ bound
+    outside = wanted[~inside] - n
+    out[~inside] = border[outside[:, :, None], outside[:, None, :]]
+    return out if np.isfinite(out).all() else nothing
+
+
+def _spread(factors: _Factors | None, layout: Layout) -> Calibration:
+    """Sigmas of the sensors' constants, all else being unknown too."""
+    variances = np.full(layout.band + layout.border, UNKNOWN)
+    border = None if factors is None else _inverse(factors.schur)
+    if border is not None:
+        variances[layout.band :] = np.maximum(np.diag(border), 0.0)
+    return layout.calibration(np.sqrt(variances))
+
+
+def _inverse(matrix: Array) -> Array | None:
     try:
-        factor = (cholesky_banded(band, lower=True, check_finite=False), True)
-        columns = np.column_stack([right[:n], border])
-        solved = cho_solve_banded(factor, columns, check_finite=False)
-        by_right, by_border = np.split(solved, [right.shape[1]], axis=1)
-        schur = corner - border.T @ by_border
-        outer = np.linalg.solve(schur, right[n:] - border.T @ by_right)
+        inverse = np.linalg.inv(matrix)
     except np.linalg.LinAlgError:
         return None
-    return np.concatenate([by_right - by_border @ outer, outer])
-
-
-def _marginals(system: System, wanted: Array) -> Array:
-    """(k, 3, 3) blocks of the inverse of the whole system for unknowns (k, 3)."""
-    unit = np.zeros((len(system.gradient), wanted.size))
-    unit[wanted.ravel(), np.arange(wanted.size)] = 1
-    inverse = _solved(system.band, system.border, system.corner, unit)
-    if inverse is None or not np.isfinite(inverse[wanted]).all():
-        return np.tile(UNKNOWN * np.eye(3), (len(wanted), 1, 1))
-    blocks = inverse[wanted].reshape(len(wanted), 3, -1, 3)
-    return np.stack([blocks[k, :, k] for k in range(len(wanted))])
-
-
-def _spread(system: System, layout: Layout) -> Calibration:
-    """Sigmas of the sensors' constants, all else being unknown too."""
-    sensors = np.concatenate([layout.bias, layout.scale, layout.yaw])
-    unit = np.zeros((len(system.gradient), len(sensors)))
-    unit[sensors, np.arange(len(sensors))] = 1
-    inverse = _solved(system.band, system.border, system.corner, unit)
-    variances = np.full(len(system.gradient), UNKNOWN)
-    if inverse is not None and np.isfinite(inverse[sensors]).all():
-        variances[sensors] = np.maximum(inverse[sensors, np.arange(len(sensors))], 0.0)
-    return layout.calibration(np.sqrt(variances))
+    return inverse if np.isfinite(inverse).all() else None
