@@ -187,9 +187,11 @@ class RelativePoseSection(Section):
     range_sigma_m: Annotated[float, Field(gt=0, le=5)] = 0.10
     range_bias_sigma_m: Annotated[float, Field(gt=0, le=5)] = 0.30
     """How far the constant bias of a pair may be from zero before anything is measured."""
+    nlos_db: Annotated[float, Field(ge=0, le=60)] = 10.0
+    """A first path so much weaker than all that is received is taken for blocked; 0 turns it off.
+    LinkTrack user manual 7.2: above 10 dB likely no line of sight, below 6 dB likely one."""
     self_calibration: bool = True
-    """Take out what module 3 has learned of biases and odometry, now and before the last start;
-    `algorithm = "paper"` does not."""
+    """Take out what module 3 has learned of biases and odometry, before this start too."""
 
 
 class ConsistencySection(Section):

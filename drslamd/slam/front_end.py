@@ -57,8 +57,9 @@ class FrontEnd:
         if sample.peer_uwb_id not in self.ranges:
             if len(self.ranges) >= MAX_UWB_IDS and not self._forget_silent(sample.utime):
                 return
-            self.ranges[sample.peer_uwb_id] = RangeBuffer()
-        self.ranges[sample.peer_uwb_id].add(sample.utime, sample.range_m)
+            self.ranges[sample.peer_uwb_id] = RangeBuffer(self._config.relative_pose.nlos_db)
+        buffer = self.ranges[sample.peer_uwb_id]
+        buffer.add(sample.utime, sample.range_m, sample.power_gap_db)
 
     def _forget_silent(self, utime: int) -> bool:
         """Make room: forget the module that was silent longest, unless all are heard."""

@@ -16,7 +16,7 @@ from drslamd.slam import se2
 from drslamd.slam.items import RangeItem
 from drslamd.slam.odometry import Track
 from drslamd.slam.pose_graph import ChainItems
-from drslamd.slam.range_buffer import RangeBuffer
+from drslamd.slam.range_buffer import RangeBuffer, in_sight
 from drslamd.slam.se2 import Array
 from drslamd.slam.window import Window, binned
 from drslamd.slam.window_noise import near_bias
@@ -98,6 +98,7 @@ def request(ranges: RangeBuffer, a: Side, b: Side, section: RelativePoseSection)
     paper = section.algorithm == "paper"
     span = section.tau * GRID_US if paper else int(section.window_max_s * SECOND_US)
     table = ranges.between(max(last - span, a.first_us, b.first_us), last)
+    table = table if paper else in_sight(table)
     if len(table) < FEWEST:
         return "too few ranges"
     at = last if paper else max(last - CONFIRM_US, a.first_us, b.first_us)
@@ -158,7 +159,8 @@ class RangeItems:
         last = newest(ranges, a, b)
         if last is None or last - self._utime < SECOND_US * 9 // 10:
             return None
-        table = ranges.between(max(self._utime, last - SECOND_US, a.first_us, b.first_us), last)
+        since = max(self._utime, last - SECOND_US, a.first_us, b.first_us)
+        table = in_sight(ranges.between(since, last))
         if not len(table):
             return None
         when = int(np.median(table[:, 0]))
@@ -170,8 +172,9 @@ class RangeItems:
         self._utime, self._place = last, place
         q_a = se2.transform(held_a.keyframe_T_body, a.items.antenna).tolist()
         q_b = se2.transform(held_b.keyframe_T_body, b.items.antenna).tolist()
-        metres = float(np.median(table[:, 1]))
+        metres, doubt = (float(x) for x in np.median(table[:, 1:], axis=0))
+        sigma = float(np.hypot(np.hypot(self._sigma_m, near_bias(metres)), doubt))
         return RangeItem(
             held_a.n, peer, held_b.n, (q_a[0], q_a[1]), (q_b[0], q_b[1]),
-            metres, float(np.hypot(self._sigma_m, near_bias(metres))),
+            metres, sigma,
         )  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from slam_scenes import config
@@ -9,7 +11,7 @@ from slam_scenes import config
 from drslamd.conventions import GRID_US, Chain
 from drslamd.slam.items import Keyframe
 from drslamd.slam.odometry import Track
-from drslamd.slam.pair_window import CONFIRM_US, Request, Side, request
+from drslamd.slam.pair_window import CONFIRM_US, RangeItems, Request, Side, request
 from drslamd.slam.pose_graph import ChainItems
 from drslamd.slam.range_buffer import RangeBuffer
 
@@ -46,3 +48,43 @@ def test_the_pose_asked_for_is_two_seconds_old_and_in_the_paper_the_latest(
     # 0.1 m a sample, seen from the reference time
     assert found.window.a_poses[:, 0] == pytest.approx(found.window.t * 1.0, abs=1e-3)
     assert found.window.before == np.count_nonzero(found.window.t <= 0)
+
+
+def measured(gap_db: float, blocked_share: float) -> RangeBuffer:
+    """5 m in sight; every so often a range that is 1 m too long and has this power gap."""
+    ranges = RangeBuffer(nlos_db=10.0)
+    period = 10
+    for n in range(LAST + 1):
+        wrong = n % period < blocked_share * period
+        ranges.add(n * GRID_US, 6.0 if wrong else 5.0, gap_db if wrong else 3.0)
+    return ranges
+
+
+@pytest.mark.parametrize(("gap_db", "longest"), [(10.0, 5.0), (9.5, 6.0)])
+def test_what_is_surely_blocked_is_not_in_a_window(gap_db: float, longest: float) -> None:
+    section = config().relative_pose
+    found = request(measured(gap_db, 0.4), side(0), side(1), section)
+    assert isinstance(found, Request)
+    assert found.window.ranges.max() == longest
+    printed = section.model_copy(update={"algorithm": "paper"})
+    found = request(measured(gap_db, 0.4), side(0), side(1), printed)
+    assert isinstance(found, Request)
+    assert found.window.ranges.max() == 6.0
+
+
+@pytest.mark.parametrize(
+    ("gap_db", "share", "metres", "sigma"),
+    [
+        (10.0, 0.4, 5.0, 0.1),
+        (10.0, 1.0, 6.0, math.hypot(0.1, 0.5)),
+        (8.0, 1.0, 6.0, math.hypot(0.1, 0.25)),
+        (6.0, 1.0, 6.0, 0.1),
+    ],
+)
+def test_a_range_for_the_graph_says_how_much_it_is_worth(
+    gap_db: float, share: float, metres: float, sigma: float
+) -> None:
+    item = RangeItems(0.1).next(measured(gap_db, share), side(0), side(1), Chain(1, 1))
+    assert item is not None
+    assert item.range_m == metres
+    assert item.sigma_m == pytest.approx(sigma, abs=0.006)

@@ -7,10 +7,13 @@ mistake in a decoder does not hide behind the same mistake in its test.
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 U32 = 0xFFFFFFFF
+
+Block = tuple[int, float, bytes]
+"""Peer, range in metres, the two bytes of its powers."""
 
 
 def _summed(frame: bytes) -> bytes:
@@ -34,35 +37,43 @@ class LinkTrackEmulator:
         self.uwb_id = uwb_id
         self._frame = {2: self._node2, 3: self._node3, 5: self._node5}[frame]
         self._power_up_ms = round(power_up_s * 1000)
+        self.gap_db: Callable[[float, int], float] = lambda t, peer: 3.0
+        """How much weaker the first path from a peer is than all that is received, at time t."""
 
     def frame(self, t: float, ranges: Sequence[tuple[int, float]]) -> bytes:
         """What it prints at time t (s of the common radio clock) for (peer, range m) blocks."""
         system = round(t * 1000) & U32
-        return self._frame(system, (system + self._power_up_ms) & U32, ranges)
+        blocks = [(peer, metres, self._signal(self.gap_db(t, peer))) for peer, metres in ranges]
+        return self._frame(system, (system + self._power_up_ms) & U32, blocks)
 
-    def _node2(self, system: int, local: int, ranges: Sequence[tuple[int, float]]) -> bytes:
-        head = struct.pack("<BBH BB I", 0x55, 4, 120 + 13 * len(ranges), 0, self.uwb_id, system)
+    @staticmethod
+    def _signal(gap_db: float) -> bytes:
+        """Powers of the first path and of all, half a decibel each; the latter is -78 dB."""
+        return bytes([156 + round(2 * gap_db), 156])
+
+    def _node2(self, system: int, local: int, blocks: Sequence[Block]) -> bytes:
+        head = struct.pack("<BBH BB I", 0x55, 4, 120 + 13 * len(blocks), 0, self.uwb_id, system)
         head += bytes(92) + struct.pack("<I", local) + bytes(10)
-        head += struct.pack("<HB", 4900, len(ranges))
-        for peer, metres in ranges:
-            head += struct.pack("<BB", 0, peer) + _int24(round(metres * 1000)) + b"\xa2\x9c"
+        head += struct.pack("<HB", 4900, len(blocks))
+        for peer, metres, signal in blocks:
+            head += struct.pack("<BB", 0, peer) + _int24(round(metres * 1000)) + signal
             head += struct.pack("<I", system) + bytes(2)
         return _summed(head)
 
-    def _node3(self, system: int, local: int, ranges: Sequence[tuple[int, float]]) -> bytes:
-        length = 22 + 7 * len(ranges)
+    def _node3(self, system: int, local: int, blocks: Sequence[Block]) -> bytes:
+        length = 22 + 7 * len(blocks)
         head = struct.pack("<BBH BB II", 0x55, 5, length, 0, self.uwb_id, local, system)
-        head += bytes(4) + struct.pack("<HB", 4900, len(ranges))
-        for peer, metres in ranges:
-            head += struct.pack("<BB", 0, peer) + _int24(round(metres * 1000)) + b"\xa2\x9c"
+        head += bytes(4) + struct.pack("<HB", 4900, len(blocks))
+        for peer, metres, signal in blocks:
+            head += struct.pack("<BB", 0, peer) + _int24(round(metres * 1000)) + signal
         return _summed(head)
 
-    def _node5(self, system: int, local: int, ranges: Sequence[tuple[int, float]]) -> bytes:
-        length = 25 + 10 * len(ranges)
+    def _node5(self, system: int, local: int, blocks: Sequence[Block]) -> bytes:
+        length = 25 + 10 * len(blocks)
         head = struct.pack("<BBH BI II", 0x55, 8, length, 0, self.uwb_id, local, 0)
-        head += bytes(4) + struct.pack("<HB", 4900, len(ranges))
-        for peer, metres in ranges:
-            head += struct.pack("<BI", 0, peer) + _int24(round(metres * 1000)) + b"\xa2\x9c"
+        head += bytes(4) + struct.pack("<HB", 4900, len(blocks))
+        for peer, metres, signal in blocks:
+            head += struct.pack("<BI", 0, peer) + _int24(round(metres * 1000)) + signal
         return _summed(head)
 
 
