@@ -1,0 +1,96 @@
+"""The last word on a pose against scipy, on the dense covariance."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from slam_scenes import NOISE, Array, matrix, same_pose, wander, window_of
+
+from drslamd.slam.generalised_fit import judge, middle
+from drslamd.slam.range_fit import RangeFit
+from drslamd.slam.window import Window
+from drslamd.slam.window_noise import RangeNoise, WindowNoise
+
+RANGES = RangeNoise(0.1, 0.3)
+
+
+def noisy(seed: int) -> tuple[Window, Array]:
+    rng = np.random.default_rng(seed)
+    window, true = window_of(wander(rng, 60, 0.25), wander(rng, 60, 0.25) + [8.0, 0, 0])
+    return replace(window, ranges=window.ranges + rng.normal(0, 0.04, 60) + 0.2), true
+
+
+def parts(window: Window) -> tuple[RangeFit, WindowNoise]:
+    a, b = window.a_points, window.b_points
+    return RangeFit(a, b, window.ranges), WindowNoise(window, a, b, RANGES, NOISE, NOISE)
+
+
+def whitened(window: Window, noise: WindowNoise, at: Array) -> Array:
+    """L with L L' the inverse of the covariance at a pose, no range thinned out."""
+    e = at[:2] + window.b_points @ matrix(at)[:2, :2].T - window.a_points
+    u = e @ [1, 1j] / np.hypot(*e.T)
+    lower = noise.covariance(u[None], np.exp(1j * at[2:]), np.ones((1, len(u))))[0]
+    return np.linalg.cholesky(np.linalg.inv(np.tril(lower) + np.tril(lower, -1).T))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_pose_and_its_covariance_are_those_of_generalised_least_squares(seed: int) -> None:
+    window, true = noisy(seed)
+    fit, noise = parts(window)
+    judged = judge(fit, noise, fit.centred(true[None]))
+    pose = fit.poses(judged.centred)[0]
+    root = whitened(window, noise, pose)
+
+    def errors(x: Array) -> Array:
+        moved = x[:2] + window.b_points @ matrix(x)[:2, :2].T
+        return np.asarray(root.T @ (np.hypot(*(moved - window.a_points).T) - window.ranges))
+
+    theirs = least_squares(errors, true, x_scale="jac", xtol=1e-12)
+    covariance = np.linalg.inv(theirs.jac.T @ theirs.jac)
+    off = pose - theirs.x
+    assert off @ np.linalg.solve(covariance, off) < 0.1**2  # a tenth of a sigma
+    assert judged.chi2[0] == pytest.approx(2 * theirs.cost, rel=0.02)
+    m = fit.by_step(judged.centred)[0]
+    assert np.allclose(m @ judged.covariance[0] @ m.T, covariance, rtol=0.03, atol=1e-4)
+
+
+def test_candidates_do_not_disturb_each_other() -> None:
+    window, true = noisy(3)
+    fit, noise = parts(window)
+    starts = fit.centred(np.array([true, true + [0.4, 0.3, 0.1], true * [1, -1, -1]]))
+    together = judge(fit, noise, starts)
+    for k in range(2):
+        alone = judge(fit, noise, starts[k : k + 1])
+        assert same_pose(fit.poses(alone.centred)[0], fit.poses(together.centred)[k], 0.02)
+        assert alone.chi2[0] == pytest.approx(together.chi2[k], rel=0.02)
+    ordered = together.best_first()
+    assert list(ordered.chi2) == sorted(together.chi2)
+    assert ordered.centred[-1, 0] == together.centred[np.argmax(together.chi2), 0]
+
+
+def test_a_covariance_that_is_none_leaves_an_infinite_misfit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    window, true = noisy(4)
+    fit, noise = parts(window)
+    plain = WindowNoise.covariance
+
+    def spoiled(self: WindowNoise, u: Array, heading: Array, weights: Array) -> Array:
+        covariance = plain(self, u, heading, weights)
+        covariance[0, 5, 5] = -1.0
+        return covariance
+
+    monkeypatch.setattr(WindowNoise, "covariance", spoiled)
+    judged = judge(fit, noise, fit.centred(np.array([true, true])))
+    assert judged.chi2[0] == np.inf
+    assert np.isfinite(judged.chi2[1])
+    assert judged.best_first().chi2[0] == judged.chi2[1]
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 6, 7])
+def test_the_middle_is_the_median(count: int) -> None:
+    values = np.random.default_rng(count).normal(size=(4, count))
+    assert np.allclose(middle(values), np.median(values, axis=1))

@@ -1,0 +1,89 @@
+"""Poses about centroids: there and back, how they step, and what a step does to the ranges."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from slam_scenes import Array, matrix, same_pose, wander, window_of
+
+from drslamd.slam import range_fit
+from drslamd.slam.range_fit import RangeFit, refine, stepped
+from drslamd.slam.window_noise import RangeNoise
+
+NOISE = RangeNoise(0.1, 0.3)
+
+
+def scene(seed: int, apart: float = 6.0) -> tuple[RangeFit, Array, Array, Array]:
+    """A window's fit, its points a, b, and its true pose."""
+    rng = np.random.default_rng(seed)
+    window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [apart, 0, 0])
+    a, b = window.a_points, window.b_points
+    return RangeFit(a, b, window.ranges), a, b, true
+
+
+def some_poses(true: Array) -> Array:
+    return np.array([true, true + [1.0, -2.0, 0.5], true * [-1.0, 1.0, -1.0]])
+
+
+def test_a_centred_pose_has_the_centroid_of_b_in_the_frame_of_a() -> None:
+    fit, a, b, true = scene(0)
+    for pose, (place, heading) in zip(some_poses(true), fit.centred(some_poses(true)), strict=True):
+        expected = (matrix(pose) @ [*b.mean(axis=0), 1.0])[:2] - a.mean(axis=0)
+        assert [place.real, place.imag] == pytest.approx(expected)
+        assert heading == pytest.approx(np.exp(1j * pose[2]))
+
+
+def test_what_was_centred_comes_back() -> None:
+    fit, _, _, true = scene(1)
+    for pose, back in zip(some_poses(true), fit.poses(fit.centred(some_poses(true))), strict=True):
+        assert same_pose(pose, back, 1e-12)
+
+
+@pytest.mark.parametrize("distance", [0.0, 0.5, 0.99, 1.01, 7.0])
+def test_a_step_goes_away_and_around_and_turns(distance: float) -> None:
+    at, little = distance * np.exp(0.6j), 1e-6
+    centred = np.array([[at, np.exp(0.2j)]])
+    moves = [stepped(centred, row[None] * little)[0] for row in np.eye(3)]
+    away = np.exp(0.6j) if distance else 1.0
+    assert (moves[0][0] - at) / little == pytest.approx(away, abs=1e-4)
+    assert (moves[1][0] - at) / little == pytest.approx(1j * away, abs=1e-4)
+    assert moves[2][0] == pytest.approx(at, abs=1e-12)
+    assert np.angle(moves[2][1]) == pytest.approx(0.2 + little)
+
+
+def test_a_long_step_around_keeps_the_distance_beyond_a_metre() -> None:
+    around = np.array([[0.0, 1.5, 0.0]])
+    for distance, kept in ((range_fit.AROUND_M * 1.01, True), (range_fit.AROUND_M * 0.99, False)):
+        moved = stepped(np.array([[distance + 0j, 1.0 + 0j]]), around)[0, 0]
+        assert bool(abs(moved) == pytest.approx(distance)) is kept
+
+
+@pytest.mark.parametrize("apart", [0.0, 6.0])
+def test_the_derivatives_are_those_of_finite_differences(apart: float) -> None:
+    fit, a, b, true = scene(2, apart)
+    centred, h = fit.centred(some_poses(true)), 1e-6
+    u, rows = fit.linear(centred)
+    by_step = fit.by_step(centred)
+    for k, pose in enumerate(some_poses(true)):
+        sight = np.array([(matrix(pose) @ [*q, 1.0])[:2] for q in b]) - a
+        assert np.allclose(u[k], sight @ [1, 1j] / np.hypot(*sight.T))
+    for part in range(3):
+        step = np.tile(np.eye(3)[part] * h, (3, 1))
+        ahead, behind = stepped(centred, step), stepped(centred, -step)
+        change = (fit.linear(ahead)[1][:, 4] - fit.linear(behind)[1][:, 4]) / (2 * h)
+        assert np.allclose(rows[:, part], change, atol=1e-7)
+        moved = (fit.poses(ahead) - fit.poses(behind)) / (2 * h)
+        assert np.allclose(by_step[..., part], moved, atol=1e-7)
+    assert np.all(rows[:, 3] == 1.0)
+    assert np.allclose(rows[0, 4], 0.0)
+
+
+def test_a_valley_is_followed_around_its_arc() -> None:
+    """A standing peer says nothing of its heading: any is as good, and the way there is short."""
+    rng = np.random.default_rng(4)
+    window, true = window_of(wander(rng, 50, 0.2), np.tile([5.0, 1.0, 0.3], (50, 1)))
+    fit = RangeFit(window.a_points, window.b_points, window.ranges)
+    seeds = np.array([true + [0.5, -0.4, 0.0], true + [0.5, -0.4, 2.0]])
+    refined = fit.poses(refine(fit, fit.centred(seeds), NOISE))
+    assert len(refined) == 2
+    assert np.hypot(*(refined[:, :2] - true[:2]).T).max() < 0.05
