@@ -11,6 +11,7 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
+from lab.ablation import PIECES, Piece, without
 from lab.accuracy_rows import ROWS, Figure
 from lab.recording import BadRecording
 
@@ -22,32 +23,50 @@ examples:
   tools/accuracy data --only vub swust        some rows: {", ".join(ROWS)}
   tools/accuracy data --json accuracy.json    the same figures for a program
   tools/accuracy data --config other.toml     with sections added to every robot's configuration
+  tools/accuracy data --without nlos          what a piece brings: {", ".join(PIECES)}
 """
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run it; the exit code."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
     extra = options.config.read_text() if options.config else ""
-    figures: list[Figure] = []
-    for name in options.only or ROWS:
-        row = ROWS[name]
-        if not (options.data / row.needs).exists():
-            print(f"{name}: no {options.data / row.needs}", file=sys.stderr)
-            continue
-        print(f"{name} ...", file=sys.stderr, flush=True)
-        try:
-            figures += row.measure(options.data, extra)
-        except BadRecording as error:
-            print(error, file=sys.stderr)
-            return NO_INPUT
+    piece = PIECES[options.without] if options.without else Piece("")
+    if piece.section and f"[{piece.section}]" in extra:
+        parser.error(f"--without {options.without} needs [{piece.section}], as does --config")
+    try:
+        with without(piece):
+            figures = _measured(options.data, options.only or list(ROWS), extra + piece.toml)
+    except BadRecording as error:
+        print(error, file=sys.stderr)
+        return NO_INPUT
     if not figures:
         return NO_INPUT
+    if options.without:
+        print(f"Without {options.without}: {piece.instead}.\n")
     print("\n".join(markdown(figures)))
     if options.json:
         rows = [{**asdict(figure), "is_reached": figure.is_reached} for figure in figures]
         options.json.write_text(json.dumps(rows, indent=1) + "\n")
     return 0 if all(figure.is_reached for figure in figures) else NOT_REACHED
+
+
+def _measured(data: Path, names: list[str], extra: str) -> list[Figure]:
+    """The figures of these rows; what is not there is named.
+
+    Raises:
+        BadRecording: a recording cannot be read.
+    """
+    figures: list[Figure] = []
+    for name in names:
+        row = ROWS[name]
+        if not (data / row.needs).exists():
+            print(f"{name}: no {data / row.needs}", file=sys.stderr)
+            continue
+        print(f"{name} ...", file=sys.stderr, flush=True)
+        figures += row.measure(data, extra)
+    return figures
 
 
 def markdown(figures: list[Figure]) -> list[str]:
@@ -74,6 +93,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--only", nargs="+", choices=list(ROWS), metavar="ROW")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     parser.add_argument("--config", type=Path, metavar="TOML", help="sections for every robot")
+    parser.add_argument("--without", choices=list(PIECES), metavar="PIECE", help="leave one out")
     return parser
 
 
