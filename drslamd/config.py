@@ -17,7 +17,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from drslamd.conventions import MAX_ROBOT_ID
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Rate = Annotated[float, Field(gt=0, le=50, allow_inf_nan=False)]
 Metres = Annotated[float, Field(allow_inf_nan=False, ge=-5, le=5)]
 RobotId = Annotated[int, Field(ge=0, le=MAX_ROBOT_ID)]
@@ -219,9 +218,10 @@ class GossipSection(Section):
     """Name or address of the network interface; empty leaves the choice to the routing table."""
     ttl: Annotated[int, Field(ge=0, le=32)] = 1
     """0 keeps everything on this host (tests), 1 on this network."""
+    max_bytes_per_s: Annotated[int, Field(ge=2_000, le=10_000_000)] = 50_000
+    """What this robot sends at most; what is least useful is held back first."""
     url: str = ""
-    """For `provider = "liblcm"`: any URL that the lcm package takes; made from the keys above
-    when empty."""
+    """For `provider = "liblcm"`: any LCM URL; made from the keys above when empty."""
 
     @model_validator(mode="after")
     def _group_is_multicast(self) -> GossipSection:

@@ -30,6 +30,7 @@ def conditions(robot: Robot, utime: int) -> Iterator[Condition]:
     yield from robot.team.conditions(utime)
     yield "pose", why_not_localised(robot, utime)
     yield "load", _load(robot, utime)
+    yield "budget", robot.outbox.condition(utime)
 
 
 def _sensor(robot: Robot, name: str, advice: Callable[[int], str | None], utime: int) -> str | None:

@@ -97,8 +97,9 @@ def _network(robot: Robot, utime: int) -> dict[str, Any]:
     return {
         "up": bool(state and state.up),
         "detail": state.detail if state else "not tried yet",
-        "messages_sent": team.messages_sent,
-        "bytes_sent": team.bytes_sent,
+        "messages_sent": robot.outbox.messages_sent,
+        "bytes_sent": robot.outbox.bytes_sent,
+        "held_back": dict(robot.outbox.held_back),
         "accepted": team.accepted,
         "refused": dict(team.refused),
         "own_echo_age_s": age_s(utime, team.last_echo),

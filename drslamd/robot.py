@@ -35,12 +35,14 @@ from drslamd.events import (
     PortState,
     Restart,
     Save,
+    Send,
     SerialData,
     Solve,
     Stop,
     Tick,
     Write,
 )
+from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
 from drslamd.health import Health
@@ -100,6 +102,7 @@ class Robot:
         self.front = FrontEnd(config, self.own, self.memory.used)
         self.back = BackEnd(config, self.own)
         self.broadcast = Broadcast(config, self.team, self.front, self.back)
+        self.outbox = Outbox(config.robot.id, config.gossip.max_bytes_per_s)
         self.health = Health()
         self.ports: dict[str, PortState] = {}
         self.network: NetworkState | None = None
@@ -140,7 +143,8 @@ class Robot:
 
     def handle(self, event: Event) -> list[Effect]:
         """Take one event; what follows from it."""
-        return self._handlers[type(event)](event)
+        effects, outbox = self._handlers[type(event)](event), self.outbox
+        return [e for e in effects if not isinstance(e, Send) or outbox.passes(e, event.utime)]
 
     # ---- sensors ----
 

@@ -67,8 +67,6 @@ class Team:
         self.repeats_heard = 0
         self.own_echoes = 0
         self.last_echo: int | None = None
-        self.bytes_sent = 0
-        self.messages_sent = 0
         self._next_seq = 0
         self.superseded_by: int | None = None
         """A later epoch of ours that a peer has heard; then our messages are refused as old."""
@@ -80,12 +78,7 @@ class Team:
         """Seal a message."""
         channel = messages.channel(messages.kind_of(message), self.own.robot)
         payload = messages.encode(self.seal.header(utime), message)
-        return self._out(channel, self.seal.close(channel, payload))
-
-    def _out(self, channel: str, payload: bytes) -> Send:
-        self.messages_sent += 1
-        self.bytes_sent += 8 + len(channel) + 1 + len(payload)
-        return Send(channel, payload)
+        return Send(channel, self.seal.close(channel, payload))
 
     def send_public(self, public: PublicPoses, utime: int) -> list[Send]:
         """Lifted poses, as many in one message as one datagram takes."""
@@ -130,7 +123,7 @@ class Team:
 
     def send_sealed(self, owner: int, sealed: bytes) -> Send:
         """A log entry as it was sealed, ours or another's."""
-        return self._out(messages.channel("GRAPH", owner), sealed)
+        return Send(messages.channel("GRAPH", owner), sealed)
 
     def repeats(self, utime: int) -> list[Send]:
         """Log entries that somebody lacks; ask several times a second."""

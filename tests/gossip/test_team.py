@@ -130,13 +130,6 @@ def test_a_message_goes_out_sealed_on_the_channel_of_its_robot() -> None:
     assert received.origin == OWN
 
 
-def test_bytes_and_messages_that_go_out_are_counted() -> None:
-    team = a_team()
-    send = team.send(a_status(), T0)
-    assert team.messages_sent == 1
-    assert team.bytes_sent == len(lc02.encode(0, send.channel, send.payload))
-
-
 def test_our_entry_is_what_the_others_will_read() -> None:
     """0.1 is no float of 32 bits; the owner computes with what was sent."""
     traits = (0.1, 0.1, 0.1, 0.1, 0.1, 0.1)

@@ -20,3 +20,18 @@ def test_a_module_takes_a_fifth_of_a_core_at_most_and_names_its_pace(
     assert np.median(np.diff(poses[-8:])) == pytest.approx(cycle_s, abs=0.25)
     sentence = f"optimizer runs every {5e-3 * solve_ms:.1f} s instead of every 1.0 s"
     assert (sentence in team.problems(1)) == said
+
+
+def test_on_a_network_that_is_too_slow_poses_wait_and_the_team_still_agrees() -> None:
+    """Ten solutions a second and two kilobytes a second for each robot."""
+    fast = "[optimizer]\nrate_hz = 10.0\n[relative_pose]\nrate_hz = 5.0\n"
+    team = VirtualTeam(EASY, extra=fast + "[gossip]\nmax_bytes_per_s = 2000\n")
+    for robot in range(3):
+        outbox = team.member(robot).robot.outbox
+        outbox._rate = 600
+        outbox._bucket = 1200.0
+    team.run(60.0)
+    assert set(team.frames().values()) == {0}
+    assert team.errors()["ate_rmse_m"] < 0.15
+    assert team.member(1).robot.outbox.held_back["pose"] > 0
+    assert "holds messages back" in team.problems(1)
