@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import eigvalsh
 from scipy.optimize import least_squares
 from slam_scenes import NOISE, Array, matrix, same_pose, wander, window_of
 
@@ -54,7 +55,8 @@ def test_the_pose_and_its_covariance_are_those_of_generalised_least_squares(seed
     assert off @ np.linalg.solve(covariance, off) < 0.1**2  # a tenth of a sigma
     assert judged.chi2[0] == pytest.approx(2 * theirs.cost, rel=0.02)
     m = fit.by_step(judged.centred)[0]
-    assert np.allclose(m @ judged.covariance[0] @ m.T, covariance, rtol=0.03, atol=1e-4)
+    ratios = eigvalsh(m @ judged.covariance[0] @ m.T, covariance)
+    assert np.abs(ratios - 1).max() < 0.1
 
 
 def test_candidates_do_not_disturb_each_other() -> None:
