@@ -15,7 +15,7 @@ STEPS, MADE = 8, 3
 """At most, and how many times at most the covariance is made anew on the way."""
 SAME_SIGMAS, SAME_SIGHT = 0.5, 0.1
 """It is the same while no residual and no line of sight (rad) has moved by more than this."""
-SETTLED, SETTLED_CHI2 = 1e-3, 1e-3
+SETTLED, SETTLED_CHI2 = 1e-3, 1e-2
 """A step below this (m, rad), or that promises less (2 log-likelihood), is the last one."""
 LONGEST = 0.5
 """m, rad: what one step may do."""

@@ -90,11 +90,13 @@ def stepped(centred: Array, step: Array) -> Array:
     """Centred poses after steps (k, 3): away from a, around a (both m), heading (rad)."""
     place = centred[:, 0]
     distance = np.abs(place)
-    arc = (distance + step[:, 0]) * np.exp(1j * step[:, 1] / np.maximum(distance, AROUND_M))
-    straight = distance + step[:, 0] + 1j * step[:, 1]
-    out = np.empty_like(centred)
+    angles = step[:, 1:3].copy()
+    angles[:, 0] /= np.maximum(distance, AROUND_M)
+    out: Array = np.exp(1j * angles)
+    away = distance + step[:, 0]
+    arc, straight = away * out[:, 0], away + 1j * step[:, 1]
     out[:, 0] = _direction(place) * np.where(distance > AROUND_M, arc, straight)
-    out[:, 1] = centred[:, 1] * np.exp(1j * step[:, 2])
+    out[:, 1] *= centred[:, 1]
     return out
 
 
