@@ -33,7 +33,7 @@ def run(trial: Trial, progress: Callable[[float], None] | None = None) -> Tally:
     tally = Tally()
     _final(tally, trial, result)
     closures(tally, trial, result.closures)
-    _published(tally, trial.recording, simulator)
+    published(tally, trial.recording, simulator)
     for name, ms in result.ms.items():
         tally.add(f"drslamd/ms/{name}", ms)
     tally.add("drslamd/bytes", sum(result.bytes_sent.values()))
@@ -87,7 +87,7 @@ def mahalanobis(pose: Array, covariance: Array, truth: Array) -> float:
     return float(error @ np.linalg.solve(covariance, error))
 
 
-def _published(tally: Tally, recording: Recording, simulator: Simulator) -> None:
+def published(tally: Tally, recording: Recording, simulator: Simulator) -> None:
     """Every published pose against its own covariance, in the frame that it names.
 
     That frame is the odometry frame of a robot, and so where that robot was switched on.
