@@ -57,7 +57,7 @@ def over(pool: list[Window], solve: Callable[[Window], object]) -> Callable[[], 
 
 def one_seed(window: Window) -> Array:
     """The best point of the coarse search, refined: the paper's question."""
-    return _refined(window, 1)
+    return refined(window, 1)
 
 
 def full(window: Window) -> relative_pose.Estimate:
@@ -72,7 +72,8 @@ def full(window: Window) -> relative_pose.Estimate:
     return relative_pose.solve(thin, windows.NOISE, DELTA)
 
 
-def _refined(window: Window, seeds: int) -> Array:
+def refined(window: Window, seeds: int) -> Array:
+    """(seeds, 3) the minima that our search finds from so many seeds."""
     a, b = window.a_points, window.b_points
     rho = float(np.median(window.ranges[-3:]))
     found = coarse_search.seeds(a, b, window.ranges, rho, DELTA, seeds)
@@ -123,7 +124,7 @@ def global_share(count: int, straight: bool) -> float:
     hits = 0
     for _ in range(count):
         window, truth = windows.window(rng, 100, straight)
-        ours = [polished(window, pose)[1] for pose in _refined(window, relative_pose.SEEDS)]
+        ours = [polished(window, pose)[1] for pose in refined(window, relative_pose.SEEDS)]
         phi = rng.uniform(-np.pi, np.pi, STARTS - 1)
         theta = rng.uniform(-np.pi, np.pi, STARTS - 1)
         place = window.ranges[-1] * np.stack([np.cos(phi), np.sin(phi)])
