@@ -11,7 +11,7 @@ from drslamd.slam.range_fit import PRIOR, ROBUST_SIGMAS, RangeFit, stepped
 from drslamd.slam.se2 import Array
 from drslamd.slam.window_noise import WindowNoise
 
-STEPS, MADE = 8, 3
+STEPS, MADE = 12, 5
 """At most, and how many times at most the covariance is made anew on the way."""
 SAME_SIGMAS, SAME_SIGHT = 0.5, 0.1
 """It is the same while no residual and no line of sight (rad) has moved by more than this."""
