@@ -1,8 +1,7 @@
 """The configuration: one frozen model per section of the TOML file.
 
-`parse` turns TOML text into a `Config` or raises `ConfigError`, whose lines are one sentence per
-fault: the key, the value and what is allowed. A wrong configuration is never repaired in silence.
-Parameters of the paper carry the paper's names and, where it gives one, the paper's value.
+`parse` turns TOML text into a `Config` or raises `ConfigError`: one sentence per fault with the
+key, the value and what is allowed. The paper's parameters have its names and, if any, its values.
 """
 
 from __future__ import annotations
@@ -57,7 +56,8 @@ class UwbSection(Section):
     max_range_m: Annotated[float, Field(gt=0, le=1000)] = 120.0
     antenna_x_m: Metres = 0.0
     antenna_y_m: Metres = 0.0
-    """Position of the antenna in the body frame: x forward, y to the left."""
+    antenna_z_m: Metres = 0.0
+    """Antenna in the body frame: x forward, y to the left, z above the floor (any common level)."""
 
 
 class CanSection(Section):
@@ -219,7 +219,7 @@ class GossipSection(Section):
     ttl: Annotated[int, Field(ge=0, le=32)] = 1
     """0 keeps everything on this host (tests), 1 on this network."""
     max_bytes_per_s: Annotated[int, Field(ge=2_000, le=10_000_000)] = 50_000
-    """What this robot sends at most; what is least useful is held back first."""
+    """Of this robot; what is least useful is held back first."""
     url: str = ""
     """For `provider = "liblcm"`: any LCM URL; made from the keys above when empty."""
 

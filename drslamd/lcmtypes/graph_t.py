@@ -29,7 +29,7 @@ class graph_t(object):
         self.n_traits = 0
         """
         now and then, what the origin is like: sigmas of its odometry (scale, yaw rad/m, m/sqrt(m),
-        rad/sqrt(m)) and where its antenna sits in its body frame (x, y, m)
+        rad/sqrt(m)) and where its antenna sits in its body frame (x, y, z, m)
         LCM Type: int8_t
         """
 

@@ -78,7 +78,7 @@ class FrontEnd:
         """What the team must know of this robot's sensors (see `GraphEntry`)."""
         n, uwb = self.noise, self._config.uwb
         return (n.scale, n.yaw_rad_per_m, n.translation_per_sqrt_m, n.yaw_rad_per_sqrt_m,
-                uwb.antenna_x_m, uwb.antenna_y_m)  # fmt: skip
+                uwb.antenna_x_m, uwb.antenna_y_m, uwb.antenna_z_m)  # fmt: skip
 
     def keyframe(self) -> Keyframe | None:
         """The latest sample of our odometry, if we moved since the last keyframe."""

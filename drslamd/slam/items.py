@@ -77,7 +77,7 @@ class GraphEntry:
 
     seq: int
     traits: tuple[float, ...] = ()
-    """Now and then: the four sigmas of `OdometryNoise`, antenna x and y in the body frame."""
+    """Now and then: the four sigmas of `OdometryNoise`, antenna x, y, z in the body frame."""
     keyframes: tuple[Keyframe, ...] = ()
     ranges: tuple[RangeItem, ...] = ()
     closures: tuple[ClosureItem, ...] = ()

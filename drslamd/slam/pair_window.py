@@ -82,6 +82,17 @@ class Request:
     b: Anchored
 
 
+def level(ranges: Array, a: Side, b: Side) -> Array:
+    """Ranges (n,) between antennas of different heights, as seen from above.
+
+    What is shorter than the difference in height is the fault of a bias and stays as it is.
+    """
+    rise = a.items.antenna_z_m - b.items.antenna_z_m
+    inside = np.maximum(ranges**2 - rise**2, 0.0)
+    seen = np.copysign(np.sqrt(inside), ranges)
+    return np.asarray(np.where(np.abs(ranges) > abs(rise), seen, ranges))
+
+
 def newest(ranges: RangeBuffer, a: Side, b: Side) -> int | None:
     """The latest time of our clock that both tracks and the ranges cover."""
     if len(a.track) < 2 or len(b.track) < 2 or ranges.newest is None:
@@ -103,7 +114,7 @@ def request(ranges: RangeBuffer, a: Side, b: Side, section: RelativePoseSection)
         return "too few ranges"
     at = last if paper else max(last - CONFIRM_US, a.first_us, b.first_us)
     width = GRID_US if paper else max(GRID_US, span // POINTS)
-    t, distances, _ = binned((table[:, 0] - at) / 1e6, table[:, 1], width / 1e6)
+    t, distances, _ = binned((table[:, 0] - at) / 1e6, level(table[:, 1], a, b), width / 1e6)
     held = anchored(a, at), anchored(b, at)
     if held[0] is None or held[1] is None:
         return "no keyframe near the window yet"
@@ -172,6 +183,7 @@ class RangeItems:
         self._utime, self._place = last, place
         q_a = se2.transform(held_a.keyframe_T_body, a.items.antenna).tolist()
         q_b = se2.transform(held_b.keyframe_T_body, b.items.antenna).tolist()
+        table[:, 1] = level(table[:, 1], a, b)
         metres, doubt = (float(x) for x in np.median(table[:, 1:], axis=0))
         sigma = float(np.hypot(np.hypot(self._sigma_m, near_bias(metres)), doubt))
         return RangeItem(

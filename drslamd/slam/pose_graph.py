@@ -86,7 +86,7 @@ class ChainItems:
 
     Attributes:
         noise: of its odometry.
-        antenna: (2,) in the body frame, m.
+        antenna: (2,) in the body frame, m; antenna_z_m: above the floor.
         relative: relative poses that it measured in full precision, by log entry.
     """
 
@@ -94,6 +94,7 @@ class ChainItems:
         self.chain = chain
         self.noise = DEFAULT_NOISE
         self.antenna: Array = np.zeros(2)
+        self.antenna_z_m = 0.0
         self.relative: dict[int, tuple[RelativePoses, ...]] = {}
         self._traits_seq = -1
         self._table = Rows(5, MAX_KEYFRAMES)
@@ -117,7 +118,8 @@ class ChainItems:
         noise = OdometryNoise(*traits[:4])
         near = all(abs(value) <= ANTENNA_M for value in traits[4:])
         if seq > self._traits_seq and noise.is_plausible() and near:
-            self._traits_seq, self.noise, self.antenna = seq, noise, np.array(traits[4:])
+            self._traits_seq, self.noise, self.antenna = seq, noise, np.array(traits[4:6])
+            self.antenna_z_m = traits[6]
 
     @property
     def rows(self) -> Array:

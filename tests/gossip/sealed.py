@@ -55,7 +55,7 @@ def one_of_each_kind() -> list[Message]:
         OdometryBatch(40, 40, steps),
         GraphEntry(
             2,
-            (0.5, 0.25, 0.125, 0.0625, 0.5, -0.5),
+            (0.5, 0.25, 0.125, 0.0625, 0.5, -0.5, 0.25),
             (Keyframe(40, 1, -100, 200, -30),),
             (RangeItem(40, peer, 41, (0.25, 0.0), (-0.125, 0.5), 3.5, 0.125),),
             (ClosureItem(8, True, 40, peer, 41, (1.5, -2.5, 0.25), COVARIANCE),),

@@ -14,7 +14,7 @@ from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose
 from drslamd.gossip.team import ITEMS_PER_ENTRY, Team
 from drslamd.slam.items import ClosureItem, Keyframe, PublicPoses, RangeItem
 
-TRAITS = (0.5, 0.25, 0.125, 0.0625, 0.5, -0.5)
+TRAITS = (0.5, 0.25, 0.125, 0.0625, 0.5, -0.5, 0.25)
 
 
 def fits(send: Send) -> bool:
@@ -76,10 +76,10 @@ def test_items_of_every_kind_are_said_completely_in_entries_that_fit(
     assert sum(len(e.closures) for e, _ in entries) == len(closures)
 
 
-def test_twenty_closures_with_twenty_peers_and_the_traits_have_1278_bytes() -> None:
+def test_twenty_closures_with_twenty_peers_and_the_traits_have_1282_bytes() -> None:
     team = Team(a_seal(3))
     (entry,) = team.entries(TRAITS, (), (), CLOSURES[:ITEMS_PER_ENTRY])
-    assert len(messages.encode(HEADER, entry)) == 54 + 24 + 20 * (10 + 50) == 1278
+    assert len(messages.encode(HEADER, entry)) == 54 + 28 + 20 * (10 + 50) == 1282
 
 
 def test_the_largest_rank_that_can_be_configured_is_20() -> None:

@@ -70,7 +70,7 @@ closures = st.builds(
     st.tuples(*[i32.map(tenths)] * 3), diagonals,
 )  # fmt: skip
 sigmas = st.floats(2**-20, 8, width=32)
-traits = st.tuples(sigmas, sigmas, sigmas, sigmas, *[st.floats(-8, 8, width=32)] * 2)
+traits = st.tuples(sigmas, sigmas, sigmas, sigmas, *[st.floats(-8, 8, width=32)] * 3)
 entries = st.builds(
     GraphEntry, n32, traits | st.just(()),
     st.lists(keyframes, max_size=6).map(tuple),

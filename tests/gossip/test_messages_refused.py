@@ -51,7 +51,7 @@ ACCEPTED: list[tuple[Any, ...]] = [
     ("ODOMETRY", "segment_start", 40),
     ("ODOMETRY", "segment_start", 0),
     ("GRAPH", "seq", 0),
-    ("GRAPH", "traits", (9.5, 1e-9, 1e-9, 1e-9, -9.5, 9.5)),
+    ("GRAPH", "traits", (9.5, 1e-9, 1e-9, 1e-9, -9.5, 9.5, 0.0)),
     ("GRAPH", "keyframes", 0, "n", 0),
     ("GRAPH", "ranges", 0, "sigma", 1),
     ("GRAPH", "ranges", 0, "range", -5000),
@@ -79,12 +79,12 @@ REFUSED: list[tuple[Any, ...]] = [
     ("ODOMETRY", "segment_start", 41),
     ("ODOMETRY", "segment_start", -1),
     ("GRAPH", "seq", -1),
-    ("GRAPH", "traits", (0.0, 1.0, 1.0, 1.0, 0.0, 0.0)),
-    ("GRAPH", "traits", (1.0, 1.0, 1.0, 10.0, 0.0, 0.0)),
-    ("GRAPH", "traits", (1.0, 1.0, 1.0, 1.0, 10.0, 0.0)),
-    ("GRAPH", "traits", (NAN, 1.0, 1.0, 1.0, 0.0, 0.0)),
-    ("GRAPH", "traits", (1.0, 1.0, 1.0, 1.0, 0.0, NAN)),
-    ("GRAPH", "traits", (1.0, INF, 1.0, 1.0, 0.0, 0.0)),
+    ("GRAPH", "traits", (0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0)),
+    ("GRAPH", "traits", (1.0, 1.0, 1.0, 10.0, 0.0, 0.0, 0.0)),
+    ("GRAPH", "traits", (1.0, 1.0, 1.0, 1.0, 10.0, 0.0, 0.0)),
+    ("GRAPH", "traits", (NAN, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0)),
+    ("GRAPH", "traits", (1.0, 1.0, 1.0, 1.0, 0.0, NAN, 0.0)),
+    ("GRAPH", "traits", (1.0, INF, 1.0, 1.0, 0.0, 0.0, 0.0)),
     ("GRAPH", "n_traits", 5),
     ("GRAPH", "n_traits", 4),
     ("GRAPH", "keyframes", 0, "n", -1),
@@ -141,10 +141,10 @@ COUNTS = {
     "logs": ("STATUS", 39 + 28 + 2 + 22 + 2 + 4, ">h"),
     "samples": ("ODOMETRY", 39 + 20, ">h"),
     "traits": ("GRAPH", 39 + 4, ">b"),
-    "keyframes": ("GRAPH", 39 + 5 + 24, ">h"),
-    "peers": ("GRAPH", 39 + 5 + 24 + 2 + 18, ">h"),
-    "ranges": ("GRAPH", 39 + 5 + 24 + 2 + 18 + 2 + 10, ">h"),
-    "closures": ("GRAPH", 39 + 5 + 24 + 2 + 18 + 2 + 10 + 2 + 23, ">h"),
+    "keyframes": ("GRAPH", 39 + 5 + 28, ">h"),
+    "peers": ("GRAPH", 39 + 5 + 28 + 2 + 18, ">h"),
+    "ranges": ("GRAPH", 39 + 5 + 28 + 2 + 18 + 2 + 10, ">h"),
+    "closures": ("GRAPH", 39 + 5 + 28 + 2 + 18 + 2 + 10 + 2 + 23, ">h"),
     "public poses": ("PUBLIC", 39 + 12, ">h"),
     "values": ("PUBLIC", 39 + 14 + 8, ">i"),
 }
@@ -157,7 +157,7 @@ def test_a_count_that_lies_is_refused(what: str, change: int) -> None:
     kind, at, form = COUNTS[what]
     payload = bytearray(messages.encode(HEADER, kinds()[kind]))
     (count,) = struct.unpack_from(form, payload, at)
-    assert count in (1, 2, 3, 6, 24)
+    assert count in (1, 2, 3, 7, 24)
     struct.pack_into(form, payload, at, max(-128, count + change))
     assert isinstance(messages.decode(kind, bytes(payload)), str)
 

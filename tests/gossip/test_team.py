@@ -132,7 +132,7 @@ def test_a_message_goes_out_sealed_on_the_channel_of_its_robot() -> None:
 
 def test_our_entry_is_what_the_others_will_read() -> None:
     """0.1 is no float of 32 bits; the owner computes with what was sent."""
-    traits = (0.1, 0.1, 0.1, 0.1, 0.1, 0.1)
+    traits = (0.1,) * 7
     team = a_team()
     (entry,) = team.entries(traits, an_entry(0, 5).keyframes, (), ())
     own, payload = team.append(entry, T0)
@@ -147,7 +147,7 @@ def test_our_entry_is_what_the_others_will_read() -> None:
 def test_traits_are_said_with_the_first_of_every_64_entries() -> None:
     team = a_team()
     for k in range(130):
-        for entry in team.entries((0.5,) * 6, an_entry(0, k).keyframes, (), ()):
+        for entry in team.entries((0.5,) * 7, an_entry(0, k).keyframes, (), ()):
             own, _ = team.append(entry, T0)
             assert bool(own.traits) == (own.seq in (0, 64, 128))
 

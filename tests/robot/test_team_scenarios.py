@@ -281,3 +281,18 @@ def test_a_robot_needs_none_of_its_modules_to_run_as_often_as_the_others() -> No
     solved = {name: len(ms) for name, ms in team.member(0).traces.solve_ms.items()}
     assert 20 <= solved["relative_pose"] <= 64
     assert 5 <= solved["optimizer"] <= 13
+
+
+def test_antennas_at_different_heights_are_told_to_the_peers() -> None:
+    """A tall robot and a low one, half a metre to five metres apart."""
+    team = VirtualTeam(on=())
+    heights = {0: 0.3, 1: 2.0, 2: 0.3}
+    for robot, metres in heights.items():
+        team.hardware[robot].antenna_z_m = metres
+    raised = team.recording.ranges.copy()
+    rise = np.array([heights[int(a)] - heights[int(b)] for a, b in raised[:, 1:3]])
+    team.recording.ranges[:, 3] = np.hypot(raised[:, 3], rise)
+    for robot in heights:
+        team.start(robot)
+    team.run(63.0)
+    assert team.errors()["ate_rmse_m"] < 0.08

@@ -159,9 +159,11 @@ def range_item(
     return RangeItem(a_n, peer, b_n, q_a, q_b, range_m, sigma)
 
 
-def traits_of(noise: OdometryNoise, antenna: tuple[float, float] = (0.0, 0.0)) -> tuple[float, ...]:
+def traits_of(
+    noise: OdometryNoise, antenna: tuple[float, float] = (0.0, 0.0), height: float = 0.0
+) -> tuple[float, ...]:
     return (noise.scale, noise.yaw_rad_per_m, noise.translation_per_sqrt_m,
-            noise.yaw_rad_per_sqrt_m, *antenna)  # fmt: skip
+            noise.yaw_rad_per_sqrt_m, *antenna, height)  # fmt: skip
 
 
 # ---- a small team with a graph -----------------------------------------------------------------

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from slam_scenes import config
+from slam_scenes import NOISE, config, traits_of
 
 from drslamd.conventions import GRID_US, Chain
 from drslamd.slam.items import Keyframe
 from drslamd.slam.odometry import Track
-from drslamd.slam.pair_window import CONFIRM_US, RangeItems, Request, Side, request
+from drslamd.slam.pair_window import CONFIRM_US, RangeItems, Request, Side, level, request
 from drslamd.slam.pose_graph import ChainItems
 from drslamd.slam.range_buffer import RangeBuffer
 
@@ -88,3 +88,18 @@ def test_a_range_for_the_graph_says_how_much_it_is_worth(
     assert item is not None
     assert item.range_m == metres
     assert item.sigma_m == pytest.approx(sigma, abs=0.006)
+
+
+@pytest.mark.parametrize(
+    ("measured", "from_above"),
+    [(5.0, 4.0), (3.0001, math.sqrt(3.0001**2 - 9)), (2.9, 2.9), (-0.3, -0.3)],
+)
+def test_ranges_between_antennas_of_different_heights_are_seen_from_above(
+    measured: float, from_above: float
+) -> None:
+    low, high = ChainItems(Chain(0, 1)), ChainItems(Chain(1, 1))
+    low.take_traits(0, traits_of(NOISE, height=0.5))
+    high.take_traits(0, traits_of(NOISE, height=3.5))
+    a, b = Side(Track(10), low), Side(Track(10), high)
+    assert level(np.array([measured]), a, b)[0] == pytest.approx(from_above)
+    assert level(np.array([measured]), a, a)[0] == pytest.approx(measured)

@@ -119,7 +119,7 @@ def _logs(
 ) -> dict[int, list[GraphEntry]]:  # fmt: skip
     """What each robot would have told the others."""
     traits = (noise.scale, noise.yaw_rad_per_m, noise.translation_per_sqrt_m,
-              noise.yaw_rad_per_sqrt_m, 0.0, 0.0)  # fmt: skip
+              noise.yaw_rad_per_sqrt_m, 0.0, 0.0, 0.0)  # fmt: skip
     covariance = se2.packed(_covariance(recording))
     logs = {}
     for robot, chain in chains.items():

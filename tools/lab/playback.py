@@ -38,6 +38,7 @@ class Hardware:
         self.base = base
         self.uwb = LinkTrackEmulator(robot, frame, power_up_s=11.0 + 7 * robot)
         self.antenna = recording.antennas.get(robot, (0.0, 0.0))
+        self.antenna_z_m = 0.0
         self._recording = recording
 
     def uwb_chunks(self) -> Iterator[Chunk]:
@@ -77,6 +78,7 @@ def robot_toml(hardware: Hardware, uwb_port: str, wheel_port: str, extra: str = 
         f"[robot]\nid = {hardware.robot}\n{team}"
         f'[uwb]\nport = "{uwb_port}"\nid = {hardware.uwb.uwb_id}\n'
         f"antenna_x_m = {hardware.antenna[0]}\nantenna_y_m = {hardware.antenna[1]}\n"
+        f"antenna_z_m = {hardware.antenna_z_m}\n"
         f"[wheels]\n{hardware.base.config(wheel_port)}{extra}"
     )
 
