@@ -13,7 +13,7 @@ from collections.abc import Hashable
 import numpy as np
 
 from drslamd.config import Config
-from drslamd.conventions import SECOND_US
+from drslamd.conventions import SECOND_US, Segment
 from drslamd.events import Effect
 from drslamd.gossip.message_types import (
     MAX_BATCH,
@@ -51,7 +51,8 @@ class Broadcast:
         self._team, self._front, self._back = team, front, back
         self._news: Hashable = None
         self._status_said = self._pose_said = -QUIET_US
-        self._pose: Array = np.full(3, np.inf)
+        self._pose: tuple[Segment, Array] | None = None
+        """What was said last, and in whose frame."""
         self._odometry_said: deque[tuple[int, int]] = deque(maxlen=BATCHES)
         """When batches were said, and one past the last sample of each."""
 
@@ -132,15 +133,21 @@ class Broadcast:
         if estimate is None or found is None:
             return []
         pose_utime, pose, covariance = found
-        moved = pose - self._pose
-        moved[2] = se2.wrap(moved[2]) if np.isfinite(moved[2]) else moved[2]
-        known = bool((moved**2 < np.diag(covariance)).all())
-        if known and utime - self._pose_said < POSE_US - SOONER_US:
+        soon = utime - self._pose_said < POSE_US - SOONER_US
+        if soon and not self._is_news(estimate.frame, pose, covariance):
             return []
-        self._pose, self._pose_said = pose, utime
+        self._pose, self._pose_said = (estimate.frame, pose), utime
         x, y, theta = pose.tolist()
         frame = estimate.frame
         message = Pose(
             1, frame.robot, frame.epoch, pose_utime, (x, y, theta), se2.packed(covariance)
         )
         return [self._team.send(message, utime)]
+
+    def _is_news(self, frame: Segment, pose: Array, covariance: Array) -> bool:
+        """Did the pose move by more than its own sigma since it was said?"""
+        if self._pose is None or self._pose[0] != frame:
+            return True
+        moved = pose - self._pose[1]
+        moved[2] = se2.wrap(moved[2])
+        return bool((moved**2 > np.diag(covariance)).any())

@@ -84,9 +84,7 @@ class Daemon:
         self._status = StatusSocket(
             socket_path(config),
             {
-                "status": lambda: {**report.status(self.robot, self._clock.now()),
-                                   "ms": self._pace.milliseconds(),
-                                   "loop_lag_ms": self._pace.lag()},
+                "status": self._picture,
                 "trajectory": lambda: report.trajectories(self.robot),
                 "closures": lambda: report.closures(self.robot),
             },
@@ -248,6 +246,12 @@ class Daemon:
                 self._notifier.alive()
             self._notifier.status(self._one_line())
 
+    def _picture(self) -> dict[str, Any]:
+        """The robot's own picture, and what only the process knows."""
+        picture = report.status(self.robot, self._clock.now())
+        picture["network"]["dropped"] = self._transport.dropped
+        return {**picture, "ms": self._pace.milliseconds(), "loop_lag_ms": self._pace.lag()}
+
     def _one_line(self) -> str:
         picture = report.status(self.robot, self._clock.now())
         alive = sum(peer["alive"] for peer in picture["peers"].values())
@@ -292,7 +296,7 @@ def _note(note: Note) -> None:
     log.log(_LEVELS[note.level.value], note.event, **note.fields)
 
 
-_LEVELS = {"debug": 10, "info": 20, "warning": 30, "error": 40}
+_LEVELS = {"info": 20, "warning": 30}
 
 
 def _dbc_text(config: Config) -> str:

@@ -156,10 +156,8 @@ class Restart:
 
 
 class Level(Enum):
-    DEBUG = "debug"
     INFO = "info"
     WARNING = "warning"
-    ERROR = "error"
 
 
 @dataclass(frozen=True)

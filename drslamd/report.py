@@ -78,6 +78,7 @@ def _uwb(robot: Robot, utime: int) -> dict[str, Any]:
         **_port(robot, "uwb"),
         "age_s": age_s(utime, robot.uwb.last_good_utime),
         "voltage_v": robot.uwb.voltage_v,
+        "foreign_id": robot.uwb.foreign_id,
         "counters": robot.uwb.counters(),
         "ranges": fresh,
     }
@@ -101,6 +102,8 @@ def _network(robot: Robot, utime: int) -> dict[str, Any]:
         "bytes_sent": robot.outbox.bytes_sent,
         "held_back": dict(robot.outbox.held_back),
         "accepted": team.accepted,
+        "own_echoes": team.own_echoes,
+        "log_entries_heard_again": team.repeats_heard,
         "refused": dict(team.refused),
         "own_echo_age_s": age_s(utime, team.last_echo),
         "log_entries_repeated": team.logs.repeated,

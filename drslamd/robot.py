@@ -107,7 +107,6 @@ class Robot:
         self.ports: dict[str, PortState] = {}
         self.network: NetworkState | None = None
         self.next_tick = 0
-        self.last_motion: int | None = None
         self._jobs: dict[int, _Job] = {}
         self._jobs_begun = 0
         self.cycles: dict[str, tuple[int, int]] = {}
@@ -153,15 +152,14 @@ class Robot:
             for sample in self.uwb.feed(event.data, event.utime):
                 self.front.on_range(sample)
             return []
-        return self._on_motions(self.wheels.feed(event.data, event.utime), event.utime)
+        return self._on_motions(self.wheels.feed(event.data, event.utime))
 
     def _on_can(self, event: CanFrame) -> list[Effect]:
-        return self._on_motions(self.wheels.on_frame(event), event.utime)
+        return self._on_motions(self.wheels.on_frame(event))
 
-    def _on_motions(self, motions: list[Any], utime: int) -> list[Effect]:
+    def _on_motions(self, motions: list[Any]) -> list[Effect]:
         for motion in motions:
             self.front.on_motion(motion)
-            self.last_motion = utime
         return []
 
     def _on_port(self, event: PortState) -> list[Effect]:

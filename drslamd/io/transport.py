@@ -6,7 +6,13 @@ from typing import Protocol
 
 
 class Transport(Protocol):
-    """Publishes LCM messages, and delivers those of others as events."""
+    """Publishes LCM messages, and delivers those of others as events.
+
+    Attributes:
+        dropped: messages that the network did not take.
+    """
+
+    dropped: int
 
     async def run(self) -> None:
         """Join, receive, join again after a fault; ends only by cancellation."""

@@ -67,6 +67,9 @@ class DbcDriver(CanDriver):
     def on_frame(self, frame: CanFrame) -> list[WheelSample]:
         return tallied(self.tally, self._decode(frame))
 
+    def unpaired(self) -> int:
+        return self._pairing.unpaired
+
     def _decode(self, frame: CanFrame) -> Outcome:
         sources = [source for source in self._sources if self._is_meant(frame, source)]
         values: list[float] = []

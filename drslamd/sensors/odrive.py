@@ -47,6 +47,9 @@ class OdriveDriver(CanDriver):
     def on_frame(self, frame: CanFrame) -> list[WheelSample]:
         return tallied(self.tally, self._decode(frame))
 
+    def unpaired(self) -> int:
+        return self._pairing.unpaired
+
     def fault(self) -> str | None:
         for axis, error in self.axis_errors.items():
             if error:

@@ -59,6 +59,10 @@ class WheelDriver(Protocol):
         """One sentence about what the base itself reports to be wrong, with a remedy, or None."""
         return None
 
+    def unpaired(self) -> int:
+        """Values of one side that found none of the other side in time."""
+        return 0
+
 
 @runtime_checkable
 class SerialDriver(WheelDriver, Protocol):

@@ -169,6 +169,7 @@ class WheelInput:
         gaps = {f"gaps.{gap.name}": count for gap, count in self.base.gaps.items()}
         return {
             **self.driver.tally.counters("messages"),
+            "messages.unpaired": self.driver.unpaired(),
             **self.base.tally.counters("samples"),
             **gaps,
         }

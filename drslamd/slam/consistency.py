@@ -149,21 +149,6 @@ class PairConsistency:
         """Size of the largest consistent set among the candidates that were not kept."""
         return self.graph.runner_up().bit_count()
 
-    def why_not(self, vertex: int) -> tuple[int, float] | None:
-        """The kept closure that candidate `vertex` disagrees with most, and its squared length.
-
-        None when it is kept itself. Hypotheses of its own window are no reason: those exclude
-        each other whatever their distance.
-        """
-        closure = self._columns.closure[0]
-        kept = np.array(bits(self.graph.clique), dtype=np.int64)
-        others = kept[closure[kept] != closure[vertex]]
-        if vertex in kept or not len(others):
-            return None
-        lengths = self._lengths(np.maximum(others, vertex), np.minimum(others, vertex))
-        worst = int(np.argmax(lengths))
-        return int(closure[others[worst]]), float(lengths[worst])
-
     def _forget(self) -> None:
         keep = MAX_VERTICES - FORGET
         for column in self._columns.all():

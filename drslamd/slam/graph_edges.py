@@ -190,12 +190,6 @@ def sensible(i: Index, j: Index) -> NDArray[np.bool_]:
     return np.asarray(~far | np.isin(i, standing) | np.isin(j, standing))
 
 
-def no_ranges() -> Ranges:
-    """For graphs whose edges are the closures."""
-    nobody = Numbering(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), {})
-    return ranges(TeamGraph(), nobody)[0]
-
-
 def _name(pair: PairItems) -> tuple[int, int]:
     low, high = sorted((pair.a.robot, pair.b.robot))
     return low, high

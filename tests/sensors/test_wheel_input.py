@@ -213,6 +213,7 @@ def test_counters_have_flat_names() -> None:
     assert wheels.counters() == {
         "messages.accepted": 3,
         "messages.ignored": 1,
+        "messages.unpaired": 0,
         "messages.refused.TIME": 1,
         "samples.accepted": 3,
         "samples.ignored": 0,

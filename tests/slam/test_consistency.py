@@ -183,27 +183,6 @@ def test_forgetting_keeps_what_is_known_of_the_rest(monkeypatch: pytest.MonkeyPa
     assert pair.graph.adjacency == fresh.graph.adjacency
 
 
-def test_one_who_is_not_kept_is_told_why() -> None:
-    drive = Drive(10)
-    odd = drive.candidate(3, 75, product(drive.true(75), [2.0, 0, 0]))
-    pair = judged(*(drive.candidate(k, 30 * k) for k in range(3)), odd, drive.candidate(4, 200))
-    assert pair.why_not(0) is None
-    reason = pair.why_not(3)
-    assert reason is not None
-    lengths = dict(zip([0, 1, 2], pair.distances(3), strict=True)) | {4: pair.distances(4)[3]}
-    worst = max(lengths, key=lambda k: float(lengths[k]))
-    assert reason[0] == worst
-    assert reason[1] == pytest.approx(float(lengths[worst]))
-    assert reason[1] > quantile3(1 - EPSILON)
-
-
-def test_one_alone_and_one_beside_its_own_twin_have_no_reason() -> None:
-    drive = Drive(11)
-    pair = judged(drive.candidate(0, 10), drive.candidate(0, 10))
-    assert pair.why_not(0) is None
-    assert pair.why_not(1) is None
-
-
 def test_renewed_sums_make_the_way_between_longer() -> None:
     """Keyframes between two candidates came late, so more may have been lost on the way."""
     drive = Drive(12)

@@ -228,7 +228,6 @@ def test_withdrawn_closures_and_those_of_other_groups_are_no_edges() -> None:
 
 
 def test_no_items_are_no_edges() -> None:
-    assert len(graph_edges.no_ranges()) == 0
     assert graph_edges.pose_edges([]).covariance.shape == (0, 3, 3)
 
 

@@ -66,8 +66,10 @@ def main(arguments: list[str] | None = None) -> int:
         return NO_INPUT
     print(f"{_machine()}\n\n{rows.markdown(found)}")
     if options.json:
-        written = {"machine": _machine(), "quick": options.quick, "rows": rows.to_json(found)}
-        options.json.write_text(json.dumps(written, indent=1) + "\n")
+        # a line for each row, so that a stored file can be read and compared
+        lines = ",\n".join(json.dumps(row) for row in rows.to_json(found))
+        head = json.dumps({"machine": _machine(), "quick": options.quick})[:-1]
+        options.json.write_text(f'{head}, "rows": [\n{lines}\n]}}\n')
     if options.picture:
         curves.draw(found, options.picture)
     worse = rows.regressions(found, stored)
