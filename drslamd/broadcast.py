@@ -8,7 +8,7 @@ comes a third as often, and a pose that moved less than it is uncertain waits fo
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Hashable
+from collections.abc import Set
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from drslamd.conventions import SECOND_US, Segment
 from drslamd.events import Effect
 from drslamd.gossip.message_types import (
     MAX_BATCH,
-    MAX_HEARD,
     NOTHING_WANTED,
     UNKNOWN_CLOCK,
     OdometryBatch,
@@ -49,7 +48,7 @@ class Broadcast:
     def __init__(self, config: Config, team: Team, front: FrontEnd, back: BackEnd) -> None:
         self._config = config
         self._team, self._front, self._back = team, front, back
-        self._news: Hashable = None
+        self._news: object = None
         self._status_said = self._pose_said = -QUIET_US
         self._pose: tuple[Segment, Array] | None = None
         """What was said last, and in whose frame."""
@@ -67,15 +66,20 @@ class Broadcast:
             uwb_clock: our clock minus LinkTrack's system_time, us, where that is known.
         """
         self._team.compare_radio_clocks(uwb_clock, utime)
-        status = self.status(neighbours, uwb_clock, utime)
-        lacks = self._team.lacks_odometry() or any(g.complete < g.newest for g in status.logs)
-        news = (status.state, status.frame, status.uwb_id, status.ranged,
-                frozenset((h.id, h.epoch) for h in status.heard))  # fmt: skip
-        quiet = bool(status.state) and not lacks and news == self._news
+        estimate, team = self._back.estimate, self._team
+        frame = None if estimate is None else estimate.frame.robot
+        news = frame, self._ranged(utime), team.audible(utime)
+        lacks = team.lacks_odometry() or team.logs.lacks_any()
+        quiet = estimate is not None and not lacks and news == self._news
         if quiet and utime - self._status_said < QUIET_US - SOONER_US:
             return []
         self._news, self._status_said = news, utime
-        return [self._team.send(status, utime)]
+        return [team.send(self.status(neighbours, uwb_clock, utime), utime)]
+
+    def _ranged(self, utime: int) -> Set[int]:
+        """Robots that we measure ranges to."""
+        robots = (self._team.robot_of_uwb(uwb_id) for uwb_id in self._front.ranged(utime))
+        return {robot for robot in robots if robot is not None}
 
     def status(
         self,
@@ -84,9 +88,9 @@ class Broadcast:
         utime: int,
         leaving: bool = False,
     ) -> Status:
-        """What we are, whom we hear, what we hold."""
+        """What we are, whom we hear, what we hold; made to be sent, because names take turns."""
         estimate = self._back.estimate
-        ranged = (self._team.robot_of_uwb(uwb_id) for uwb_id in self._front.ranged(utime))
+        heard = self._team.heard(utime, self._front.needed(neighbours, utime))
         return Status(
             state=int(estimate is not None),
             frame=estimate.frame.robot if estimate else self._team.own.robot,
@@ -94,8 +98,8 @@ class Broadcast:
             uwb_id=self._config.uwb_id,
             uwb_clock_us=UNKNOWN_CLOCK if uwb_clock is None else uwb_clock,
             graph_hash=self._back.digest(),
-            heard=self._team.heard(utime, self._front.needed(neighbours, utime)),
-            ranged=tuple(sorted(r for r in ranged if r is not None))[:MAX_HEARD],
+            heard=heard,
+            ranged=tuple(sorted(self._ranged(utime) & {h.id for h in heard})),
             logs=self._team.logs.states(),
         )
 

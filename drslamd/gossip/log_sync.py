@@ -9,7 +9,7 @@ others a little later and only if nobody else did.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import NamedTuple
@@ -100,7 +100,8 @@ class _Repeat:
 
 @dataclass
 class _Question:
-    """What a peer lacks, in how many statuses in a row it said so, and when to answer again."""
+    """What a peer lacks, in how many statuses in a row (of those that name the log) it said so, and
+    when to answer again."""
 
     lacking: dict[_Place, int]
     again: int
@@ -168,6 +169,10 @@ class LogSync:
         log = self._logs.get(robot)
         return log.newest - log.first - len(log.sealed) if log else 0
 
+    def lacks_any(self) -> bool:
+        """Do we know of entries, of anybody's, that we do not hold?"""
+        return any(log.complete < log.newest for log in self._logs.values())
+
     def peer_holds(self, states: tuple[LogState, ...], sender: int, utime: int) -> None:
         """A peer said what it holds: learn what we lack, plan to repeat what it lacks."""
         for theirs in states:
@@ -176,8 +181,13 @@ class LogSync:
                 self._learn(log, theirs, sender)
         last = self._questions.get(sender)
         asked = last.lacking if last else {}
-        lacking = {place: asked.get(place, 0) + 1 for place in self._lacking(sender, states)}
-        self._questions[sender] = _Question(lacking, utime + OVERDUE_US, utime + BELIEVED_US)
+        named = {state.id: state for state in states}
+        left_out = self._logs.keys() - named if len(states) == MAX_LOGS else set()
+        places = self._lacking(sender, named, left_out)
+        lacking = {place: asked.get(place, 0) + 1 for place in places}
+        still = {place: times for place, times in asked.items() if place.robot in left_out}
+        question = _Question({**still, **lacking}, utime + OVERDUE_US, utime + BELIEVED_US)
+        self._questions[sender] = question
         for place, times in lacking.items():
             self._plan(place, times, utime)
 
@@ -189,14 +199,14 @@ class LogSync:
             # the owner itself no longer holds what we lack
             log.forget_before(theirs.first)
 
-    def _lacking(self, sender: int, states: tuple[LogState, ...]) -> Iterator[_Place]:
+    def _lacking(
+        self, sender: int, named: dict[int, LogState], left_out: Set[int]
+    ) -> Iterator[_Place]:
         """What a peer lacks and we hold, a few entries of each log."""
-        named = {state.id: state for state in states}
-        all_named = len(states) < MAX_LOGS
         for robot, log in self._logs.items():
-            theirs = named.get(robot)
-            if robot == sender or (theirs is None and not all_named):
+            if robot == sender or robot in left_out:
                 continue
+            theirs = named.get(robot)
             if theirs is None or theirs.epoch < log.epoch:
                 start = log.first
             elif theirs.epoch == log.epoch:

@@ -17,8 +17,8 @@ UNKNOWN_CLOCK = -(2**63)
 NOTHING_WANTED = -1
 
 MAX_HEARD = 28
-"""Peers named in one status, which with as many logs has 1,361 bytes. Robots that hear more than
-this many others do not all learn that they are heard."""
+"""Peers named in one status, which with as many logs has 1,361 bytes; whoever hears more names them
+in turn."""
 MAX_LOGS = 28
 """Logs named in one status; whoever holds more names them in turn."""
 MAX_BATCH = 150

@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Set
+from dataclasses import dataclass
 
 from drslamd.conventions import GRID_US, SECOND_US, Chain
-from drslamd.gossip.message_types import MAX_BATCH, NOTHING_WANTED, OdometryBatch, Pose, Status
+from drslamd.gossip.message_types import (
+    MAX_BATCH,
+    MAX_HEARD,
+    NOTHING_WANTED,
+    Heard,
+    OdometryBatch,
+    Pose,
+    Status,
+)
 from drslamd.gossip.peer_clock import PeerClock
 from drslamd.slam.items import PublicPoses
 from drslamd.slam.neighbour import Neighbour
@@ -18,6 +28,18 @@ GAP_US = 8 * SECOND_US
 """What of its odometry is not said again for so long will not be."""
 LOSS_STATUSES = 30
 """Heartbeats over which the loss is counted: the last half minute or so."""
+REMEMBERED_US = 40 * SECOND_US
+"""How long it counts that a peer named a robot, when it hears too many for one status: 254 take ten
+heartbeats, which come every three seconds at the slowest; a few may be lost."""
+
+
+@dataclass(frozen=True)
+class _Named:
+    """What a peer said of one robot that it hears, whether it ranges to it, and when."""
+
+    heard: Heard
+    is_ranged: bool
+    utime: int
 
 
 class Peer:
@@ -33,7 +55,7 @@ class Peer:
         self.last_heard = utime
         self.received = 0
         self._status_counter = self._pose_counter = 0
-        self._status_at = utime
+        self._named: dict[int, _Named] = {}
         self._gap_since: int | None = None
         self._tallies: deque[tuple[int, int]] = deque(maxlen=LOSS_STATUSES)
         """(messages that it had sent, those of them that had come) at each of its statuses."""
@@ -56,13 +78,27 @@ class Peer:
         """Keep the latest status; False when this one was overtaken by a later one."""
         if counter <= self._status_counter:
             return False
-        self._status_counter, self.status, self._status_at = counter, status, utime
+        self._status_counter, self.status = counter, status
         # entries of its log have counters too, but are not heard from the peer alone
         entries = max((log.newest for log in status.logs if log.id == self.chain.robot), default=0)
         self._tallies.append((counter - entries, self.received))
-        echoes = (heard.delay_us for heard in status.heard if (heard.id, heard.epoch) == own)
-        self.clock.echoed(next(echoes, None))
+        self._remember(status, utime)
+        of_us = self._named_as(own)
+        self.clock.echoed((of_us.heard.delay_us, of_us.utime) if of_us else None)
         return True
+
+    def _remember(self, status: Status, utime: int) -> None:
+        """Keep whom it hears; only a full status leaves anybody out."""
+        is_full = len(status.heard) == MAX_HEARD
+        for robot, named in list(self._named.items()):
+            if not is_full or utime - named.utime >= REMEMBERED_US:
+                del self._named[robot]
+        for heard in status.heard:
+            self._named[heard.id] = _Named(heard, heard.id in status.ranged, utime)
+
+    def _named_as(self, chain: Chain) -> _Named | None:
+        named = self._named.get(chain.robot)
+        return named if named and named.heard.epoch == chain.epoch else None
 
     def take_pose(self, pose: Pose, counter: int) -> None:
         """Keep the latest pose."""
@@ -98,20 +134,24 @@ class Peer:
 
     def hears(self, own: Chain) -> bool:
         """Has it said that it hears this very start of ours? A replayed recording cannot."""
-        return self.status is not None and any((h.id, h.epoch) == own for h in self.status.heard)
+        return self._named_as(own) is not None
+
+    @property
+    def audible(self) -> Set[Chain]:
+        """Whom it hears."""
+        return {Chain(robot, named.heard.epoch) for robot, named in self._named.items()}
 
     def neighbour(self, own: Chain, utime: int) -> Neighbour:
         """What the front end must know of a living peer."""
         assert self.status is not None
-        offset = self.clock.offset(utime)
-        wanted = (h.wanted_n for h in self.status.heard if (h.id, h.epoch) == own)
+        offset, of_us = self.clock.offset(utime), self._named_as(own)
         known = offset is not None and offset.uncertainty_us <= GRID_US
         return Neighbour(
             self.chain,
             self.status.uwb_id,
-            own.robot in self.status.ranged,
+            of_us is not None and of_us.is_ranged,
             self.track,
             offset.us if offset is not None and known else None,
-            next(wanted, NOTHING_WANTED),
-            self._status_at,
+            of_us.heard.wanted_n if of_us else NOTHING_WANTED,
+            of_us.utime if of_us else utime,
         )

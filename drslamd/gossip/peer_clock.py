@@ -19,7 +19,9 @@ from drslamd.sensors.linktrack_input import SYSTEM_TIME_PERIOD_US
 WINDOW_S = 16
 """Over which the smallest delay is taken."""
 DRIFT_US = 3_200
-"""What clocks that drift apart by 200 ppm move in that time; either delay may be so old."""
+"""What clocks that drift apart by 200 ppm move in that time; either delay may be so old ..."""
+AGEING = 10_000
+"""... and what the peer said grows older until it says it anew: half of 200 ppm, as a divisor."""
 ONE_WAY_UNCERTAINTY_US = 100 * MILLISECOND_US
 """What is claimed while the peer has not yet said how it hears us."""
 RADIO_UNCERTAINTY_US = 3 * MILLISECOND_US
@@ -42,7 +44,7 @@ class PeerClock:
     def __init__(self) -> None:
         self._smallest: deque[tuple[int, int]] = deque()
         """(second, smallest arrival - stamp in it), at most `WINDOW_S` of them."""
-        self._echo: int | None = None
+        self._echo: tuple[int, int] | None = None
         self._radio: tuple[int, int] | None = None
 
     def heard(self, sent: int, arrived: int) -> None:
@@ -54,9 +56,10 @@ class PeerClock:
         while self._smallest[0][0] <= second - WINDOW_S:
             self._smallest.popleft()
 
-    def echoed(self, delay_us: int | None) -> None:
-        """The peer's own smallest (arrival there - our stamp); None when it does not hear us."""
-        self._echo = delay_us
+    def echoed(self, echo: tuple[int, int] | None) -> None:
+        """The peer's own smallest (arrival there - our stamp), and when it said so; None when it
+        does not hear us."""
+        self._echo = echo
 
     def radio(self, own_minus_system: int, peer_minus_system: int, utime: int) -> None:
         """Both clocks against LinkTrack's system_time, each modulo its period."""
@@ -69,15 +72,16 @@ class PeerClock:
 
     def offset(self, utime: int) -> Offset | None:
         """The best of what is known, or None before the first message."""
-        incoming, echo = self.delay_us, self._echo
+        incoming = self.delay_us
         if incoming is None:
             return None
-        if echo is None:
+        if self._echo is None:
             return Offset(-incoming, ONE_WAY_UNCERTAINTY_US, "one way")
+        echo, said = self._echo
         radio = self._by_radio(-incoming, echo, utime)
         if radio is not None:
             return Offset(radio, RADIO_UNCERTAINTY_US, "LinkTrack system_time")
-        uncertainty = max(0, (echo + incoming) // 2) + DRIFT_US
+        uncertainty = max(0, (echo + incoming) // 2) + DRIFT_US + max(0, utime - said) // AGEING
         return Offset((echo - incoming) // 2, uncertainty, "messages")
 
     def _by_radio(self, least: int, most: int, utime: int) -> int | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence, Set
 from dataclasses import dataclass
 
 from drslamd.conventions import SECOND_US, Chain
@@ -68,6 +68,8 @@ class Team:
         self.own_echoes = 0
         self.last_echo: int | None = None
         self._next_seq = 0
+        self._named_last = -1
+        """The robot after which the next status goes on, when it cannot name all that are heard."""
         self.superseded_by: int | None = None
         """A later epoch of ours that a peer has heard; then our messages are refused as old."""
         self._last_refused: dict[SealFault, tuple[int, str]] = {}
@@ -129,19 +131,26 @@ class Team:
         """Log entries that somebody lacks; ask several times a second."""
         return [self.send_sealed(owner, sealed) for owner, sealed in self.logs.due(utime)]
 
+    def audible(self, utime: int) -> Set[Chain]:
+        """Whom we hear."""
+        return {peer.chain for peer in self.peers.values() if peer.is_alive(utime)}
+
     def heard(self, utime: int, needed: Container[int] = ()) -> tuple[Heard, ...]:
-        """For our status: whom we hear, the most recent first.
+        """For our next status: whom we hear, in turn when they are too many.
 
         Args:
             needed: robots whose odometry we need.
         """
-        alive = [peer for peer in self.peers.values() if peer.is_alive(utime)]
-        recent = sorted(alive, key=lambda peer: -peer.last_heard)[: messages.MAX_HEARD]
+        chains = sorted(self.audible(utime))
+        if len(chains) > messages.MAX_HEARD:
+            later = [chain for chain in chains if chain.robot > self._named_last]
+            chains = (later + chains)[: messages.MAX_HEARD]
+            self._named_last = chains[-1].robot
         return tuple(
             Heard(*peer.chain, peer.clock.delay_us, peer.track.end)
             if peer.chain.robot in needed
             else Heard(*peer.chain, peer.clock.delay_us)
-            for peer in recent
+            for peer in (self.peers[chain.robot] for chain in chains)
             if peer.clock.delay_us is not None
         )
 
@@ -232,11 +241,10 @@ class Team:
         """Robots that live: those we talk to, and those that they vouch for."""
         direct = self.living(utime)
         vouched = {
-            heard.id
+            chain.robot
             for peer in direct.values()
-            if peer.status
-            for heard in peer.status.heard
-            if heard.epoch == self.logs.epoch(heard.id)
+            for chain in peer.audible
+            if chain.epoch == self.logs.epoch(chain.robot)
         }
         return set(direct) | vouched | {self.own.robot}
 

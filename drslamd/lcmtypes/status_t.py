@@ -65,7 +65,7 @@ class status_t(object):
         """ LCM Type: int16_t """
         self.ranged = []
         """
-        robots to which this one measures ranges
+        those of the heard to which this one measures ranges
         LCM Type: int16_t[n_ranged]
         """
 

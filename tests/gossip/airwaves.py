@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from collections import Counter
 from collections.abc import Callable, Iterable
 
 from sealed import MS, SECOND, a_seal, a_status
@@ -17,24 +18,27 @@ Link = Callable[[int, int], bool]
 
 
 class Air:
-    """Robots with ids 0, 1, 2, ... that send a status a second, each at its own moment.
+    """Robots with ids 0, 1, 2, ... that send a status every `period`, each at its own moment.
 
     Attributes:
         hears: does robot b hear what robot a sends?
         held: entries of all logs by robot: {(owner, seq): entry}.
         sent: messages on the air so far.
         entries_sent: log entries among them, repeated ones and all.
+        bytes_sent: by robot.
     """
 
-    def __init__(self, robots: int, loss: float = 0.0, seed: int = 0) -> None:
+    def __init__(self, robots: int, loss: float = 0.0, seed: int = 0, period: int = SECOND) -> None:
         self.teams = {robot: Team(a_seal(robot)) for robot in range(robots)}
         self.held: dict[int, dict[tuple[int, int], GraphEntry]] = {r: {} for r in self.teams}
         self.hears: Link = lambda a, b: True
         self.utime = 10 * SECOND
         self.sent = self.entries_sent = 0
+        self.bytes_sent: Counter[int] = Counter()
         self._loss = loss
         self._random = random.Random(seed)
-        self._phase = {robot: self._random.randrange(10) for robot in self.teams}
+        self._steps = period // STEP
+        self._phase = {robot: self._random.randrange(self._steps) for robot in self.teams}
 
     def say(self, robot: int, *, aloud: bool = True) -> None:
         """A robot adds an entry to its log, and sends it if `aloud`."""
@@ -54,6 +58,7 @@ class Air:
     def carry(self, sender: int, send: Send) -> None:
         """One message to whoever hears it."""
         self.sent += 1
+        self.bytes_sent[sender] += len(send.payload)
         self.entries_sent += "GRAPH" in send.channel
         for robot, team in self.teams.items():
             if robot == sender or not self.hears(sender, robot):
@@ -73,7 +78,7 @@ class Air:
         for robot, team in self.teams.items():
             for send in team.repeats(self.utime):
                 self.carry(robot, send)
-            if self.utime // STEP % 10 == self._phase[robot]:
+            if self.utime // STEP % self._steps == self._phase[robot]:
                 status = a_status(team.heard(self.utime), team.logs.states())
                 self.carry(robot, team.send(status, self.utime))
 

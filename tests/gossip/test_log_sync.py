@@ -323,11 +323,13 @@ def test_a_relay_stays_silent_when_somebody_else_repeated_the_entry(robot: int) 
     assert repeated(logs, T0 + 1200 * MS) == [said(OWNER, 1)]
 
 
-def asked_four_times(logs: LogSync, repeated_by_another: bool) -> list[list[int]]:
+def asked_four_times(
+    logs: LogSync, repeated_by_another: bool, states: tuple[LogState, ...] = ()
+) -> list[list[int]]:
     """When an entry leaves, in ms after each of four statuses a second apart."""
     out: list[list[int]] = []
     for k in range(4):
-        logs.peer_holds((), 9, T0 + k * SECOND)
+        logs.peer_holds(states, 9, T0 + k * SECOND)
         out.append([])
         for ms in range(0, 1000, 100):
             if ms == 100 and repeated_by_another:
@@ -341,6 +343,34 @@ def test_a_relay_goes_first_when_three_repeats_of_the_owner_did_not_help() -> No
     """The owner may be heard by the relay, and not by the one who asks."""
     logs = holding(4, OWNER, 0)
     assert asked_four_times(logs, repeated_by_another=True) == [[], [], [], [0]]
+
+
+def test_statuses_that_leave_a_log_out_do_not_begin_the_count_anew() -> None:
+    """Whoever holds many logs names each in some of its statuses only."""
+    others = tuple(LogState(100 + k, 1, 0, 0, 0) for k in range(28))
+    logs = holding(4, OWNER, 0)
+    assert asked_four_times(logs, True, (*state(OWNER), *others[1:])) == [[], [], [], [0]]
+    logs = holding(4, OWNER, 0)
+    for k in range(3):
+        logs.peer_holds((*state(OWNER), *others[1:]), 9, T0 + 2 * k * SECOND)
+        logs.add(OWNER, 0, said(OWNER, 0), T0 + 2 * k * SECOND + 100 * MS)
+        assert logs.due(T0 + (2 * k + 1) * SECOND) == []
+        logs.peer_holds(others, 9, T0 + (2 * k + 1) * SECOND)
+    logs.peer_holds((*state(OWNER), *others[1:]), 9, T0 + 6 * SECOND)
+    assert logs.due(T0 + 6 * SECOND) == [(OWNER.robot, said(OWNER, 0))]
+
+
+@pytest.mark.parametrize("robot", [0, 5, 254])
+def test_a_log_of_anybody_that_is_not_complete_is_lacked(robot: int) -> None:
+    logs = LogSync(0)
+    for k in range(255):
+        logs.begin(Chain(k, 1))
+        logs.add(Chain(k, 1), 0, b"", T0)
+    assert not logs.lacks_any()
+    logs.add(Chain(robot, 1), 2, b"", T0)
+    assert logs.lacks_any()
+    logs.add(Chain(robot, 1), 1, b"", T0)
+    assert not logs.lacks_any()
 
 
 def test_the_owner_comes_last_when_three_of_its_repeats_did_not_help() -> None:

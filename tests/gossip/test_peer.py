@@ -7,7 +7,7 @@ import pytest
 from sealed import MS, SECOND, a_status
 
 from drslamd.conventions import Chain
-from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose
+from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose, Status
 from drslamd.gossip.peer import Peer
 from drslamd.slam.se2 import Array
 
@@ -98,6 +98,50 @@ def test_a_peer_hears_us_when_its_latest_status_names_this_very_start() -> None:
     ):
         peer.take_status(a_status((Heard(7, 7, 0), named)), counter, OWN, 0)
         assert peer.hears(OWN) == hears
+
+
+def full(*named: Heard, others: int) -> Status:
+    """A status that names these, and so many others."""
+    return a_status((*named, *(Heard(100 + k, 1, 0) for k in range(others))), ranged=(1,))
+
+
+@pytest.mark.parametrize(("others", "remembered"), [(27, False), (28, True)])
+def test_a_status_with_room_for_us_says_that_we_are_not_heard_and_a_full_one_does_not(
+    others: int, remembered: bool
+) -> None:
+    peer = a_peer()
+    peer.heard(T0 + SECOND, T0)
+    peer.take_status(full(Heard(*OWN, SECOND, 70), others=27), 1, OWN, T0)
+    peer.take_status(full(others=others), 2, OWN, T0 + 3 * SECOND)
+    assert peer.hears(OWN) == remembered
+    assert (OWN in peer.audible) == remembered
+    neighbour = peer.neighbour(OWN, T0 + 3 * SECOND)
+    assert neighbour.ranges_to_us == remembered
+    assert neighbour.wanted_n == (70 if remembered else -1)
+    assert not remembered or neighbour.wanted_at == T0
+    offset = peer.clock.offset(T0)
+    assert offset is not None
+    assert offset.source == ("messages" if remembered else "one way")
+
+
+@pytest.mark.parametrize(("later", "remembered"), [(40 * SECOND - 1, True), (40 * SECOND, False)])
+def test_whom_full_statuses_no_longer_name_is_remembered_for_forty_seconds(
+    later: int, remembered: bool
+) -> None:
+    peer = a_peer()
+    peer.take_status(full(Heard(*OWN, 0), others=27), 1, OWN, T0)
+    peer.take_status(full(others=28), 2, OWN, T0 + later)
+    assert peer.hears(OWN) == remembered
+
+
+def test_what_is_said_of_us_anew_replaces_what_is_remembered() -> None:
+    peer = a_peer()
+    peer.take_status(full(Heard(*OWN, 0, 70), others=27), 1, OWN, T0)
+    peer.take_status(full(Heard(*OWN, 0, 90), others=27), 2, OWN, T0 + SECOND)
+    neighbour = peer.neighbour(OWN, T0 + SECOND)
+    assert (neighbour.wanted_n, neighbour.wanted_at) == (90, T0 + SECOND)
+    peer.take_status(full(Heard(1, 9, 0), others=27), 3, OWN, T0 + 2 * SECOND)
+    assert not peer.hears(OWN)
 
 
 def test_what_it_hears_of_us_makes_its_clock_known() -> None:
@@ -215,5 +259,5 @@ def test_a_clock_that_is_known_worse_than_a_grid_step_is_not_used(
     """The sum of both delays, halved, and 3.2 ms for the drift make 100 ms."""
     peer = a_peer()
     peer.heard(T0, T0 + 96_800)
-    peer.take_status(a_status((Heard(*OWN, 96_800 + excess_us),)), 1, OWN, 0)
+    peer.take_status(a_status((Heard(*OWN, 96_800 + excess_us),)), 1, OWN, T0)
     assert (peer.neighbour(OWN, T0).ahead_us is not None) == known

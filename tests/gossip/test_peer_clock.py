@@ -54,7 +54,7 @@ class Conversation:
             self.theirs.heard(self.now, there + self._out(self._random))
             self.ours.heard(there, self.now + self._back(self._random))
             if k % 5 == 0:
-                self.ours.echoed(self.theirs.delay_us)
+                self.ours.echoed((self.theirs.delay_us or 0, self.now))
 
     def found(self) -> Offset:
         found = self.ours.offset(self.now)
@@ -79,9 +79,10 @@ def test_before_the_first_message_nothing_is_known() -> None:
 
 
 def test_equal_delays_both_ways_cancel() -> None:
+    """The peer last said how it hears us 0.8 s ago."""
     talk = Conversation(offset=123_456_789, out=constant(7 * MS), back=constant(7 * MS))
     talk.talk(5)
-    assert talk.found() == Offset(123_456_789, 7 * MS + 3_200, "messages")
+    assert talk.found() == Offset(123_456_789, 7 * MS + 3_200 + 80, "messages")
 
 
 @pytest.mark.parametrize("offset", [0, 5 * SECOND, -5 * SECOND, 100 * DAY, -100 * DAY])
@@ -140,6 +141,17 @@ def test_a_peer_that_does_not_say_how_it_hears_us_is_known_to_a_tenth_of_a_secon
     clock = PeerClock()
     clock.heard(T0 + 5 * SECOND, T0 + 40 * MS)
     assert clock.offset(T0) == Offset(5 * SECOND - 40 * MS, 100 * MS, "one way")
+
+
+@pytest.mark.parametrize("ppm", [-200, 200])
+@pytest.mark.parametrize("silence_s", [3, 12, 40])
+def test_what_the_peer_said_some_time_ago_stays_within_the_claim(silence_s: int, ppm: int) -> None:
+    talk = Conversation(10 * SECOND, ppm)
+    talk.talk(20)
+    for _ in range(5 * silence_s):
+        talk.now += 200 * MS
+        talk.ours.heard(talk.now + talk.offset(), talk.now + 2 * MS)
+    assert is_within_the_claim(talk)
 
 
 def test_a_peer_that_no_longer_hears_us_is_known_one_way_again() -> None:

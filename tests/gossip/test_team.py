@@ -201,13 +201,37 @@ def test_we_vouch_for_those_whom_we_heard_of_late() -> None:
         assert [h.id for h in team.heard(utime)] == heard
 
 
-def test_we_name_those_whom_we_heard_last_first_and_what_their_messages_took() -> None:
+def test_we_name_those_whom_we_hear_and_what_their_messages_took() -> None:
     team = a_team()
-    for robot, arrived in ((3, 30 * MS), (4, 50 * MS), (5, 40 * MS)):
+    for robot, arrived in ((5, 40 * MS), (3, 30 * MS), (4, 50 * MS)):
         team.receive(ChannelMessage(T0 + arrived, *sealed(a_seal(robot), a_status(), T0)))
     assert team.heard(T0 + 60 * MS) == (
-        Heard(4, 1, 50 * MS), Heard(5, 1, 40 * MS), Heard(3, 1, 30 * MS),
+        Heard(3, 1, 30 * MS), Heard(4, 1, 50 * MS), Heard(5, 1, 40 * MS),
     )  # fmt: skip
+
+
+@pytest.mark.parametrize(("others", "statuses"), [(28, 1), (29, 2), (56, 2), (57, 3), (254, 10)])
+def test_peers_that_do_not_fit_one_status_take_turns(others: int, statuses: int) -> None:
+    team = Team(a_seal(0))
+    for robot in range(1, others + 1):
+        tell(team, a_seal(robot), a_status())
+    named: list[int] = []
+    for _ in range(statuses):
+        assert len(set(named)) < others
+        ids = [h.id for h in team.heard(T0)]
+        assert len(set(ids)) == len(ids) == min(28, others)
+        named += ids
+    assert set(named) == set(range(1, others + 1))
+    assert len(team.audible(T0)) == others
+
+
+def test_a_robot_that_falls_silent_costs_nobody_else_its_turn() -> None:
+    """Of 40, the first 28 are named; then number 28, where the turn stands, is no longer heard."""
+    team = Team(a_seal(0))
+    for robot in range(1, 41):
+        tell(team, a_seal(robot), a_status(), T0 if robot == 28 else T0 + SECOND)
+    assert [h.id for h in team.heard(T0 + SECOND)] == list(range(1, 29))
+    assert [h.id for h in team.heard(T0 + 5 * SECOND)] == [*range(29, 41), *range(1, 17)]
 
 
 def test_a_peer_is_forgotten_after_ten_silent_minutes_and_its_log_is_not() -> None:
