@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 from lab.simulator import Network
 from teams import EASY, VirtualTeam
 
-from drslamd.conventions import SECOND_US
+from drslamd.broadcast import Broadcast
+from drslamd.config import Config
+from drslamd.conventions import SECOND_US, Segment
 from drslamd.gossip import messages
 from drslamd.gossip.messages import OdometryBatch
+from drslamd.gossip.seal import Seal, team_key
+from drslamd.gossip.team import Team
+from drslamd.slam.back_end import BackEnd
+from drslamd.slam.front_end import FrontEnd
 
 RUN_S = 55
 
@@ -69,6 +77,35 @@ def test_at_ten_solutions_a_second_a_pose_is_said_when_it_is_news() -> None:
     team.run(40.0)
     said = sum(t > 30 for t, _ in sent(team, 1, "POSE"))
     assert 11 <= said <= 70
+
+
+@pytest.mark.parametrize(
+    ("moved", "said"),
+    [
+        ((0.0, 0.0, 0.0), False),
+        ((0.19, -0.09, 0.29), False),
+        ((0.21, 0.0, 0.0), True),
+        ((0.0, -0.11, 0.0), True),
+        ((0.0, 0.0, 2 * np.pi - 0.29), False),
+        ((0.0, 0.0, 2 * np.pi - 0.31), True),
+    ],
+)
+def test_a_pose_that_moved_less_than_it_is_uncertain_waits_for_its_second(
+    moved: tuple[float, float, float], said: bool
+) -> None:
+    frame = Segment(0, 1, 0)
+    broadcast = Broadcast(
+        cast(Config, None),
+        Team(Seal(team_key(None), 0, 1, {})),
+        cast(FrontEnd, None),
+        cast(BackEnd, SimpleNamespace(estimate=SimpleNamespace(frame=frame))),
+    )
+    covariance = np.diag([0.2, 0.1, 0.3]) ** 2
+    first = np.array([1.0, 2.0, 3.0])
+    assert broadcast.pose((0, first, covariance), SECOND_US)
+    found = (0, first + moved, covariance)
+    assert bool(broadcast.pose(found, SECOND_US + 100_000)) == said
+    assert broadcast.pose(found, 3 * SECOND_US)
 
 
 def test_odometry_that_was_lost_is_said_again_so_that_no_hole_remains() -> None:

@@ -127,6 +127,19 @@ def test_marginals_are_blocks_of_the_dense_inverse_calibration_included() -> Non
         assert np.allclose(solution.covariances[k], block, rtol=1e-3, atol=1e-12)
 
 
+def test_what_is_said_of_the_calibration_is_the_end_of_the_dense_inverse() -> None:
+    problem, _ = team_problem(5, robots=3, count=8)
+    solution = solve(problem, marginals=(0,), tolerance=1e-10)
+    x = packed(solution.poses, solution.calibration)
+    j = jacobian(problem, x, robust=False)
+    inverse = np.linalg.inv(j.T @ (range_weights(problem, x)[:, None] * j))
+    _, bias, scale, yaw = unpacked(problem, np.sqrt(np.diag(inverse)))
+    assert solution.spread is not None
+    assert np.allclose(solution.spread.bias, bias, rtol=1e-3)
+    assert np.allclose(solution.spread.scale, scale, rtol=1e-3)
+    assert np.allclose(solution.spread.yaw, yaw, rtol=1e-3)
+
+
 def test_marginals_of_poses_at_the_border_are_the_same() -> None:
     problem, _ = team_problem(6, robots=2, count=40, closures=0)
     far = [(9, k) for k in range(40, 80, 7)]
