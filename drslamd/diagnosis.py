@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from typing import Protocol
 
+from drslamd.config import Config
 from drslamd.conventions import SECOND_US
-from drslamd.events import PortCondition
-
-if TYPE_CHECKING:
-    from drslamd.robot import Robot
+from drslamd.events import NetworkState, PortCondition, PortState
+from drslamd.gossip.outbox import Outbox
+from drslamd.gossip.team import Team
+from drslamd.sensors.linktrack_input import LinkTrackInput
+from drslamd.sensors.wheel_input import WheelInput
+from drslamd.slam.back_end import BackEnd
+from drslamd.slam.front_end import FrontEnd
+from drslamd.slam.neighbour import Neighbour
 
 PATIENCE_US = 3 * SECOND_US
 """How long an open port may be silent before that is worth a word."""
@@ -21,7 +26,24 @@ Condition = tuple[str, "str | None"]
 """A key, and a sentence when something is wrong."""
 
 
-def conditions(robot: Robot, utime: int) -> Iterator[Condition]:
+class Stages(Protocol):
+    """The parts of a robot, from its sensors to its pose."""
+
+    config: Config
+    uwb: LinkTrackInput
+    wheels: WheelInput
+    team: Team
+    front: FrontEnd
+    back: BackEnd
+    outbox: Outbox
+    ports: dict[str, PortState]
+    network: NetworkState | None
+    cycles: dict[str, tuple[int, int]]
+
+    def neighbours(self, utime: int) -> list[Neighbour]: ...
+
+
+def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
     """Everything that is looked after, sensor by sensor and stage by stage."""
     yield "uwb", _sensor(robot, "uwb", robot.uwb.advice, utime)
     yield "wheels", _sensor(robot, "wheels", robot.wheels.advice, utime)
@@ -33,7 +55,9 @@ def conditions(robot: Robot, utime: int) -> Iterator[Condition]:
     yield "budget", robot.outbox.condition(utime)
 
 
-def _sensor(robot: Robot, name: str, advice: Callable[[int], str | None], utime: int) -> str | None:
+def _sensor(
+    robot: Stages, name: str, advice: Callable[[int], str | None], utime: int
+) -> str | None:
     """The fault of its port, or what its codec says once the port has been open for a while."""
     state = robot.ports.get(name)
     if state is None:
@@ -43,7 +67,7 @@ def _sensor(robot: Robot, name: str, advice: Callable[[int], str | None], utime:
     return advice(utime) if utime - state.utime > PATIENCE_US else None
 
 
-def _load(robot: Robot, utime: int) -> str | None:
+def _load(robot: Stages, utime: int) -> str | None:
     """Modules that cannot run as often as they should."""
     config = robot.config
     rates = {"relative_pose": config.relative_pose.rate_hz, "optimizer": config.optimizer.rate_hz}
@@ -58,7 +82,7 @@ def _load(robot: Robot, utime: int) -> str | None:
     return f"{', '.join(late)}, to leave time for the sensors; the team is large for this computer"
 
 
-def why_not_localised(robot: Robot, utime: int) -> str | None:
+def why_not_localised(robot: Stages, utime: int) -> str | None:
     """The first stage at which it stops, None when the robot is localised."""
     if robot.back.estimate is not None:
         return None

@@ -62,8 +62,8 @@ def test_forty_robots_know_that_they_are_heard_hold_all_logs_and_do_not_crowd_th
 # ---- heartbeats --------------------------------------------------------------------------------
 
 
-def a_broadcast(team: Team, ranged: dict[int, int]) -> Broadcast:
-    """Of a localised robot with nothing to say; UWB ids that it ranges to are those of `ranged`."""
+def a_broadcast(team: Team, ranged: set[int]) -> Broadcast:
+    """Of a localised robot with nothing to say that ranges to these UWB ids."""
     front = SimpleNamespace(ranged=lambda utime: list(ranged), needed=lambda near, utime: ())
     estimate = SimpleNamespace(frame=SimpleNamespace(robot=0))
     back = SimpleNamespace(estimate=estimate, digest=lambda: 0)
@@ -76,7 +76,7 @@ def test_a_robot_in_a_crowd_stays_quiet_and_still_names_everybody(others: int) -
     """Statuses that are not sent must not use up turns: of 42 or 84 always the same would speak."""
     team = Team(a_seal(0))
     seals = [a_seal(robot) for robot in range(1, others + 1)]
-    broadcast = a_broadcast(team, {1000 + robot: robot for robot in range(1, others + 1)})
+    broadcast = a_broadcast(team, {1000 + robot for robot in range(1, others + 1)})
     said: list[tuple[int, Status]] = []
     for second in range(20):
         utime = (100 + second) * SECOND
@@ -100,7 +100,7 @@ def test_a_quiet_robot_speaks_when_any_of_a_crowd_comes_or_goes() -> None:
     team = Team(a_seal(0))
     for robot in range(1, 41):
         team.receive(ChannelMessage(0, *sealed(a_seal(robot), a_status())))
-    broadcast = a_broadcast(team, {})
+    broadcast = a_broadcast(team, set())
     assert broadcast.heartbeat([], None, SECOND)
     assert not broadcast.heartbeat([], None, 2 * SECOND)
     team.receive(ChannelMessage(0, *sealed(a_seal(99), a_status())))
@@ -109,3 +109,19 @@ def test_a_quiet_robot_speaks_when_any_of_a_crowd_comes_or_goes() -> None:
     team.receive(ChannelMessage(0, *sealed(*leaving)))
     assert Chain(40, 1) not in team.audible(2 * SECOND)
     assert broadcast.heartbeat([], None, 3 * SECOND)
+
+
+def test_a_quiet_robot_speaks_when_it_ranges_to_somebody_new_or_no_longer_does() -> None:
+    team = Team(a_seal(0))
+    team.receive(ChannelMessage(0, *sealed(a_seal(1), a_status(uwb_id=1001))))
+    ranged: set[int] = set()
+    broadcast = a_broadcast(team, ranged)
+    spoke = []
+    scene: list[tuple[int, set[int]]] = [
+        (0, set()), (200, set()), (400, {1001}), (600, {1001}), (800, set()),
+    ]  # fmt: skip
+    for ms, now in scene:
+        ranged.clear()
+        ranged.update(now)
+        spoke.append(bool(broadcast.heartbeat([], None, 1000 * ms)))
+    assert spoke == [True, False, True, False, True]
