@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import socket
-from collections.abc import AsyncIterator, Callable
-from typing import Union
+from collections.abc import AsyncIterator, Callable, Coroutine
+from typing import Any, ParamSpec, Union
 
 from drslamd.config import GossipSection
 from drslamd.events import ChannelMessage, Datagram, Event, NetworkState
@@ -17,6 +18,9 @@ from drslamd.io.multicast import Multicast
 
 GROUP = "239.255.76.67"
 Transport = Union[Multicast, Liblcm]
+P = ParamSpec("P")
+LONGEST_S = 60.0
+"""No test of a network may take longer."""
 
 
 def free_port() -> int:
@@ -59,6 +63,20 @@ class Ear:
 
     def is_down(self) -> bool:
         return bool(self.states) and not self.states[-1].up
+
+
+def in_a_loop(test: Callable[P, Coroutine[Any, Any, None]]) -> Callable[P, None]:
+    """A test in a loop of its own, which it must leave in time and without tasks."""
+
+    @functools.wraps(test)
+    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        async def alone() -> None:
+            await asyncio.wait_for(test(*args, **kwargs), LONGEST_S)
+            assert asyncio.all_tasks() == {asyncio.current_task()}
+
+        asyncio.run(alone())
+
+    return run
 
 
 async def until(condition: Callable[[], bool], seconds: float = 5.0) -> float:

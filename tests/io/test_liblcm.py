@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ears import Ear, running, until
+from ears import Ear, in_a_loop, running, until
 from namespace import run_in_namespace
 
 from drslamd.config import ConfigError, GossipSection
@@ -95,57 +95,49 @@ def test_what_is_sent_before_the_start_is_dropped_and_counted() -> None:
 
 
 @needs_lcm
-def test_messages_go_through_a_provider_that_the_user_names() -> None:
-    async def work() -> None:
-        transport, ear = a_transport("memq://")
-        async with running(transport):
-            await until(ear.is_up)
-            before = MonotonicClock().now()
-            transport.send("DRSLAM_POSE_001", b"x")
-            await until(lambda: bool(ear.messages))
-        assert asyncio.all_tasks() == {asyncio.current_task()}
-        assert transport._lcm is None
-        message = ear.events[-1]
-        assert isinstance(message, ChannelMessage)
-        assert (message.channel, message.payload, message.sender) == ("DRSLAM_POSE_001", b"x", "")
-        assert before <= message.utime <= MonotonicClock().now()
-        (state,) = ear.states
-        assert (state.up, state.detail) == (True, "memq://")
-
-    asyncio.run(work())
+@in_a_loop
+async def test_messages_go_through_a_provider_that_the_user_names() -> None:
+    transport, ear = a_transport("memq://")
+    async with running(transport):
+        await until(ear.is_up)
+        before = MonotonicClock().now()
+        transport.send("DRSLAM_POSE_001", b"x")
+        await until(lambda: bool(ear.messages))
+    assert transport._lcm is None
+    message = ear.events[-1]
+    assert isinstance(message, ChannelMessage)
+    assert (message.channel, message.payload, message.sender) == ("DRSLAM_POSE_001", b"x", "")
+    assert before <= message.utime <= MonotonicClock().now()
+    (state,) = ear.states
+    assert (state.up, state.detail) == (True, "memq://")
 
 
 @needs_lcm
-def test_a_url_that_lcm_does_not_take_is_told_in_one_sentence() -> None:
-    async def work() -> None:
-        transport, ear = a_transport("nonsense://")
-        async with running(transport):
-            await until(ear.is_down)
-            await asyncio.sleep(0.7)
-        (state,) = ear.states
-        assert state.detail.startswith("nonsense://: ")
-
-    asyncio.run(work())
+@in_a_loop
+async def test_a_url_that_lcm_does_not_take_is_told_in_one_sentence() -> None:
+    transport, ear = a_transport("nonsense://")
+    async with running(transport):
+        await until(ear.is_down)
+        await asyncio.sleep(0.7)
+    (state,) = ear.states
+    assert state.detail.startswith("nonsense://: ")
 
 
 @needs_lcm
-def test_the_end_of_a_log_that_is_played_is_told_and_nothing_breaks(tmp_path: Path) -> None:
+@in_a_loop
+async def test_the_end_of_a_log_that_is_played_is_told_and_nothing_breaks(tmp_path: Path) -> None:
     import lcm
 
     log = lcm.EventLog(str(tmp_path / "team.lcmlog"), "w")
     for number in range(3):
         log.write_event(1_000 * number, "DRSLAM_POSE_001", b"%d" % number)
     log.close()
-
-    async def work() -> None:
-        transport, ear = a_transport(f"file://{tmp_path}/team.lcmlog?speed=0")
-        async with running(transport):
-            await until(ear.is_down)
-        assert ear.messages[:3] == [("DRSLAM_POSE_001", b"%d" % number) for number in range(3)]
-        assert ear.states[0].up
-        assert ear.states[1].detail.startswith("cannot receive from file://")
-
-    asyncio.run(work())
+    transport, ear = a_transport(f"file://{tmp_path}/team.lcmlog?speed=0")
+    async with running(transport):
+        await until(ear.is_down)
+    assert ear.messages[:3] == [("DRSLAM_POSE_001", b"%d" % number) for number in range(3)]
+    assert ear.states[0].up
+    assert ear.states[1].detail.startswith("cannot receive from file://")
 
 
 # ---- on a network, where only a namespace has the route that liblcm wants ----------------------
