@@ -53,7 +53,7 @@ def sub_payloads(packet: bytes) -> dict[int, bytes] | None:
     found, at, end = {}, len(_HEADER) + 1, len(packet) - 1
     while at + 2 <= end:
         kind, length = packet[at], packet[at + 1]
-        data = packet[at + 2 : min(at + 2 + length, end)]
+        data = packet[at + 2 : at + 2 + length]
         if len(data) != length or length not in _LENGTHS.get(kind, {length}):
             return None
         found[kind] = data

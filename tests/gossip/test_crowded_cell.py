@@ -8,14 +8,14 @@ from typing import cast
 import numpy as np
 import pytest
 from airwaves import Air
-from sealed import SECOND, a_seal, a_status, sealed
+from sealed import SECOND, a_seal, a_status, an_entry, sealed
 
 from drslamd.broadcast import Broadcast
 from drslamd.config import Config
 from drslamd.conventions import Chain
 from drslamd.events import ChannelMessage, Send
 from drslamd.gossip import messages
-from drslamd.gossip.message_types import Status
+from drslamd.gossip.message_types import Message, OdometryBatch, Status
 from drslamd.gossip.team import Team
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.front_end import FrontEnd
@@ -109,6 +109,26 @@ def test_a_quiet_robot_speaks_when_any_of_a_crowd_comes_or_goes() -> None:
     team.receive(ChannelMessage(0, *sealed(*leaving)))
     assert Chain(40, 1) not in team.audible(2 * SECOND)
     assert broadcast.heartbeat([], None, 3 * SECOND)
+
+
+@pytest.mark.parametrize("lost", ["odometry", "entry of a log"])
+def test_a_robot_that_lacks_something_is_not_quiet(lost: str) -> None:
+    team, seal = Team(a_seal(0)), a_seal(1)
+
+    def says(message: Message) -> None:
+        team.receive(ChannelMessage(0, *sealed(seal, message)))
+
+    def spoke(ms: int) -> bool:
+        return bool(broadcast.heartbeat([], None, 1000 * ms))
+
+    broadcast = a_broadcast(team, set())
+    says(OdometryBatch(0, 0, np.zeros((10, 3))))
+    says(an_entry(0, 1))
+    assert [spoke(ms) for ms in (0, 100)] == [True, False]
+    says(OdometryBatch(0, 15, np.zeros((5, 3))) if lost == "odometry" else an_entry(2, 1))
+    assert [spoke(ms) for ms in (200, 300)] == [True, True]
+    says(OdometryBatch(0, 10, np.zeros((10, 3))) if lost == "odometry" else an_entry(1, 1))
+    assert not spoke(400)
 
 
 def test_a_quiet_robot_speaks_when_it_ranges_to_somebody_new_or_no_longer_does() -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import itertools
 import socket
 import sys
 import time
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from ears import GROUP, Ear, in_a_loop, native, running, section, spoken_until, until
@@ -30,6 +31,17 @@ def raw_sender() -> socket.socket:
     sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
     sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton("127.0.0.1"))
     return sender
+
+
+class Deaf:
+    """A socket that takes no message."""
+
+    def __init__(self, real: socket.socket, error: OSError) -> None:
+        self.fileno, self.close = real.fileno, real.close
+        self._error = error
+
+    def sendto(self, *_: object) -> None:
+        raise self._error
 
 
 # ---- talking -----------------------------------------------------------------------------------
@@ -100,6 +112,22 @@ def test_what_is_sent_before_the_group_is_joined_is_dropped_and_counted() -> Non
     transport.send("A", b"y")
     assert transport.dropped == 2
     assert ear.events == []
+
+
+@pytest.mark.parametrize(
+    ("error", "is_down"),
+    [(BlockingIOError(errno.EAGAIN, "full"), False), (OSError(errno.ENETUNREACH, "gone"), True)],
+)
+@in_a_loop
+async def test_a_full_buffer_costs_a_message_and_a_lost_network_is_left(
+    error: OSError, is_down: bool
+) -> None:
+    transport, ear = native(section())
+    with raw_sender() as real:
+        transport._socket = cast(socket.socket, Deaf(real, error))
+        transport.send("A", b"x")
+    assert transport.dropped == 1
+    assert ear.is_down() == is_down
 
 
 @in_a_loop

@@ -151,6 +151,15 @@ def test_counters_that_go_on_from_elsewhere_are_a_gap_without_motion() -> None:
     assert base.gaps == {Gap.START: 1, Gap.JUMP: 1}
 
 
+@pytest.mark.parametrize(("mm", "goes_on"), [(3 * (20 + JITTER_MS), True), (361, False)])
+def test_from_elsewhere_counters_go_on_no_faster_than_the_base(mm: int, goes_on: bool) -> None:
+    base = WheelBase(BASE)
+    base.add(counts(0, 50_000, 50_000))
+    assert base.add(counts(20, 3, 4)) is None
+    assert (base.add(counts(40, 3 + mm, 4)) is not None) == goes_on
+    assert base.gaps[Gap.JUMP] == goes_on
+
+
 @pytest.mark.parametrize(("share", "believed"), [(0.99, True), (1.01, False)])
 def test_a_turn_of_more_than_a_round_a_second_is_no_turn(share: float, believed: bool) -> None:
     """Both wheels well below their speed; the stamps may be off by their jitter."""

@@ -191,6 +191,17 @@ def test_an_earlier_start_of_the_same_robot_is_a_stranger() -> None:
     assert np.allclose(start[group.frame], graph.chains[0].poses)
 
 
+def test_an_earlier_start_of_the_new_frame_s_robot_carries_nothing_over() -> None:
+    graph, group, truth = exact()
+    before = as_estimate(group, graph, {r: p + [3.0, 3.0, 1.0] for r, p in truth.items()})
+    old = before.trajectories[1]
+    before.trajectories[1] = Trajectory(Chain(1, 1), old.n, old.poses + [9.0, 9.0, 0.0])
+    other = Group(group.members, Segment(*graph.chains[1].chain, 0), {})
+    start, afresh = placed(graph, other, before), placed(graph, other, None)
+    for member, poses in start.items():
+        assert np.array_equal(poses, afresh[member])
+
+
 def test_two_segments_of_one_robot_are_placed_each_by_itself() -> None:
     graph = team_of((A, B), breaks=(A,))
     graph.insert(A, GraphEntry(9, closures=(closure(5, 70, B, 70, (-1, 0, 0.5)),)))
@@ -200,6 +211,20 @@ def test_two_segments_of_one_robot_are_placed_each_by_itself() -> None:
     b = start[segment(B)]
     assert same_pose(b[1], product(start[segment(A, 0)][1], (1, 2, 0.3)), 1e-9)
     assert same_pose(product(start[segment(A, 1)][2], (-1, 0, 0.5)), b[7], 1e-9)
+
+
+def test_the_robot_that_most_closures_join_is_placed_first() -> None:
+    """Three closures place B, and what C says of it, who is placed by one, does not count."""
+    graph = team_of((A, B), (A, C))
+    more = tuple(closure(7 + n, n, B, n, (1, 2, 0.3)) for n in (20, 30))
+    graph.insert(A, GraphEntry(8, closures=more))
+    graph.insert(B, GraphEntry(9, closures=(closure(50, 50, C, 50, (5, 5, 1)),)))
+    members = {segment(A), segment(B), segment(C)}
+    start = placed(graph, in_frame(graph, members, segment(A)), None)
+    b, own = start[segment(B)], graph.chains[B.robot].poses
+    assert same_pose(b[3], product(start[segment(A)][3], (1, 2, 0.3)), 1e-9)
+    assert same_pose(b[5], product(b[3], product(inverted(own[3]), own[5])), 1e-9)
+    assert same_pose(start[segment(C)][5], product(b[5], (5, 5, 1)), 1e-9)
 
 
 def test_keyframes_follow_the_nearest_that_is_known() -> None:
