@@ -22,7 +22,9 @@ from deploy_helpers import (
 from drslamd.cli import BAD_CONFIG, OK, USAGE
 from drslamd.gossip.seal import KEY_BYTES
 
-LONGEST_S = 3.0
+LONGEST_CPU_S = 1.5
+"""Of a process that starts Python and reads its configuration: 0.3 to 0.8 s. What other programs do
+to the clock does not count."""
 SECRET = "5e" * KEY_BYTES
 
 slow = pytest.mark.slow
@@ -63,7 +65,7 @@ def refusal(config: Path) -> str:
     assert code == BAD_CONFIG, said
     assert "Traceback" not in said
     assert not opened(config)
-    assert seconds < LONGEST_S
+    assert seconds < LONGEST_CPU_S
     return said
 
 

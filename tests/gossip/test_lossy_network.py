@@ -1,16 +1,18 @@
 """Whole teams on a bad channel: in the end everybody holds the same, and soon.
 
-The bounds are a few rounds above the worst of the seeds; one round is one status of each robot.
+One round is one status of each robot. The bounds are a round or two above the worst of these seeds,
+and of 24 where the tail is long: at a loss of 0.7 a last status can be lost many times in a row.
 """
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from airwaves import Air
 
 
 @pytest.mark.parametrize("seed", range(8))
-@pytest.mark.parametrize(("loss", "rounds"), [(0.0, 0), (0.1, 5), (0.3, 8), (0.5, 14), (0.7, 36)])
+@pytest.mark.parametrize(("loss", "rounds"), [(0.0, 0), (0.1, 4), (0.3, 6), (0.5, 14), (0.7, 36)])
 def test_five_robots_that_lose_messages_hold_the_same_soon_after_the_last_word(
     loss: float, rounds: int, seed: int
 ) -> None:
@@ -30,13 +32,19 @@ def test_two_robots_alone_hold_the_same_soon_after_the_last_word(
     assert air.rounds_until_equal(rounds) <= rounds
 
 
-@pytest.mark.parametrize(("loss", "rounds"), [(0.0, 0), (0.1, 4), (0.3, 8), (0.5, 14), (0.7, 36)])
-def test_one_entry_reaches_a_team_of_five(loss: float, rounds: int) -> None:
+@pytest.mark.parametrize(
+    ("loss", "mean", "worst"),
+    [(0.0, 0.0, 0), (0.1, 1.2, 5), (0.3, 2.8, 8), (0.5, 5.2, 13), (0.7, 8.2, 17)],
+)
+def test_one_entry_reaches_a_team_of_five(loss: float, mean: float, worst: int) -> None:
+    rounds = []
     for seed in range(30):
         air = Air(5, loss, seed)
         air.seconds(3)
         air.say(0)
-        assert air.rounds_until_equal(rounds) <= rounds, f"seed {seed}"
+        rounds.append(air.rounds_until_equal(worst))
+    assert np.mean(rounds) <= mean
+    assert max(rounds) <= worst
 
 
 def test_ten_robots_at_30_percent_loss_do_not_crowd_the_channel() -> None:

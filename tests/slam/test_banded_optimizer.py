@@ -60,7 +60,7 @@ def test_a_team_is_solved_in_the_frame_of_its_lowest_robot() -> None:
     assert {r: t.n.tolist() for r, t in estimate.trajectories.items()} == {
         r: n.tolist() for r, n in team.n.items()
     }
-    assert errors(estimate, team.truth) < 0.8
+    assert errors(estimate, team.truth) < 0.7
     assert set(estimate.covariances) == {0, 1, 2}
     for robot, covariance in estimate.covariances.items():
         error = estimate.trajectories[robot].poses[-1] - product(
@@ -71,13 +71,13 @@ def test_a_team_is_solved_in_the_frame_of_its_lowest_robot() -> None:
 
 
 def test_biases_are_named_by_their_pairs_and_scales_by_their_robots() -> None:
-    team = small_team(
-        2, count=150, range_sigma=0.01, biases={(0, 1): 0.4, (0, 2): 0.0, (1, 2): -0.3}
-    )
+    true = {(0, 1): 0.4, (0, 2): 0.0, (1, 2): -0.3}
+    team = small_team(2, count=150, range_sigma=0.01, biases=true)
     estimate = solved(team.graph, group_of(team.graph, CLOCKS))
-    assert estimate.bias_m[0, 1].value == pytest.approx(0.4, abs=0.2)
-    assert estimate.bias_m[0, 2].value == pytest.approx(0.0, abs=0.2)
-    assert estimate.bias_m[1, 2].value == pytest.approx(-0.3, abs=0.2)
+    for pair, bias in true.items():
+        found = estimate.bias_m[pair]
+        assert found.value == pytest.approx(bias, abs=0.15)
+        assert abs(found.value - bias) < 2 * found.sigma < 0.6
     assert set(estimate.scale) == set(estimate.yaw) == {0, 1, 2}
 
 

@@ -81,7 +81,7 @@ def test_bytes_are_stamped_on_time_while_a_solve_runs(tmp_path: Path) -> None:
         return lags, solved[0]
 
     lags, windows = asyncio.run(asyncio.wait_for(run(), 30))
-    assert windows > 20
+    assert windows > 100
     assert len(lags) >= 280
     assert np.percentile(lags, 99) < 0.060
-    assert np.median(lags) < 0.015
+    assert np.median(lags) < 0.005
