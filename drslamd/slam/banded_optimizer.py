@@ -20,7 +20,8 @@ from drslamd.slam.estimate import Learned, TeamEstimate, Trajectory
 from drslamd.slam.items import PublicPoses
 from drslamd.slam.optimizer import Job
 from drslamd.slam.pose_graph import TeamGraph
-from drslamd.slam.problem import Calibration, Priors, Problem
+from drslamd.slam.problem import Calibration, Priors, Problem, range_errors
+from drslamd.slam.range_scatter import scatter
 from drslamd.slam.se2 import Array
 from drslamd.slam.team_frame import Group
 
@@ -117,6 +118,9 @@ def _solve(team: Stated, group: Group) -> TeamEstimate:
     robots = [chain.robot for chain in team.chains]
     learned, spread, priors = solution.calibration, solution.spread, problem.priors
     assert spread is not None
+    ranges = problem.ranges
+    errors = range_errors(solution.poses, ranges, learned.bias)[0]
+    scatters = scatter(errors, ranges.sigma, ranges.pair, len(team.pairs)).tolist()
     return TeamEstimate(
         group.frame,
         {
@@ -129,6 +133,7 @@ def _solve(team: Stated, group: Group) -> TeamEstimate:
         dict(zip(team.pairs, _loosely(learned.bias, spread.bias, priors.bias), strict=True)),
         dict(zip(robots, _loosely(learned.scale, spread.scale, priors.scale), strict=True)),
         dict(zip(robots, _measured(learned.yaw, spread.yaw, priors.yaw**-2.0), strict=True)),
+        dict(zip(team.pairs, scatters, strict=True)),
         solution.cost,
         solution.iterations,
         solution.converged,

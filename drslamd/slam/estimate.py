@@ -53,6 +53,8 @@ class TeamEstimate:
     scale: dict[int, Learned] = field(default_factory=dict)
     yaw: dict[int, Learned] = field(default_factory=dict)
     """rad/m"""
+    scatter: dict[tuple[int, int], float] = field(default_factory=dict)
+    """How many times the configured sigma the ranges of a pair scatter (`range_scatter`)."""
     cost: float = 0.0
     iterations: int = 0
     converged: bool = True

@@ -11,10 +11,10 @@ from drslamd.slam.range_fit import PRIOR, ROBUST_SIGMAS, RangeFit, stepped
 from drslamd.slam.se2 import Array
 from drslamd.slam.window_noise import WindowNoise
 
-STEPS, MADE = 12, 5
-"""At most, and how many times at most the covariance is made anew on the way."""
+STEPS = 12
+"""At most."""
 SAME_SIGMAS, SAME_SIGHT = 0.5, 0.1
-"""It is the same while no residual and no line of sight (rad) has moved by more than this."""
+"""The covariance stays the same while no residual and no line of sight (rad) has moved by more."""
 SETTLED, SETTLED_CHI2 = 1e-3, 1e-2
 """A step below this (m, rad), or that promises less (2 log-likelihood), is the last one."""
 LONGEST = 0.5
@@ -46,16 +46,16 @@ class Judged(NamedTuple):
 
 def judge(fit: RangeFit, noise: WindowNoise, centred: Array) -> Judged:
     """Where the noise of the window puts some minima (k, 2)."""
-    x, made = centred, 0
+    x = centred
     made_at: tuple[Array, Array] | None = None
     for _ in range(STEPS):
         u, rows = fit.linear(x)
         e = rows[:, 4]
-        if made_at is None or (made < MADE and not _same(e, u, made_at, noise.sigma)):
+        if made_at is None or not _same(e, u, made_at, noise.sigma):
             factors, sound = _factors(noise.covariance(u, x[:, 1], _weights(e, noise.sigma)))
-            made_at, made = (e, u), made + 1
-        weighted = [_solve(f, r.T)[0] for r, f in zip(rows, factors, strict=True)]
-        normal = rows @ np.stack(weighted)
+            made_at = e, u
+        weighted = np.stack([_solve(f, r.T)[0] for r, f in zip(rows, factors, strict=True)])
+        normal = rows @ weighted
         information = normal[:, :3, :3] + PRIOR * np.eye(3)
         step = -np.linalg.solve(information, normal[:, :3, 4:])[..., 0]
         promise = -(normal[:, 4, :3] * step).sum(axis=1)
@@ -64,7 +64,9 @@ def judge(fit: RangeFit, noise: WindowNoise, centred: Array) -> Judged:
         if ((size < SETTLED) | (promise < SETTLED_CHI2)).all():
             break
     chi2 = np.where(sound, normal[:, 4, 4] - promise, np.inf)
-    return Judged(x, np.linalg.inv(information), chi2, e)
+    covariance = np.linalg.inv(information)
+    covariance += noise.excess(covariance @ weighted[:, :, :3].transpose(0, 2, 1))
+    return Judged(x, covariance, chi2, e)
 
 
 def _same(e: Array, u: Array, before: tuple[Array, Array], sigma: float) -> bool:

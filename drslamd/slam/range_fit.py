@@ -64,6 +64,30 @@ class RangeFit:
         m[:, 2, 2] = 1.0
         return m
 
+    def by_arcs(self, centred: Array, covariance: Array) -> Array:
+        """(k, 3, 3): what `by_step` leaves out of the covariance of poses a_T_b, because x and y
+        of a step are not straight: to second order, about the pose itself.
+
+        With the second derivatives D of x or y by a step, covariance C of a step and x, y as i, j:
+        tr(D_i C D_j C) / 2 + tr(D_i C) tr(D_j C) / 4.
+        """
+        distance = np.abs(centred[:, 0])
+        curved = _direction(centred[:, 0]) / np.maximum(distance, AROUND_M)
+        curved[distance <= AROUND_M] = 0.0
+        d = np.zeros((len(centred), 3, 3), dtype=complex)
+        d[:, 1, 1], d[:, 2, 2] = -curved, centred[:, 1] * self._b_mean
+        d[:, 0, 1] = d[:, 1, 0] = 1j * curved
+        # both at once, as x + iy: E[z z] = xx - yy + 2i xy and E[z conj(z)] = xx + yy
+        once = d @ covariance
+        other = once.conj()
+        drift = np.einsum("kaa->k", once)
+        zz = (once * once.transpose(0, 2, 1)).sum(axis=(1, 2)) / 2 + drift**2 / 4
+        size = (once * other.transpose(0, 2, 1)).sum(axis=(1, 2)).real / 2 + np.abs(drift) ** 2 / 4
+        out = np.zeros((len(centred), 3, 3))
+        out[:, 0, 0], out[:, 1, 1] = (size + zz.real) / 2, (size - zz.real) / 2
+        out[:, 0, 1] = out[:, 1, 0] = zz.imag / 2
+        return out
+
     def linear(self, centred: Array) -> tuple[Array, Array]:
         """Equation 1 about centred poses.
 

@@ -101,6 +101,7 @@ def solve(window: Window, noise: Noise, delta: float) -> Estimate:
         return Estimate(Verdict.POOR_FIT)
     poses, by_step = fit.poses(minima), fit.by_step(minima)
     covariances = by_step @ judged.covariance @ by_step.transpose(0, 2, 1)
+    covariances += fit.by_arcs(minima, judged.covariance)
     # under the full noise two candidates may have come to the same minimum
     kept = [k for k in _distinct(poses) if chi2[k] < chi2[0] + EXCLUDED_CHI2][:HYPOTHESES]
     if not all(_observable(covariances[k]) for k in kept):

@@ -38,6 +38,7 @@ class Sensors(NamedTuple):
     bias: Learned = Learned()
     scale_a: Learned = Learned()
     scale_b: Learned = Learned()
+    scatter: float = 1.0
 
     @staticmethod
     def of(estimate: TeamEstimate | None, a: int, b: int) -> Sensors:
@@ -49,17 +50,19 @@ class Sensors(NamedTuple):
             estimate.bias_m.get(pair, Learned()),
             estimate.scale.get(a, Learned()),
             estimate.scale.get(b, Learned()),
+            estimate.scatter.get(pair, 1.0),
         )
 
 
-def remaining(learned: Learned, before: float, least: float) -> float:
+def remaining(learned: Learned, before: float, least: float, scatter: float = 1.0) -> float:
     """Sigma of what is left of a constant when its learned value is taken out.
 
     Args:
         before: its sigma before anything was measured.
         least: what no constant can describe.
+        scatter: of the ranges from which it was learned, see `range_scatter`.
     """
-    spread = float(np.hypot(SHARED * learned.sigma, least))
+    spread = float(np.hypot(SHARED * scatter * learned.sigma, least))
     return float((before**-2.0 + spread**-2.0) ** -0.5)
 
 
@@ -71,11 +74,12 @@ def calibrated(window: Window, noise: Noise, sensors: Sensors) -> tuple[Window, 
         a_poses=_scaled(window.a_poses, sensors.scale_a),
         b_poses=_scaled(window.b_poses, sensors.scale_b),
     )
-    bias = remaining(sensors.bias, noise.ranges.bias_sigma, LEAST_BIAS_M)
+    scatter = sensors.scatter
+    bias = remaining(sensors.bias, noise.ranges.bias_sigma, LEAST_BIAS_M, scatter)
     return better, Noise(
-        RangeNoise(noise.ranges.sigma, bias),
-        _narrowed(noise.a, sensors.scale_a),
-        _narrowed(noise.b, sensors.scale_b),
+        RangeNoise(noise.ranges.sigma, bias, scatter),
+        _narrowed(noise.a, sensors.scale_a, scatter),
+        _narrowed(noise.b, sensors.scale_b, scatter),
     )
 
 
@@ -83,5 +87,5 @@ def _scaled(poses: Array, scale: Learned) -> Array:
     return np.asarray(poses * [1 - scale.value, 1 - scale.value, 1.0])
 
 
-def _narrowed(noise: OdometryNoise, scale: Learned) -> OdometryNoise:
-    return replace(noise, scale=remaining(scale, noise.scale, LEAST_SCALE))
+def _narrowed(noise: OdometryNoise, scale: Learned, scatter: float) -> OdometryNoise:
+    return replace(noise, scale=remaining(scale, noise.scale, LEAST_SCALE, scatter))

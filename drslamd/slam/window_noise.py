@@ -37,15 +37,29 @@ _TERMS = np.array([[3, 4, 1], [4, 5, 2], [1, 2, 0], [1, 2, 0]])
 
 @dataclass(frozen=True)
 class RangeNoise:
-    """Sigmas of a range in metres: around its bias, and of the constant bias of the pair."""
+    """Sigmas of a range in metres: around its bias, and of the constant bias of the pair.
+
+    `sigma` is what must be allowed for and weighs ranges against odometry; where more is known,
+    they scatter by `scatter` times as much, and that is what a pose is as wrong by.
+    """
 
     sigma: float
     bias_sigma: float
+    scatter: float = 1.0
 
 
 def near_bias(ranges: Array | float) -> Array:
     """Sigma, m, of what the bias of a pair does at short range and not elsewhere."""
     return np.asarray(NEAR_BIAS_M * np.exp(-np.maximum(ranges, 0.0) / NEAR_REACH_M))
+
+
+def scatter_covariance(t: Array, sigma: float) -> Array:
+    """(n, n): the slow and the white part of ranges at times t (n,), s, around their bias."""
+    slow = (SLOW_SHARE * sigma) ** 2
+    covariance = np.exp(np.abs(t[:, None] - t) * (-1 / SLOW_TIME_S))
+    covariance *= slow
+    covariance.ravel()[:: len(t) + 1] += sigma**2 - slow
+    return np.asarray(covariance)
 
 
 def range_covariance(t: Array, ranges: Array, noise: RangeNoise) -> Array:
@@ -56,14 +70,10 @@ def range_covariance(t: Array, ranges: Array, noise: RangeNoise) -> Array:
         ranges: (n,) m.
         noise: sigmas.
     """
-    slow = (SLOW_SHARE * noise.sigma) ** 2
-    white = noise.sigma**2 - slow
     near = near_bias(ranges)
-    covariance = np.exp(np.abs(t[:, None] - t) * (-1 / SLOW_TIME_S))
-    covariance *= slow
+    covariance = scatter_covariance(t, noise.sigma)
     covariance += near[:, None] * near + noise.bias_sigma**2
-    covariance.ravel()[:: len(t) + 1] += white
-    return np.asarray(covariance)
+    return covariance
 
 
 def twists(paths: Array, noises: Sequence[OdometryNoise], before: int) -> Array:
@@ -144,6 +154,8 @@ class WindowNoise:
         self.sigma = ranges.sigma
         self._before = window.before
         self._ranges = range_covariance(window.t, window.ranges, ranges)
+        self._t = window.t
+        self._excess = ranges.scatter**2 - 1
         self._points = np.stack([_complex(a_points), _complex(b_points)])
         paths = np.stack([window.a_poses[:, :2], window.b_poses[:, :2]])
         self._twists = twists(paths, (a, b), self._before)
@@ -162,6 +174,18 @@ class WindowNoise:
         covariance += self._ranges
         np.einsum("kii->ki", covariance)[:] += self.sigma**2 * (1 / weights - 1)
         return covariance
+
+    def excess(self, gain: Array) -> Array:
+        """(k, 3, 3) what ranges that scatter otherwise than allowed for add to a covariance.
+
+        Args:
+            gain: (k, 3, n) how the estimate follows the residuals, gain G: with true noise V' in
+                the place of V the covariance G V G' becomes G V' G' (a sandwich).
+        """
+        if not self._excess:
+            return np.zeros((len(gain), 3, 3))
+        scatter = scatter_covariance(self._t, self.sigma)
+        return np.asarray(self._excess * (gain @ scatter @ gain.transpose(0, 2, 1)))
 
 
 def _complex(points: Array) -> Array:

@@ -24,9 +24,9 @@ def noisy(seed: int) -> tuple[Window, Array]:
     return replace(window, ranges=window.ranges + rng.normal(0, 0.04, 60) + 0.2), true
 
 
-def parts(window: Window) -> tuple[RangeFit, WindowNoise]:
+def parts(window: Window, ranges: RangeNoise = RANGES) -> tuple[RangeFit, WindowNoise]:
     a, b = window.a_points, window.b_points
-    return RangeFit(a, b, window.ranges), WindowNoise(window, a, b, RANGES, NOISE, NOISE)
+    return RangeFit(a, b, window.ranges), WindowNoise(window, a, b, ranges, NOISE, NOISE)
 
 
 def whitened(window: Window, noise: WindowNoise, at: Array) -> Array:
@@ -57,6 +57,42 @@ def test_the_pose_and_its_covariance_are_those_of_generalised_least_squares(seed
     m = fit.by_step(judged.centred)[0]
     ratios = eigvalsh(m @ judged.covariance[0] @ m.T, covariance)
     assert np.abs(ratios - 1).max() < 0.1
+
+
+@pytest.mark.parametrize("scatter", [0.5, 1.5])
+def test_claims_follow_what_ranges_scatter_and_weights_do_not(scatter: float) -> None:
+    """Noise drawn as it is claimed, through the weights that were kept: a sandwich."""
+    window, true = noisy(7)
+    fit, noise = parts(window)
+    start = fit.centred(true[None])
+    plain = judge(fit, noise, start)
+    claimed = judge(fit, parts(window, replace(RANGES, scatter=scatter))[1], start)
+    assert np.array_equal(plain.centred, claimed.centred)
+    assert np.array_equal(plain.chi2, claimed.chi2)
+    # the linear estimate, written out
+    pose = fit.poses(plain.centred)[0]
+    root = whitened(window, noise, pose)
+    truly = whitened(window, parts(window, replace(RANGES, sigma=0.1 * scatter))[1], pose)
+    j = fit.linear(plain.centred)[1][0, :3].T
+    gain = np.linalg.pinv(root.T @ j) @ root.T
+    draws = np.linalg.inv(truly.T) @ np.random.default_rng(8).normal(size=(60, 20_000))
+    ratios = eigvalsh(claimed.covariance[0], np.cov(gain @ draws))
+    assert np.abs(ratios - 1).max() < 0.1
+    assert np.abs(eigvalsh(plain.covariance[0], np.cov(gain @ draws)) - 1).max() > 0.3
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_pose_that_was_named_stays_where_it_is_when_it_is_judged_again(seed: int) -> None:
+    """Odometry that is a quarter too long: on the way the noise of the window is made anew."""
+    window, true = noisy(20 + seed)
+    a, b = window.a_poses * [1.25, 1.25, 1], window.b_poses * [0.8, 0.8, 1]
+    wrong = replace(window, a_poses=a, b_poses=b)
+    fit, noise = parts(wrong)
+    once = judge(fit, noise, fit.centred((true + [1.5, -1.5, 0.3])[None]))
+    again = judge(fit, noise, once.centred)
+    m = fit.by_step(again.centred)[0]
+    off = fit.poses(again.centred)[0] - fit.poses(once.centred)[0]
+    assert off @ np.linalg.solve(m @ again.covariance[0] @ m.T, off) < 1.0
 
 
 def test_candidates_do_not_disturb_each_other() -> None:

@@ -78,6 +78,27 @@ def test_the_derivatives_are_those_of_finite_differences(apart: float) -> None:
     assert np.allclose(rows[0, 4], 0.0)
 
 
+@pytest.mark.parametrize("apart", [0.5, 6.0])
+def test_a_long_valley_is_as_wide_as_its_arc_is_deep(apart: float) -> None:
+    """Poses drawn about the centroids, and their spread about the pose in x, y and heading."""
+    fit, _, _, true = scene(5, apart)
+    centred = fit.centred(true[None])
+    covariance = np.diag([0.05, 0.8, 0.15]) ** 2
+    covariance[1, 2] = covariance[2, 1] = 0.06
+    steps = np.random.default_rng(6).multivariate_normal(np.zeros(3), covariance, 400_000)
+    off = fit.poses(stepped(np.repeat(centred, len(steps), axis=0), steps)) - true
+    off[:, 2] = np.angle(np.exp(1j * off[:, 2]))
+    seen = off.T @ off / len(off)
+    m = fit.by_step(centred)[0]
+    straight = m @ covariance @ m.T
+    claimed = straight + fit.by_arcs(centred, covariance[None])[0]
+    sigma = np.sqrt(np.diag(seen))
+    assert np.abs((claimed - seen) / np.outer(sigma, sigma)).max() < 0.05
+    assert np.array_equal(claimed[2], straight[2])
+    if apart > range_fit.AROUND_M:
+        assert np.linalg.eigvalsh(straight)[0] < 0.8 * np.linalg.eigvalsh(seen)[0]
+
+
 def test_a_valley_is_followed_around_its_arc() -> None:
     """A standing peer says nothing of its heading: any is as good, and the way there is short."""
     rng = np.random.default_rng(4)

@@ -66,6 +66,23 @@ def test_what_is_left_is_never_below_what_no_constant_describes() -> None:
     assert noise.a.yaw_rad_per_m == NOISE.yaw_rad_per_m
 
 
+@pytest.mark.parametrize("scatter", [0.5, 1.0, 1.3])
+def test_ranges_that_scatter_less_have_taught_more(scatter: float) -> None:
+    window, _ = uncalibrated(5)
+    learned = Sensors(Learned(0.1, 0.08), Learned(0.05, 0.02), Learned(0.0, 0.01), scatter)
+    same, noise = calibrated(window, SENSORS, learned)
+    assert np.allclose(same.ranges, window.ranges - 0.1)
+    # weights are those that the configuration asks for, claims those of what was learned
+    assert noise.ranges.sigma == SENSORS.ranges.sigma
+    assert noise.ranges.scatter == scatter
+    spread = math.hypot(2 * scatter * 0.08, 0.05)
+    assert noise.ranges.bias_sigma**-2 == pytest.approx(0.3**-2 + spread**-2)
+    spread = math.hypot(2 * scatter * 0.02, 0.01)
+    assert noise.a.scale**-2 == pytest.approx(NOISE.scale**-2 + spread**-2)
+    spread = math.hypot(2 * scatter * 0.01, 0.01)
+    assert noise.b.scale**-2 == pytest.approx(NOISE.scale**-2 + spread**-2)
+
+
 @pytest.mark.parametrize("sigma", [0.01, 0.1, 10.0])
 def test_knowledge_adds_up_as_information(sigma: float) -> None:
     left = remaining(Learned(0.2, sigma), before=0.3, least=0.0)
@@ -74,9 +91,15 @@ def test_knowledge_adds_up_as_information(sigma: float) -> None:
 
 def test_a_pair_is_found_whoever_owns_it() -> None:
     estimate = TeamEstimate(
-        Segment(0, 1, 0), {}, bias_m={(1, 2): Learned(0.3, 0.02)}, scale={2: Learned(0.1, 0.01)}
+        Segment(0, 1, 0),
+        {},
+        bias_m={(1, 2): Learned(0.3, 0.02)},
+        scale={2: Learned(0.1, 0.01)},
+        scatter={(1, 2): 0.7},
     )
     sensors = Sensors.of(estimate, 2, 1)
     assert sensors.bias.value == 0.3
+    assert sensors.scatter == 0.7
+    assert Sensors.of(estimate, 0, 1).scatter == 1.0
     assert sensors.scale_a.value == 0.1
     assert math.isinf(sensors.scale_b.sigma)

@@ -176,3 +176,18 @@ def test_short_ranges_share_a_bias_of_their_own() -> None:
     # at one short range as at the other, so their errors add to each other's covariance
     assert near[0, 1] - far[0, 1] == pytest.approx(0.143 * 0.074, abs=1e-3)
     assert near[1, 1] - far[1, 1] == pytest.approx(0.074**2, abs=1e-3)
+
+
+@pytest.mark.parametrize("scatter", [0.6, 1.5])
+def test_what_follows_ranges_is_as_wrong_as_they_scatter(scatter: float) -> None:
+    window, a, b = drive(30)
+    said = WindowNoise(window, a, b, RangeNoise(0.1, 0.3, scatter), NOISE, NOISE)
+    true = WindowNoise(window, a, b, RangeNoise(0.1 * scatter, 0.3), NOISE, NOISE)
+    rng = np.random.default_rng(16)
+    u, heading, ones = np.exp(1j * rng.uniform(size=(2, 40))), np.ones(2) + 0j, np.ones((2, 40))
+    gain = rng.normal(size=(2, 3, 40))
+    for k, excess in enumerate(said.excess(gain)):
+        covariances = [from_lower(n.covariance(u, heading, ones)[k]) for n in (said, true)]
+        wrong, right = (gain[k] @ c @ gain[k].T for c in covariances)
+        assert np.allclose(wrong + excess, right, rtol=0, atol=1e-9)
+        assert np.abs(excess).max() > 0.01
