@@ -27,6 +27,10 @@ from drslamd.slam.team_frame import Group
 
 YAW_PRIOR_FLOOR = 1e-4
 """rad/m; a prior of zero width would make the system singular."""
+STRONG_SIGMA_M = 0.05
+"""Makers correct most of what receivers misjudge of strong signals; what they leave is as large as
+other things that move a bias (`self_calibration.LEAST_BIAS_M`). Gauss's tails: with those that
+biases have, the two trade metres against each other where ranges vary little."""
 CAUCHY_TAILS = 3.0
 """Half widths of Cauchy's distribution within which four of five values lie."""
 HINT = 10.0**2
@@ -82,6 +86,7 @@ def stated(
         np.full(len(pairs), bias_sigma / CAUCHY_TAILS),
         np.array([items.noise.scale for items in chains]) / CAUCHY_TAILS,
         np.array([max(items.noise.yaw_rad_per_m, YAW_PRIOR_FLOOR) for items in chains]),
+        np.array([STRONG_SIGMA_M]),
     )
     start = Calibration.zero(priors)
     if previous:
@@ -89,6 +94,7 @@ def stated(
             np.array([previous.bias_m.get(pair, Learned()).value for pair in pairs]),
             np.array([previous.scale.get(robot, Learned()).value for robot in robots]),
             np.array([previous.yaw.get(robot, Learned()).value for robot in robots]),
+            np.array([previous.strong_m.value]),
         )
     initial = np.zeros((len(numbers.n), 3))
     for segment, poses in team_frame.placed(graph, group, previous).items():
@@ -119,7 +125,7 @@ def _solve(team: Stated, group: Group) -> TeamEstimate:
     learned, spread, priors = solution.calibration, solution.spread, problem.priors
     assert spread is not None
     ranges = problem.ranges
-    errors = range_errors(solution.poses, ranges, learned.bias)[0]
+    errors = range_errors(solution.poses, ranges, learned)[0]
     scatters = scatter(errors, ranges.sigma, ranges.pair, len(team.pairs)).tolist()
     return TeamEstimate(
         group.frame,
@@ -137,6 +143,7 @@ def _solve(team: Stated, group: Group) -> TeamEstimate:
         solution.cost,
         solution.iterations,
         solution.converged,
+        strong_m=_measured(learned.strong, spread.strong, priors.strong**-2.0)[0],
     )
 
 

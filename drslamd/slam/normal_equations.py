@@ -2,8 +2,9 @@
 
 Closures and ranges join poses of the same time and odometry joins neighbouring times, so with all
 poses of all robots in the order of time J' W J is banded. The border takes the unknowns that touch
-everything: the bias of each pair, scale and yaw rate of each robot, and the few poses that reach
-far (a robot that stands still while others drive about has one pose for all that time).
+everything: the bias of each pair, that of strong signals, scale and yaw rate of each robot, and the
+few poses that reach far (a robot that stands still while others drive about has one pose for all
+that time).
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from drslamd.slam.problem import (
     PoseEdges,
     Problem,
     corrected,
+    fading,
     pose_errors,
     range_errors,
 )
@@ -35,7 +37,7 @@ class Layout:
 
     Attributes:
         poses: (k, 3) numbers of the unknowns of each pose.
-        bias, scale, yaw: numbers of the unknowns of each pair and robot.
+        bias, scale, yaw: numbers of the unknowns of each pair and robot; strong: of the team.
         band, border: how many unknowns are in each.
         width: diagonals of the band, the main one included.
     """
@@ -44,6 +46,7 @@ class Layout:
     bias: Index
     scale: Index
     yaw: Index
+    strong: Index
     band: int
     border: int
     width: int
@@ -61,16 +64,17 @@ class Layout:
         place[apart] = count - len(apart) + np.arange(len(apart))
         both = inside[i] & inside[j]
         reach = int(np.abs(place[i] - place[j])[both].max(initial=0))
-        sizes = [len(priors.bias), len(priors.scale), len(priors.yaw)]
-        bias, scale, yaw, _ = np.split(3 * count + np.arange(sum(sizes)), np.cumsum(sizes))
+        sizes = [len(p) for p in (priors.bias, priors.scale, priors.yaw, priors.strong)]
+        numbers = 3 * count + np.arange(sum(sizes))
+        bias, scale, yaw, strong = np.split(numbers, np.cumsum(sizes)[:-1])
         return Layout(
-            3 * place[:, None] + np.arange(3), bias, scale, yaw,
+            3 * place[:, None] + np.arange(3), bias, scale, yaw, strong,
             3 * (count - len(apart)), 3 * len(apart) + sum(sizes), 3 * reach + 3,
         )  # fmt: skip
 
     def calibration(self, unknowns: Array) -> Calibration:
         """The part of a vector over all unknowns that belongs to the sensors."""
-        return Calibration(unknowns[self.bias], unknowns[self.scale], unknowns[self.yaw])
+        return Calibration(*(unknowns[k] for k in (self.bias, self.scale, self.yaw, self.strong)))
 
 
 def far_poses(i: Index, j: Index, narrow: int) -> Index:
@@ -191,8 +195,10 @@ class Equations:
         sensors = np.stack([layout.scale[links.robot], layout.yaw[links.robot]], axis=-1)
         self._links = _Scatter(layout, np.hstack([poses[links.i], poses[links.j], sensors]))
         self._closures = _Scatter(layout, np.hstack([poses[closures.i], poses[closures.j]]))
+        shared = np.tile(layout.strong, (len(ranges), 1))
         self._ranges = _Scatter(
-            layout, np.column_stack([poses[ranges.i], poses[ranges.j], layout.bias[ranges.pair]])
+            layout,
+            np.column_stack([poses[ranges.i], poses[ranges.j], layout.bias[ranges.pair], shared]),
         )
 
     def at(self, poses: Array, calibration: Calibration) -> System:
@@ -200,11 +206,12 @@ class Equations:
         system = System.empty(self.layout)
         self._add_links(system, poses, calibration)
         self._add_closures(system, poses)
-        self._add_ranges(system, poses, calibration.bias)
+        self._add_ranges(system, poses, calibration)
         layout, priors = self.layout, self._problem.priors
         system.hold_loosely(layout.bias, calibration.bias, priors.bias)
         system.hold_loosely(layout.scale, calibration.scale, priors.scale)
         system.hold(layout.yaw, calibration.yaw, priors.yaw**-2.0)
+        system.hold(layout.strong, calibration.strong, priors.strong**-2.0)
         gauge = self._problem.gauge
         moved = poses[gauge] - self._problem.initial[gauge]
         system.hold(layout.poses[gauge], moved, GAUGE_SIGMA**-2)
@@ -227,14 +234,15 @@ class Equations:
         error = pose_errors(poses, closures, closures.measured)
         self._closures.add(system, error, _pose_jacobians(poses, closures), closures.information)
 
-    def _add_ranges(self, system: System, poses: Array, bias: Array) -> None:
+    def _add_ranges(self, system: System, poses: Array, calibration: Calibration) -> None:
         ranges = self._problem.ranges
-        error, sight, arm_i, arm_j = range_errors(poses, ranges, bias)
-        jacobian = np.ones((len(ranges), 1, 7))
+        error, sight, arm_i, arm_j = range_errors(poses, ranges, calibration)
+        jacobian = np.ones((len(ranges), 1, 8))
         jacobian[:, 0, 0:2] = -sight
         jacobian[:, 0, 2] = sight[:, 0] * arm_i[:, 1] - sight[:, 1] * arm_i[:, 0]
         jacobian[:, 0, 3:5] = sight
         jacobian[:, 0, 5] = sight[:, 1] * arm_j[:, 0] - sight[:, 0] * arm_j[:, 1]
+        jacobian[:, 0, 7] = fading(ranges.measured)
         # Cauchy's cost c^2 log(1 + (e / c)^2) by its weight; e and c in sigmas
         scaled = (error / (ROBUST_SIGMAS * ranges.sigma)) ** 2
         weight = 1 / (1 + scaled)

@@ -5,7 +5,7 @@ that number. Errors are defined here once, so that every optimiser minimises the
 
     odometry   e = [R_i' (p_j - p_i), theta_j - theta_i] - measured, corrected by scale and yaw rate
     closure    the same, without correction
-    range      e = |p_j + R_j q_j - p_i - R_i q_i| + bias - r
+    range      e = |p_j + R_j q_j - p_i - R_i q_i| + bias + strong exp(-r / L) - r
 """
 
 from __future__ import annotations
@@ -21,6 +21,10 @@ from drslamd.slam.se2 import Array
 
 Index = NDArray[np.int64]
 
+FADING_M = 3.0
+"""L: at this range a third is left of what receivers misjudge of strong signals. LinkTrack modules
+measure -0.25 m below 1 m and -0.06 m beyond 6 m; Decawave's note APS011 prints such a curve over
+received power."""
 RIDGE = 1e-10
 """Added to correlations before they are inverted; nobody knows his correlations so well."""
 
@@ -90,6 +94,9 @@ class Priors:
     """(robots,) fraction, likewise."""
     yaw: Array
     """(robots,) rad/m."""
+    strong: Array
+    """(1,) metres, for the whole team: its modules are of one kind, and the bias follows the power
+    that is received."""
 
 
 @dataclass(frozen=True)
@@ -119,13 +126,18 @@ class Calibration:
     bias: Array
     scale: Array
     yaw: Array
+    strong: Array
 
     @staticmethod
     def zero(priors: Priors) -> Calibration:
-        return Calibration(*(np.zeros(len(p)) for p in (priors.bias, priors.scale, priors.yaw)))
+        sigmas = (priors.bias, priors.scale, priors.yaw, priors.strong)
+        return Calibration(*(np.zeros(len(sigma)) for sigma in sigmas))
 
     def plus(self, step: Calibration) -> Calibration:
-        return Calibration(self.bias + step.bias, self.scale + step.scale, self.yaw + step.yaw)
+        return Calibration(
+            self.bias + step.bias, self.scale + step.scale, self.yaw + step.yaw,
+            self.strong + step.strong,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -158,11 +170,19 @@ def corrected(links: Links, calibration: Calibration) -> Array:
     return np.stack([keep * x + bend / 2 * y, keep * y - bend / 2 * x, theta - bend], axis=-1)
 
 
-def range_errors(poses: Array, ranges: Ranges, bias: Array) -> tuple[Array, Array, Array, Array]:
+def fading(ranges: Array) -> Array:
+    """How much of the bias of strong signals is in ranges (n,) m: all of it in those of none."""
+    return np.asarray(np.exp(-np.maximum(ranges, 0.0) / FADING_M))
+
+
+def range_errors(
+    poses: Array, ranges: Ranges, calibration: Calibration
+) -> tuple[Array, Array, Array, Array]:
     """Errors (m,), unit line of sight from i to j in w (m, 2), and both arms in w (m, 2)."""
     arm_i = se2.rotate(poses[ranges.i, 2], ranges.q_i)
     arm_j = se2.rotate(poses[ranges.j, 2], ranges.q_j)
     sight = poses[ranges.j, :2] + arm_j - poses[ranges.i, :2] - arm_i
     distance = np.maximum(np.hypot(sight[:, 0], sight[:, 1]), 1e-6)
-    error = distance + bias[ranges.pair] - ranges.measured
+    error = distance + calibration.bias[ranges.pair] - ranges.measured
+    error += calibration.strong * fading(ranges.measured)
     return error, sight / distance[:, None], arm_i, arm_j

@@ -1,10 +1,12 @@
 """Self-calibration: what module 3 learned of the sensors serves module 1.
 
 A window alone hardly tells a range bias from distance, or a wheel's scale from speed; hours of
-driving do. Module 3 carries the bias of each pair and the scale of each robot's odometry as
-unknowns. Here a window is rid of what is known of them, and its noise says what is still unknown:
+driving do. Module 3 carries the bias of each pair, what that of all pairs does at short range
+(`problem.fading`) and the scale of each robot's odometry as unknowns. Here a window is rid of what
+is known of them, and its noise says what is still unknown:
 
-    r' = r - bias        p' = (1 - scale) p        sigma'^-2 = sigma^-2 + (k sigma_measured)^-2
+    r' = r - bias - strong exp(-r / L)     p' = (1 - scale) p
+    sigma'^-2 = sigma^-2 + (k sigma_measured)^-2
 
 k accounts for ranges that share their errors; nothing falls below what no constant can describe.
 """
@@ -18,6 +20,7 @@ import numpy as np
 
 from drslamd.slam.estimate import Learned, TeamEstimate
 from drslamd.slam.odometry import OdometryNoise
+from drslamd.slam.problem import fading
 from drslamd.slam.relative_pose import Noise
 from drslamd.slam.se2 import Array
 from drslamd.slam.window import Window
@@ -39,6 +42,7 @@ class Sensors(NamedTuple):
     scale_a: Learned = Learned()
     scale_b: Learned = Learned()
     scatter: float = 1.0
+    strong: Learned = Learned()
 
     @staticmethod
     def of(estimate: TeamEstimate | None, a: int, b: int) -> Sensors:
@@ -51,6 +55,7 @@ class Sensors(NamedTuple):
             estimate.scale.get(a, Learned()),
             estimate.scale.get(b, Learned()),
             estimate.scatter.get(pair, 1.0),
+            estimate.strong_m,
         )
 
 
@@ -68,9 +73,10 @@ def remaining(learned: Learned, before: float, least: float, scatter: float = 1.
 
 def calibrated(window: Window, noise: Noise, sensors: Sensors) -> tuple[Window, Noise]:
     """The window without its known errors, and the noise that is left."""
+    near = sensors.strong.value * fading(window.ranges)
     better = replace(
         window,
-        ranges=window.ranges - sensors.bias.value,
+        ranges=window.ranges - sensors.bias.value - near,
         a_poses=_scaled(window.a_poses, sensors.scale_a),
         b_poses=_scaled(window.b_poses, sensors.scale_b),
     )

@@ -8,7 +8,15 @@ import numpy as np
 from slam_scenes import Array, inverted, product, wander
 
 from drslamd.slam.normal_equations import GAUGE_SIGMA, ROBUST_SIGMAS, Layout, System
-from drslamd.slam.problem import Calibration, Links, PoseEdges, Priors, Problem, Ranges
+from drslamd.slam.problem import (
+    FADING_M,
+    Calibration,
+    Links,
+    PoseEdges,
+    Priors,
+    Problem,
+    Ranges,
+)
 
 
 def random_covariance(rng: np.random.Generator, sigma: tuple[float, float, float]) -> Array:
@@ -46,6 +54,7 @@ def team_problem(
     biases: tuple[float, ...] = (0.0, 0.0, 0.0),
     scale: tuple[float, ...] = (0.0, 0.0, 0.0),
     yaw: tuple[float, ...] = (0.0, 0.0, 0.0),
+    strong: float = 0.0,
     range_error: float = 0.05,
     link_error: float = 1.0,
     closures: int = 3,
@@ -54,7 +63,8 @@ def team_problem(
     """Robots whose poses alternate in time, with every kind of edge; and the truth.
 
     Pose robots * k + r is keyframe k of robot r. Each pair has its ranges, between antennas off
-    the middle; neighbouring poses of a robot have their odometry, wrong by `scale` and `yaw`.
+    the middle, wrong by `strong` where they are near; neighbouring poses of a robot have their
+    odometry, wrong by `scale` and `yaw`.
     """
     rng = np.random.default_rng(seed)
     paths = [wander(rng, count, 0.4) for _ in range(robots)]
@@ -79,7 +89,11 @@ def team_problem(
             i, j = robots * k + a, robots * k + b
             ends = [product(truth[i], (*q[a], 0)), product(truth[j], (*q[b], 0))]
             distance = math.hypot(*(ends[1] - ends[0])[:2])
-            rows.append((i, j, *q[a], *q[b], distance + biases[number], number))
+            measured_m = distance + biases[number]
+            # the term is of what is measured, itself included
+            for _ in range(30):
+                measured_m = distance + biases[number] + strong * math.exp(-measured_m / FADING_M)
+            rows.append((i, j, *q[a], *q[b], measured_m, number))
     table = np.reshape(rows, (-1, 8))
     ranges = Ranges(
         table[:, 0].astype(int), table[:, 1].astype(int), table[:, 2:4], table[:, 4:6],
@@ -87,7 +101,9 @@ def team_problem(
         table[:, 7].astype(int),
     )  # fmt: skip
     joined = [(robots * k, robots * k + 1) for k in np.linspace(1, count - 2, closures).astype(int)]
-    priors = Priors(np.full(len(names), 0.3), np.full(robots, 0.03), np.full(robots, 0.01))
+    priors = Priors(
+        np.full(len(names), 0.3), np.full(robots, 0.03), np.full(robots, 0.01), np.full(1, 0.1)
+    )
     start = truth + rng.normal(0, 0.03, truth.shape)
     problem = Problem(
         np.arange(len(truth)) % robots, np.arange(len(truth)) // robots, start, 0, odometry,
@@ -100,16 +116,16 @@ def team_problem(
 # ---- the same written once more, plainly -------------------------------------------------------
 
 
-def unpacked(problem: Problem, x: Array) -> tuple[Array, Array, Array, Array]:
-    """Poses, biases, scales and yaw rates of one vector of all unknowns."""
+def unpacked(problem: Problem, x: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Poses, biases, scales, yaw rates and bias of strong signals of one vector of all unknowns."""
     count, priors = len(problem.initial), problem.priors
-    ends = np.cumsum([3 * count, len(priors.bias), len(priors.scale)])
-    poses, bias, scale, yaw = np.split(x, ends)
-    return poses.reshape(-1, 3), bias, scale, yaw
+    ends = np.cumsum([3 * count, len(priors.bias), len(priors.scale), len(priors.yaw)])
+    poses, bias, scale, yaw, strong = np.split(x, ends)
+    return poses.reshape(-1, 3), bias, scale, yaw, strong
 
 
 def packed(poses: Array, c: Calibration) -> Array:
-    return np.concatenate([poses.ravel(), c.bias, c.scale, c.yaw])
+    return np.concatenate([poses.ravel(), c.bias, c.scale, c.yaw, c.strong])
 
 
 def residual_vector(problem: Problem, x: Array, robust: bool = True) -> Array:
@@ -119,7 +135,7 @@ def residual_vector(problem: Problem, x: Array, robust: bool = True) -> Array:
         robust: ranges, biases and scales by the root of Cauchy's cost; otherwise by the error
             itself, which Gauss and Newton weigh by `range_weights`.
     """
-    poses, bias, scale, yaw = unpacked(problem, x)
+    poses, bias, scale, yaw, strong = unpacked(problem, x)
     out: list[float] = []
     links = problem.links
     for m in range(len(links)):
@@ -134,11 +150,12 @@ def residual_vector(problem: Problem, x: Array, robust: bool = True) -> Array:
     r = problem.ranges
     for m in range(len(r)):
         i, j = (product(poses[k], (*q, 0)) for k, q in ((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m])))
-        e = (math.hypot(*(j - i)[:2]) + bias[r.pair[m]] - r.measured[m]) / r.sigma[m]
+        wrong = bias[r.pair[m]] + strong[0] * math.exp(-r.measured[m] / FADING_M)
+        e = (math.hypot(*(j - i)[:2]) + wrong - r.measured[m]) / r.sigma[m]
         out.append(cauchy_root(e, ROBUST_SIGMAS) if robust else e)
     for e in np.concatenate([bias / problem.priors.bias, scale / problem.priors.scale]):
         out.append(cauchy_root(e, 1.0) if robust else e)
-    out += (yaw / problem.priors.yaw).tolist()
+    out += (yaw / problem.priors.yaw).tolist() + (strong / problem.priors.strong).tolist()
     out += ((poses[problem.gauge] - problem.initial[problem.gauge]) / GAUGE_SIGMA).tolist()
     return np.array(out)
 
@@ -188,5 +205,7 @@ def dense(system: System, layout: Layout) -> Array:
         below = np.arange(n - d)
         full[below + d, below] = full[below, below + d] = system.band[d, : n - d]
     full[:n, n:], full[n:, :n], full[n:, n:] = system.border, system.border.T, system.corner
-    order = np.concatenate([layout.poses.ravel(), layout.bias, layout.scale, layout.yaw])
+    order = np.concatenate(
+        [layout.poses.ravel(), layout.bias, layout.scale, layout.yaw, layout.strong]
+    )
     return np.asarray(full[np.ix_(order, order)])

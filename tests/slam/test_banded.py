@@ -49,13 +49,14 @@ def loose(problem: Problem) -> Problem:
 def test_the_solution_is_that_of_a_dense_solver(seed: int, robots: int) -> None:
     problem, _ = team_problem(seed, robots=robots, count=7, biases=(0.2, -0.1, 0.1))
     solution = solve(problem, tolerance=1e-10)
-    poses, bias, scale, yaw = unpacked(problem, dense_solution(problem))
+    poses, bias, scale, yaw, strong = unpacked(problem, dense_solution(problem))
     assert solution.converged
     for ours, theirs in zip(solution.poses, poses, strict=True):
         assert same_pose(ours, theirs, 1e-5)
     assert np.allclose(solution.calibration.bias, bias, atol=1e-5)
     assert np.allclose(solution.calibration.scale, scale, atol=1e-5)
     assert np.allclose(solution.calibration.yaw, yaw, atol=1e-5)
+    assert np.allclose(solution.calibration.strong, strong, atol=1e-5)
 
 
 def test_the_default_tolerance_is_far_below_every_noise() -> None:
@@ -78,7 +79,7 @@ def test_the_pose_graph_of_gtsam_has_the_same_minimum_and_marginals() -> None:
     odometry = Links(links.i, links.j, links.measured, links.covariance,
                      np.zeros(len(links), dtype=int), np.zeros(len(links)))  # fmt: skip
     # calibration that is known to be nothing
-    priors = Priors(np.zeros(0), np.array([1e-9]), np.array([1e-9]))
+    priors = Priors(np.zeros(0), *(np.array([1e-9]) for _ in range(3)))
     start = truth + rng.normal(0, 0.02, truth.shape)
     start[0] = truth[0]
     problem = Problem(np.zeros(50, dtype=int), np.arange(50), start, 0, odometry, closures,
@@ -133,11 +134,12 @@ def test_what_is_said_of_the_calibration_is_the_end_of_the_dense_inverse() -> No
     x = packed(solution.poses, solution.calibration)
     j = jacobian(problem, x, robust=False)
     inverse = np.linalg.inv(j.T @ (range_weights(problem, x)[:, None] * j))
-    _, bias, scale, yaw = unpacked(problem, np.sqrt(np.diag(inverse)))
+    _, bias, scale, yaw, strong = unpacked(problem, np.sqrt(np.diag(inverse)))
     assert solution.spread is not None
     assert np.allclose(solution.spread.bias, bias, rtol=1e-3)
     assert np.allclose(solution.spread.scale, scale, rtol=1e-3)
     assert np.allclose(solution.spread.yaw, yaw, rtol=1e-3)
+    assert np.allclose(solution.spread.strong, strong, rtol=1e-3)
 
 
 def test_marginals_of_poses_at_the_border_are_the_same() -> None:
@@ -189,9 +191,28 @@ def test_bias_scale_and_yaw_rate_are_found() -> None:
     assert solution.calibration.scale == pytest.approx([0.03, -0.02, 0.05], abs=0.006)
     assert solution.calibration.yaw == pytest.approx([0.01, -0.008, 0.0], abs=0.002)
     assert np.hypot(*(solution.poses - truth)[:, :2].T).max() < 0.3
-    fixed = replace(problem, priors=Priors(np.full(3, 1e-9), np.full(3, 1e-9), np.full(3, 1e-9)))
+    known = Priors(*(np.full(k, 1e-9) for k in (3, 3, 3, 1)))
+    fixed = replace(problem, priors=known)
     wrong = solve(replace(fixed, initial=start))
     assert np.hypot(*(wrong.poses - truth)[:, :2].T).max() > 0.9
+
+
+def test_a_bias_that_only_near_ranges_have_is_found_and_told_from_that_of_the_pairs() -> None:
+    """-0.25 m at no distance, as uncorrected modules have it, beside another bias of each pair."""
+    problem, truth = team_problem(
+        8, robots=3, count=150, biases=(0.25, -0.2, 0.4), strong=-0.25, range_error=0.02,
+        link_sigma=(0.004, 0.004, 0.002),
+    )  # fmt: skip
+    start = problem.initial.copy()
+    start[0] = truth[0]
+    solution = solve(replace(problem, initial=start))
+    assert solution.calibration.strong == pytest.approx([-0.25], abs=0.05)
+    assert solution.calibration.bias == pytest.approx([0.25, -0.2, 0.4], abs=0.03)
+    # what is held to zero goes elsewhere
+    held = replace(problem.priors, strong=np.full(1, 1e-9))
+    without = solve(replace(problem, initial=start, priors=held))
+    assert without.calibration.strong == pytest.approx([0.0], abs=1e-6)
+    assert without.cost > solution.cost + 20
 
 
 def test_bursts_move_the_solution_by_less_than_it_is_known() -> None:
@@ -222,7 +243,7 @@ def test_the_gauge_stays_where_it_was() -> None:
 
 def test_calibration_that_nothing_touches_keeps_its_prior() -> None:
     problem, _ = team_problem(11, robots=2, count=20)
-    priors = Priors(np.array([0.3, 0.3]), np.full(3, 0.03), np.full(3, 0.01))
+    priors = Priors(np.array([0.3, 0.3]), np.full(3, 0.03), np.full(3, 0.01), np.full(1, 0.1))
     wide, plain = solve(replace(problem, priors=priors)), solve(problem)
     assert np.allclose(wide.poses, plain.poses, atol=1e-6)
     assert wide.calibration.bias[1] == 0

@@ -21,10 +21,12 @@ from slam_scenes import (
 )
 
 from drslamd.conventions import GRID_US, Chain, Segment
-from drslamd.slam.banded_optimizer import YAW_PRIOR_FLOOR, Banded, stated
+from drslamd.slam import banded_optimizer
+from drslamd.slam.banded_optimizer import STRONG_SIGMA_M, YAW_PRIOR_FLOOR, Banded, stated
 from drslamd.slam.estimate import TeamEstimate
 from drslamd.slam.items import GraphEntry
 from drslamd.slam.pose_graph import TeamGraph
+from drslamd.slam.problem import FADING_M
 from drslamd.slam.team_frame import Group
 
 
@@ -81,6 +83,23 @@ def test_biases_are_named_by_their_pairs_and_scales_by_their_robots() -> None:
     assert set(estimate.scale) == set(estimate.yaw) == {0, 1, 2}
 
 
+def test_what_strong_signals_do_is_one_constant_of_the_team(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Found where it may be large; its sigma is that of what was measured, without the prior."""
+    team = small_team(2, count=150, range_sigma=0.01)
+    for items in team.graph.pairs.values():
+        items.ranges[:, 6] -= 0.6 * np.exp(-items.ranges[:, 6] / FADING_M)
+    group = group_of(team.graph, CLOCKS)
+    held = solved(team.graph, group).strong_m
+    monkeypatch.setattr(banded_optimizer, "STRONG_SIGMA_M", 1.0)
+    free = solved(team.graph, group).strong_m
+    assert abs(free.value + 0.6) < 3 * free.sigma
+    assert free.value < held.value < 0
+    assert held.sigma == pytest.approx(free.sigma, rel=0.3)
+    assert abs(held.value) < 2 * STRONG_SIGMA_M
+
+
 def test_priors_are_those_of_the_robots_and_of_the_configuration() -> None:
     team = small_team(3)
     still = replace(NOISE, yaw_rad_per_m=1e-6, scale=0.07)
@@ -91,6 +110,7 @@ def test_priors_are_those_of_the_robots_and_of_the_configuration() -> None:
     assert problem.priors.yaw == pytest.approx(
         [NOISE.yaw_rad_per_m, YAW_PRIOR_FLOOR, NOISE.yaw_rad_per_m]
     )
+    assert problem.priors.strong == pytest.approx([STRONG_SIGMA_M])
 
 
 def test_the_next_solution_goes_on_from_the_last_one() -> None:
@@ -99,6 +119,7 @@ def test_the_next_solution_goes_on_from_the_last_one() -> None:
     first = solved(team.graph, group)
     problem_and_start = stated(team.graph, group, first, 0.3)
     assert problem_and_start.start.scale.tolist() == [first.scale[r].value for r in range(3)]
+    assert problem_and_start.start.strong.tolist() == [first.strong_m.value] != [0.0]
     again = solved(team.graph, group, first)
     assert again.iterations <= 2
     for robot, trajectory in again.trajectories.items():

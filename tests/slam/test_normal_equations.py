@@ -26,7 +26,7 @@ def somewhere(problem: Problem, seed: int) -> tuple[Array, Calibration]:
     """A point where nothing is zero."""
     rng = np.random.default_rng(seed)
     p = problem.priors
-    calibration = Calibration(*(rng.normal(0, s) for s in (p.bias, p.scale, p.yaw)))
+    calibration = Calibration(*(rng.normal(0, s) for s in (p.bias, p.scale, p.yaw, p.strong)))
     return problem.initial + rng.normal(0, 0.05, problem.initial.shape), calibration
 
 
@@ -42,7 +42,9 @@ def test_gradient_hessian_and_cost_are_those_of_the_dense_residuals(robots: int)
     # the gradient is that of the robust cost itself ...
     gradient = jacobian(problem, x, robust=True).T @ robust
     layout = equations.layout
-    order = np.concatenate([layout.poses.ravel(), layout.bias, layout.scale, layout.yaw])
+    order = np.concatenate(
+        [layout.poses.ravel(), layout.bias, layout.scale, layout.yaw, layout.strong]
+    )
     assert np.allclose(system.gradient[order], gradient, rtol=1e-5, atol=1e-4)
     # ... the Hessian that of Gauss and Newton, ranges by their weights
     j = jacobian(problem, x, robust=False)
@@ -74,7 +76,7 @@ def test_it_is_the_same_with_poses_at_the_border() -> None:
 def test_every_unknown_stands_somewhere_and_only_once() -> None:
     problem, _ = team_problem(6, robots=3, count=30)
     layout = Layout.of(problem)
-    parts = [layout.poses.ravel(), layout.bias, layout.scale, layout.yaw]
+    parts = [layout.poses.ravel(), layout.bias, layout.scale, layout.yaw, layout.strong]
     numbers = np.sort(np.concatenate(parts))
     assert np.array_equal(numbers, np.arange(layout.band + layout.border))
     # links of three robots reach three poses: 3 * 3 + 2 below the diagonal

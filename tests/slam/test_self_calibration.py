@@ -89,6 +89,16 @@ def test_knowledge_adds_up_as_information(sigma: float) -> None:
     assert left**-2 == pytest.approx(0.3**-2 + (SHARED * sigma) ** -2)
 
 
+def test_what_strong_signals_do_is_taken_out_of_near_ranges_alone() -> None:
+    window, _ = uncalibrated(5)
+    window = replace(window, ranges=np.linspace(-0.2, 30.0, len(window.ranges)))
+    better, _ = calibrated(window, SENSORS, Sensors(strong=Learned(-0.2, 0.02)))
+    added = better.ranges - window.ranges
+    assert added[0] == pytest.approx(0.2)
+    assert np.interp(3.0, window.ranges, added) == pytest.approx(0.2 / math.e, abs=0.003)
+    assert added[-1] == pytest.approx(0.0, abs=1e-4)
+
+
 def test_a_pair_is_found_whoever_owns_it() -> None:
     estimate = TeamEstimate(
         Segment(0, 1, 0),
@@ -97,9 +107,10 @@ def test_a_pair_is_found_whoever_owns_it() -> None:
         scale={2: Learned(0.1, 0.01)},
         scatter={(1, 2): 0.7},
     )
-    sensors = Sensors.of(estimate, 2, 1)
+    sensors = Sensors.of(replace(estimate, strong_m=Learned(-0.1, 0.03)), 2, 1)
     assert sensors.bias.value == 0.3
     assert sensors.scatter == 0.7
     assert Sensors.of(estimate, 0, 1).scatter == 1.0
+    assert sensors.strong == (-0.1, 0.03)
     assert sensors.scale_a.value == 0.1
     assert math.isinf(sensors.scale_b.sigma)

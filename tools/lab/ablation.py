@@ -71,6 +71,10 @@ PIECES = {
         "short ranges are trusted like others",
         exchanged=((window_noise, "NEAR_BIAS_M", 0.0),),
     ),
+    "strong-signals": Piece(
+        "what biases do at short range is not an unknown",
+        exchanged=((banded_optimizer, "STRONG_SIGMA_M", 1e-6),),
+    ),
     "robust-ranges": Piece(
         "module 3 squares the errors of ranges, whatever their size",
         exchanged=((normal_equations, "ROBUST_SIGMAS", 1e6),),
