@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from drslamd.slam import banded_optimizer, normal_equations, pair_window, window_noise
 from drslamd.slam.normal_equations import System
 from drslamd.slam.problem import Index
@@ -47,10 +49,19 @@ def _measured(values: Array, sigmas: Array, prior: Array) -> Any:
     return banded_optimizer._measured(values, sigmas, prior**-2.0)
 
 
+def _as_configured(errors: Array, sigmas: Array, pair: Index, pairs: int) -> Array:
+    """What ranges scatter, when nobody looks."""
+    return np.ones(pairs)
+
+
 PIECES = {
     "self-calibration": Piece(
         "windows know nothing of what module 3 has learned", "relative_pose",
         "self_calibration = false",
+    ),
+    "range-scatter": Piece(
+        "closures claim what the configured sigma of ranges says",
+        exchanged=((banded_optimizer, "scatter", _as_configured),),
     ),
     "nlos": Piece("the power of the first path is not looked at", "relative_pose", "nlos_db = 0.0"),
     "long-windows": Piece("windows of 30 s", "relative_pose", "window_max_s = 30.0"),
