@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import get_lapack_funcs
 
-from drslamd.slam.range_fit import PRIOR, ROBUST_SIGMAS, RangeFit, stepped
+from drslamd.slam.range_fit import PRIOR, ROBUST_SIGMAS, Minima, RangeFit, stepped
 from drslamd.slam.se2 import Array
 from drslamd.slam.window_noise import WindowNoise
 
@@ -24,49 +24,49 @@ _factorise, _solve = get_lapack_funcs(("potrf", "potrs"), dtype=np.float64)
 
 
 class Judged(NamedTuple):
-    """k minima under the noise of the whole window.
+    """Minima under the noise of the whole window, best first.
 
     Attributes:
-        centred: (k, 2) see `RangeFit`.
-        covariance: (k, 3, 3) in parts of a step.
-        chi2: (k,); infinite where the covariance of the window is not one, which absurd odometry
-            can bring about.
+        minima: chi-squared is infinite where the covariance of the window is not one, which absurd
+            odometry can bring about.
         e: (k, n) predicted minus measured ranges.
     """
 
-    centred: Array
-    covariance: Array
-    chi2: Array
+    minima: Minima
     e: Array
 
-    def best_first(self) -> Judged:
-        order = np.argsort(self.chi2, kind="stable")
-        return Judged(*(values[order] for values in self))
 
-
-def judge(fit: RangeFit, noise: WindowNoise, centred: Array) -> Judged:
-    """Where the noise of the window puts some minima (k, 2)."""
+def judge(fit: RangeFit, noise: WindowNoise, centred: Array) -> Judged | None:
+    """Where the noise of the window puts some minima (k, 2); None where it leaves it vague."""
     x = centred
     made_at: tuple[Array, Array] | None = None
-    for _ in range(STEPS):
+    for n in range(STEPS):
         u, rows = fit.linear(x)
         e = rows[:, 4]
         if made_at is None or not _same(e, u, made_at, noise.sigma):
             factors, sound = _factors(noise.covariance(u, x[:, 1], _weights(e, noise.sigma)))
             made_at = e, u
-        weighted = np.stack([_solve(f, r.T)[0] for r, f in zip(rows, factors, strict=True)])
+        weighted = np.array([_solve(f, r.T)[0] for r, f in zip(rows, factors, strict=True)])
         normal = rows @ weighted
-        information = normal[:, :3, :3] + PRIOR * np.eye(3)
-        step = -np.linalg.solve(information, normal[:, :3, 4:])[..., 0]
+        covariance = np.linalg.inv(normal[:, :3, :3] + PRIOR * np.eye(3))
+        step = -(covariance @ normal[:, :3, 4:])[..., 0]
         promise = -(normal[:, 4, :3] * step).sum(axis=1)
+        minima = Minima(x, covariance, np.where(sound, normal[:, 4, 4] - promise, np.inf))
+        if n == 0 and fit.is_vague(_as_they_scatter(minima, weighted, noise)):
+            return None
         size = np.abs(step).max(axis=1)
         x = stepped(x, step * np.minimum(1.0, LONGEST / (size + 1e-12))[:, None])
         if ((size < SETTLED) | (promise < SETTLED_CHI2)).all():
             break
-    chi2 = np.where(sound, normal[:, 4, 4] - promise, np.inf)
-    covariance = np.linalg.inv(information)
-    covariance += noise.excess(covariance @ weighted[:, :, :3].transpose(0, 2, 1))
-    return Judged(x, covariance, chi2, e)
+    minima = _as_they_scatter(minima._replace(centred=x), weighted, noise)
+    order = np.argsort(minima.chi2, kind="stable")
+    return Judged(Minima(*(values[order] for values in minima)), e[order])
+
+
+def _as_they_scatter(minima: Minima, weighted: Array, noise: WindowNoise) -> Minima:
+    """Weights are those of what must be allowed for, the covariance that of what is known."""
+    gain = minima.covariance @ weighted[:, :, :3].transpose(0, 2, 1)
+    return minima._replace(covariance=minima.covariance + noise.excess(gain))
 
 
 def _same(e: Array, u: Array, before: tuple[Array, Array], sigma: float) -> bool:

@@ -8,13 +8,16 @@ so that what is an arc in x and y is straight here.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from drslamd.slam.se2 import Array
 from drslamd.slam.window_noise import RangeNoise
 
-STEPS = 14
-"""Of the refinement at most; what is not settled then lies in a valley without an end."""
+FIRST_STEPS, STEPS = 3, 14
+"""Of a descent until a first look, and in all; what is not settled then lies in a valley without
+an end."""
 SETTLED_CHI2 = 0.3
 """A step that promises less than this (2 log-likelihood) is not worth the next one."""
 HOPELESS, HOPELESS_CHI2 = 5.0, 60.0
@@ -28,6 +31,25 @@ ROBUST_SIGMAS = 2.5
 """Huber's threshold: beyond it a range loses weight (bursts are 0.3 m and more)."""
 AROUND_M = 1.0
 """Centroids nearer than this have no direction to speak of: steps are straight."""
+MAX_SIGMA_M, MAX_SIGMA_RAD = 1.5, 0.5
+"""A pose known worse than this helps nobody."""
+VAGUE, SURELY_CHI2 = 1.5, 10.0
+"""A minimum this many times vaguer, and no worse than the best by more than this, will not become
+known, nor be excluded, by the last steps."""
+
+
+class Minima(NamedTuple):
+    """k minima of one window.
+
+    Attributes:
+        centred: (k, 2).
+        covariance: (k, 3, 3) in parts of a step (see `stepped`).
+        chi2: (k,) 2 log-likelihood.
+    """
+
+    centred: Array
+    covariance: Array
+    chi2: Array
 
 
 class RangeFit:
@@ -88,6 +110,21 @@ class RangeFit:
         out[:, 0, 1] = out[:, 1, 0] = zz.imag / 2
         return out
 
+    def covariances(self, minima: Minima) -> Array:
+        """(k, 3, 3) of x, y, theta in frame a."""
+        return self._as_if_straight(minima) + self.by_arcs(minima.centred, minima.covariance)
+
+    def is_vague(self, minima: Minima) -> bool:
+        """Whether a minimum that counts is far from being known, so that nothing else matters."""
+        limits = np.array([MAX_SIGMA_M, MAX_SIGMA_M, MAX_SIGMA_RAD]) * VAGUE
+        vague = np.einsum("kii->ki", self._as_if_straight(minima)) > limits**2
+        counts = minima.chi2 < minima.chi2.min() + SURELY_CHI2
+        return bool((vague.any(axis=1) & counts).any())
+
+    def _as_if_straight(self, minima: Minima) -> Array:
+        m = self.by_step(minima.centred)
+        return np.asarray(m @ minima.covariance @ m.transpose(0, 2, 1))
+
     def linear(self, centred: Array) -> tuple[Array, Array]:
         """Equation 1 about centred poses.
 
@@ -132,36 +169,47 @@ def _direction(place: Array) -> Array:
     return np.asarray(np.exp(1j * _angle(place)))
 
 
-def refine(fit: RangeFit, seeds: Array, noise: RangeNoise) -> Array:
-    """Robust Levenberg-Marquardt on all seeds at once, the pair's bias a fourth unknown.
+class Descent:
+    """Robust Levenberg-Marquardt from all seeds at once, the pair's bias a fourth unknown."""
 
-    Args:
-        fit: the window.
-        seeds: (k, 2) centred poses.
-        noise: sigmas.
+    def __init__(self, fit: RangeFit, seeds: Array, noise: RangeNoise) -> None:
+        """From centred poses (k, 2)."""
+        self._fit, self._noise = fit, noise
+        self._x, self._bias = seeds, np.zeros(len(seeds))
+        self._damping = np.full(len(seeds), 1e-3)
+        self._cost, self._normal = _normal_equations(fit, seeds, self._bias, noise)
+        self._is_settled = False
 
-    Returns:
-        (k, 2) the minima, best first, without those that are worse than the best beyond doubt.
-    """
-    x, bias = seeds, np.zeros(len(seeds))
-    damping = np.full(len(x), 1e-3)
-    cost, normal = _normal_equations(fit, x, bias, noise)
-    for _ in range(STEPS):
-        step, promise = _damped_step(normal, damping)
-        trial, trial_bias = stepped(x, step), bias + step[:, 3]
-        trial_cost, trial_normal = _normal_equations(fit, trial, trial_bias, noise)
-        settled = (promise < SETTLED_CHI2) | (damping > MOST_DAMPING)
-        better = trial_cost <= cost
-        x = np.where(better[:, None], trial, x)
-        bias = np.where(better, trial_bias, bias)
-        cost = np.where(better, trial_cost, cost)
-        normal = np.where(better[:, None, None], trial_normal, normal)
-        damping *= np.where(better, 0.2, 8.0)
-        hopeful = cost < cost.min() * HOPELESS + HOPELESS_CHI2
-        if (settled | ~hopeful).all():
-            break
-    order = np.argsort(cost, kind="stable")
-    return np.asarray(x[order[hopeful[order]]])
+    def run(self, steps: int) -> None:
+        """At most so many steps, until all that may still count are settled."""
+        for _ in range(steps):
+            if self._is_settled:
+                break
+            step, promise = _damped_step(self._normal, self._damping)
+            x, bias = stepped(self._x, step), self._bias + step[:, 3]
+            cost, normal = _normal_equations(self._fit, x, bias, self._noise)
+            settled = (promise < SETTLED_CHI2) | (self._damping > MOST_DAMPING)
+            better = cost <= self._cost
+            self._x = np.where(better[:, None], x, self._x)
+            self._bias = np.where(better, bias, self._bias)
+            self._cost = np.where(better, cost, self._cost)
+            self._normal = np.where(better[:, None, None], normal, self._normal)
+            self._damping *= np.where(better, 0.2, 8.0)
+            self._is_settled = bool((settled | ~self._may_count()).all())
+
+    def minima(self) -> Minima:
+        """Best first, without those that are worse than the best beyond doubt.
+
+        What ranges scatter counts as white, which flatters.
+        """
+        order = np.argsort(self._cost, kind="stable")
+        order = order[self._may_count()[order]]
+        covariance = np.linalg.inv(self._normal[order, :4, :4])[:, :3, :3]
+        covariance *= self._noise.scatter**2
+        return Minima(self._x[order], covariance, self._cost[order])
+
+    def _may_count(self) -> Array:
+        return np.asarray(self._cost < self._cost.min() * HOPELESS + HOPELESS_CHI2)
 
 
 def _damped_step(normal: Array, damping: Array) -> tuple[Array, Array]:
@@ -169,8 +217,8 @@ def _damped_step(normal: Array, damping: Array) -> tuple[Array, Array]:
     hessian, gradient = normal[:, :4, :4].copy(), normal[:, :4, 4:]
     diagonal = np.einsum("kii->ki", hessian)
     diagonal *= 1 + np.maximum(damping, LEAST_DAMPING)[:, None]
-    step = np.linalg.solve(hessian, gradient)
-    return -step[..., 0], (step * gradient).sum(axis=(1, 2))
+    step = np.linalg.solve(hessian, gradient)[..., 0]
+    return -step, (step * gradient[..., 0]).sum(axis=1)
 
 
 def _normal_equations(
@@ -181,12 +229,11 @@ def _normal_equations(
     e = rows[:, 4]
     e += bias[:, None]
     beyond = ROBUST_SIGMAS * noise.sigma
-    weighted = rows * (beyond / np.maximum(np.abs(e), beyond))[:, None]
+    weighted = rows * (ROBUST_SIGMAS / noise.sigma / np.maximum(np.abs(e), beyond))[:, None]
     normal = weighted @ rows.transpose(0, 2, 1)
-    normal *= noise.sigma**-2.0
     # e^2 within the threshold, 2 c |e| - c^2 beyond it
     shrunk = weighted[:, 4]
-    cost = 2 * normal[:, 4, 4] - np.einsum("kn,kn->k", shrunk, shrunk) * noise.sigma**-2.0
+    cost = 2 * normal[:, 4, 4] - np.einsum("kn,kn->k", shrunk, shrunk) * noise.sigma**2
     prior = noise.bias_sigma**-2.0
     cost += bias * bias * prior
     normal[:, 3, 4] += bias * prior

@@ -17,7 +17,15 @@ import numpy as np
 from drslamd.slam import coarse_search, se2
 from drslamd.slam.generalised_fit import judge, middle
 from drslamd.slam.odometry import OdometryNoise
-from drslamd.slam.range_fit import LEAST_DAMPING, RangeFit, refine
+from drslamd.slam.range_fit import (
+    FIRST_STEPS,
+    LEAST_DAMPING,
+    MAX_SIGMA_M,
+    MAX_SIGMA_RAD,
+    STEPS,
+    Descent,
+    RangeFit,
+)
 from drslamd.slam.se2 import Array
 from drslamd.slam.window import Window
 from drslamd.slam.window_noise import RangeNoise, WindowNoise
@@ -34,8 +42,6 @@ POOR_FIT = 4.0
 NEWEST, NEWEST_SIGMAS = 3, 2.0
 """So many last measurements may not lie off the rest by so much in the median: near the end of a
 window a burst and odometry that has just failed look alike."""
-MAX_SIGMA_M, MAX_SIGMA_RAD = 1.5, 0.5
-"""A pose known worse than this helps nobody."""
 PAPER_PRIOR = 1e-4
 """Information, 1/m^2 and 1/rad^2, that the paper's solver adds: no verdict keeps windows back that
 say nothing, and a covariance of 100 m can still be sent."""
@@ -92,16 +98,21 @@ def solve(window: Window, noise: Noise, delta: float) -> Estimate:
     nearest = np.argsort(np.abs(window.t), kind="stable")[:3]
     rho = max(0.1, float(np.sort(window.ranges[nearest])[1]))
     seeds = coarse_search.seeds(a, b, window.ranges, rho, delta, SEEDS)
-    candidates = refine(fit, fit.centred(seeds), noise.ranges)
-    candidates = candidates[_distinct(fit.poses(candidates))]
+    descent = Descent(fit, fit.centred(seeds), noise.ranges)
+    descent.run(FIRST_STEPS)
+    if fit.is_vague(descent.minima()):
+        return Estimate(Verdict.UNOBSERVABLE)
+    descent.run(STEPS - FIRST_STEPS)
+    refined = descent.minima().centred
+    candidates = refined[_distinct(fit.poses(refined))]
     window_noise = WindowNoise(window, a, b, noise.ranges, noise.a, noise.b)
-    judged = judge(fit, window_noise, candidates).best_first()
-    minima, chi2 = judged.centred, judged.chi2
+    judged = judge(fit, window_noise, candidates)
+    if judged is None:
+        return Estimate(Verdict.UNOBSERVABLE)
+    minima, chi2 = judged.minima, judged.minima.chi2
     if chi2[0] > POOR_FIT * (len(window) - 3) or _end_is_off(judged.e[0], noise):
         return Estimate(Verdict.POOR_FIT)
-    poses, by_step = fit.poses(minima), fit.by_step(minima)
-    covariances = by_step @ judged.covariance @ by_step.transpose(0, 2, 1)
-    covariances += fit.by_arcs(minima, judged.covariance)
+    poses, covariances = fit.poses(minima.centred), fit.covariances(minima)
     # under the full noise two candidates may have come to the same minimum
     kept = [k for k in _distinct(poses) if chi2[k] < chi2[0] + EXCLUDED_CHI2][:HYPOTHESES]
     if not all(_observable(covariances[k]) for k in kept):
@@ -138,6 +149,8 @@ def residuals(poses: Array, a: Array, b: Array, ranges: Array) -> tuple[Array, A
 
 def _distinct(poses: Array) -> list[int]:
     """Which of the poses (k, 3), best first, are not near a better one."""
+    if len(poses) == 1:
+        return [0]
     off = poses[:, None] - poses
     near = np.hypot(off[..., 0], off[..., 1]) < MERGE_M
     near &= np.abs(se2.wrap(off[..., 2])) < MERGE_RAD

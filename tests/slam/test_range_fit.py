@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from slam_scenes import Array, matrix, same_pose, wander, window_of
 
 from drslamd.slam import range_fit
-from drslamd.slam.range_fit import RangeFit, refine, stepped
+from drslamd.slam.range_fit import STEPS, Descent, Minima, RangeFit, stepped
 from drslamd.slam.window_noise import RangeNoise
 
 NOISE = RangeNoise(0.1, 0.3)
@@ -105,6 +107,49 @@ def test_a_valley_is_followed_around_its_arc() -> None:
     window, true = window_of(wander(rng, 50, 0.2), np.tile([5.0, 1.0, 0.3], (50, 1)))
     fit = RangeFit(window.a_points, window.b_points, window.ranges)
     seeds = np.array([true + [0.5, -0.4, 0.0], true + [0.5, -0.4, 2.0]])
-    refined = fit.poses(refine(fit, fit.centred(seeds), NOISE))
+    descent = Descent(fit, fit.centred(seeds), NOISE)
+    descent.run(STEPS)
+    refined = fit.poses(descent.minima().centred)
     assert len(refined) == 2
     assert np.hypot(*(refined[:, :2] - true[:2]).T).max() < 0.05
+
+
+@pytest.mark.parametrize("part", [0, 1, 2])
+@pytest.mark.parametrize(("times", "chi2", "vague"), [
+    (0.99, 0.0, False), (1.01, 0.0, True), (1.01, 0.99, True), (1.01, 1.01, False),
+])  # fmt: skip
+def test_a_window_is_vague_as_soon_as_one_minimum_that_counts_is(
+    part: int, times: float, chi2: float, vague: bool
+) -> None:
+    """Seen from the centroids, which lie at the antennas of two robots that did not move."""
+    still = np.zeros((6, 2))
+    fit = RangeFit(still, still, np.full(6, 4.0))
+    limit = [range_fit.MAX_SIGMA_M, range_fit.MAX_SIGMA_M, range_fit.MAX_SIGMA_RAD][part]
+    covariance = np.tile(1e-4 * np.eye(3), (2, 1, 1))
+    covariance[1, part, part] = (times * range_fit.VAGUE * limit) ** 2
+    centred = fit.centred(np.array([[4.0, 0.0, 1.0], [4.0, 0.0, -1.0]]))
+    worse = 7.0 + np.array([0.0, chi2 * range_fit.SURELY_CHI2])
+    assert fit.is_vague(Minima(centred, covariance, worse)) is vague
+
+
+def test_a_descent_that_is_settled_does_nothing_more() -> None:
+    rng = np.random.default_rng(6)
+    window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [6.0, 0, 0])
+    fit = RangeFit(window.a_points, window.b_points, window.ranges)
+    once, twice = (Descent(fit, fit.centred(true[None]), NOISE) for _ in range(2))
+    once.run(STEPS)
+    twice.run(STEPS)
+    twice.run(STEPS)
+    assert np.array_equal(once.minima().centred, twice.minima().centred)
+
+
+def test_ranges_that_are_known_to_scatter_less_leave_a_window_less_vague() -> None:
+    rng = np.random.default_rng(6)
+    window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [6.0, 0, 0])
+    fit = RangeFit(window.a_points, window.b_points, window.ranges)
+    plain, quiet = (
+        Descent(fit, fit.centred(true[None]), replace(NOISE, scatter=scatter)).minima()
+        for scatter in (1.0, 0.5)
+    )
+    assert np.allclose(quiet.covariance, plain.covariance / 4)
+    assert np.array_equal(quiet.centred, plain.centred)

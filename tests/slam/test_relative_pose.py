@@ -11,7 +11,7 @@ from scipy.optimize import least_squares, minimize_scalar
 from slam_scenes import EXACT, NOISE, Array, matrix, same_pose, straight, wander, window_of
 
 from drslamd.slam import coarse_search, range_fit, relative_pose, se2
-from drslamd.slam.range_fit import RangeFit, refine
+from drslamd.slam.range_fit import STEPS, Descent, RangeFit
 from drslamd.slam.relative_pose import Estimate, Noise, Verdict, residuals, solve
 from drslamd.slam.window import Window
 from drslamd.slam.window_noise import RangeNoise
@@ -265,7 +265,9 @@ def minpack(window: Window, seeds: Array) -> Array:
 
 def refined(window: Window, seeds: Array) -> Array:
     fit = RangeFit(window.a_points, window.b_points, window.ranges)
-    return fit.poses(refine(fit, fit.centred(seeds), SENSORS.ranges))
+    descent = Descent(fit, fit.centred(seeds), SENSORS.ranges)
+    descent.run(STEPS)
+    return fit.poses(descent.minima().centred)
 
 
 def test_the_refinement_reaches_the_minima_of_minpack() -> None:

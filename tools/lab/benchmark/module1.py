@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from drslamd.slam import coarse_search, relative_pose
 from drslamd.slam.pair_window import POINTS
-from drslamd.slam.range_fit import RangeFit, refine
+from drslamd.slam.range_fit import STEPS, Descent, RangeFit
 from drslamd.slam.window import Window, binned
 from lab.benchmark import timing, windows
 from lab.benchmark.rows import Peer, Row
@@ -78,7 +78,9 @@ def refined(window: Window, seeds: int) -> Array:
     rho = float(np.median(window.ranges[-3:]))
     found = coarse_search.seeds(a, b, window.ranges, rho, DELTA, seeds)
     fit = RangeFit(a, b, window.ranges)
-    return fit.poses(refine(fit, fit.centred(found), windows.NOISE.ranges))
+    descent = Descent(fit, fit.centred(found), windows.NOISE.ranges)
+    descent.run(STEPS)
+    return fit.poses(descent.minima().centred)
 
 
 def grid(window: Window) -> Array:
