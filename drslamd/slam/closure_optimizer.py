@@ -1,8 +1,9 @@
 """`optimizer.algorithm = "closures"`: the paper's pose graph, solved exactly on every robot.
 
 Odometry and kept closures alone, with the weights and the cost of `rbcd`, and with every iterate of
-it left out: the graph is replicated anyway. Robots that measured relative poses in full precision
-(`items.RelativePoses`) add those.
+it left out: the graph is replicated anyway. Closures that the whole of it contradicts count for
+nothing (`graduated`). Robots that measured relative poses in full precision
+(`items.RelativePoses`) add those, which are believed.
 """
 
 from __future__ import annotations
@@ -12,10 +13,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drslamd.config import Config
 from drslamd.conventions import Chain
-from drslamd.slam import graph_edges, se2, team_frame
+from drslamd.slam import graduated, graph_edges, se2, team_frame
 from drslamd.slam.chordal import PoseGraph
 from drslamd.slam.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph_edges import Numbering, chain_links
@@ -52,7 +54,7 @@ class Closures:
             for segment, poses in team_frame.placed(graph, group, previous).items():
                 rows = graph.chains[segment.robot].rows_of(segment.segment)
                 start[numbers.place[segment.robot][rows]] = poses
-        stated = _Stated(numbers, _edges(graph, numbers), chains, gauge, first[2:], start)
+        stated = _Stated(numbers, *_edges(graph, numbers), chains, gauge, first[2:], start)
         return partial(_solve, stated, group)
 
 
@@ -61,19 +63,22 @@ class _Stated:
     """A group as a pose graph.
 
     Attributes:
+        is_closure: (m,) of the edges.
         gauge: the pose that is at `origin` (3,) in the frame of the team.
         start: (k, 3), None to start from the chordal relaxation.
     """
 
     numbers: Numbering
     edges: ComplexEdges
+    is_closure: NDArray[np.bool_]
     chains: list[Chain]
     gauge: int
     origin: Array
     start: Array | None
 
 
-def _edges(graph: TeamGraph, numbers: Numbering) -> ComplexEdges:
+def _edges(graph: TeamGraph, numbers: Numbering) -> tuple[ComplexEdges, NDArray[np.bool_]]:
+    """All edges, and which of them are closures."""
     parts = [ComplexEdges.of(graph_edges.closures(graph, numbers))]
     for robot, place in numbers.place.items():
         items = graph.chains[robot]
@@ -88,13 +93,14 @@ def _edges(graph: TeamGraph, numbers: Numbering) -> ComplexEdges:
                 parts.append(ComplexEdges.relative(i, j, batch))
     edges = ComplexEdges.joined(parts)
     # a pose relative to itself says nothing
-    return edges.chosen((edges.i >= 0) & (edges.j >= 0) & (edges.i != edges.j))
+    used = (edges.i >= 0) & (edges.j >= 0) & (edges.i != edges.j)
+    return edges.chosen(used), (np.arange(len(edges)) < len(parts[0]))[used]
 
 
 def _solve(stated: _Stated, group: Group) -> TeamEstimate:
     """Solve, carry the answer into the frame of the team, and sort it by robot."""
     numbers, count = stated.numbers, len(stated.numbers.n)
-    answer = PoseGraph(stated.edges, count).solve(stated.start)
+    answer, edges = graduated.solve(stated.edges, count, stated.is_closure, stated.start)
     w_T_any = se2.compose(stated.origin, se2.inverse(answer.poses[stated.gauge]))
     poses = se2.compose(w_T_any[None], answer.poses)
     poses[:, 2] = se2.wrap(poses[:, 2])
@@ -102,7 +108,7 @@ def _solve(stated: _Stated, group: Group) -> TeamEstimate:
     mine = {robot: at[np.argsort(numbers.n[at], kind="stable")] for robot, at in mine.items()}
     last = {robot: int(at[-1]) for robot, at in mine.items()}
     # the cost counts an angle twice (`ComplexEdges.of`), which for a covariance it must not
-    weighed = replace(stated.edges, kappa=stated.edges.kappa / 2)
+    weighed = replace(edges, kappa=edges.kappa / 2)
     covariances = PoseGraph(weighed, count, stated.gauge).marginals(poses, list(last.values()))
     return TeamEstimate(
         group.frame,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -96,3 +97,20 @@ def test_a_group_of_false_edges_agrees_with_itself() -> None:
     chains = {r: edge_run._chain(only, trail) for r, trail in only.trails.items()}
     noise = OdometryNoise(0.03, 0.0026, 0.01, 0.0087)
     assert edge_run.consistent(only, chains, noise, 0.1).sum() >= 4
+
+
+def test_a_misled_pair_has_nothing_but_false_edges_that_agree() -> None:
+    made = injection.misled(edged(), np.array([0, 1]), 12, 3)
+    assert len(made.edges) == 12
+    true = metrics.relative(
+        *(metrics.at_times(t.t, t.truth, made.edges[:, 0]) for t in made.trails.values())
+    )
+    assert np.hypot(*(made.edges[:, 3:] - true)[:, :2].T).min() > 0.5
+    chains = {robot: edge_run._chain(made, trail) for robot, trail in made.trails.items()}
+    noise = OdometryNoise(0.03, 0.003, 0.01, 0.01)
+    assert edge_run.consistent(made, chains, noise, 0.01).sum() >= 11
+    other = edged().edges + [0, 0, 1, 0, 0, 0]
+    more = replace(edged(), edges=np.concatenate([edged().edges, other]))
+    kept = injection.misled(more, np.array([0, 1]), 12, 3).edges
+    assert np.array_equal(kept[kept[:, 2] == 2], other)
+    assert len(kept) == len(other) + 12

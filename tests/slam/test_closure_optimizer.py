@@ -123,12 +123,29 @@ def test_beside_a_single_closure_a_heading_is_as_uncertain_as_its_odometry() -> 
 def test_two_closures_between_the_same_keyframes_both_count() -> None:
     team = Team(3)
     once = team.solved()
-    wrong = team.true(1, 12) + [0.3, 0, 0]
+    wrong = team.true(1, 12) + [0.05, 0, 0]
     team.close(900, 1, 12, wrong, 0.02)
     twice = team.solved()
     team.close(901, 1, 12, wrong, 0.02)
     thrice = team.solved()
     assert once.cost + 1 < twice.cost < thrice.cost - 1
+
+
+def test_closures_that_agree_only_with_each_other_count_for_nothing() -> None:
+    """Robot 2 seen elsewhere from robot 1, five times alike; who knows robot 0 knows better."""
+    team = Team(8)
+    before = team.solved()
+    n, chains = team.team.n, team.team.chains
+    for k in range(5, COUNT, 7):
+        seen = product(inverted(team.team.truth[1][k]), [2.0, 1.0, 0.5], team.team.truth[2][k])
+        item = closure(900 + k, int(n[1][k]), chains[2], int(n[2][k]), seen, 0.02)
+        team.team.graph.insert(chains[1], GraphEntry(2000 + k, closures=(item,)))
+    after = team.solved()
+    for robot, trajectory in before.trajectories.items():
+        off = after.trajectories[robot].poses - trajectory.poses
+        assert np.abs(off[:, :2]).max() < 0.02
+        ratio = after.covariances[robot] / before.covariances[robot]
+        assert np.diag(ratio) == pytest.approx(1.0, rel=0.1)
 
 
 def test_what_closures_are_worth_shows_in_the_covariances() -> None:

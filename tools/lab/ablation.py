@@ -7,6 +7,7 @@ these switches.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,7 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from drslamd.slam import banded_optimizer, normal_equations, pair_window, window_noise
+from drslamd.slam import (
+    banded_optimizer,
+    graduated,
+    normal_equations,
+    pair_window,
+    window_noise,
+)
 from drslamd.slam.normal_equations import System
 from drslamd.slam.problem import Index
 from lab.recording import Array
@@ -85,6 +92,10 @@ PIECES = {
     "strong-signals": Piece(
         "what biases do at short range is not an unknown",
         exchanged=((banded_optimizer, "STRONG_SIGMA_M", 1e-6),),
+    ),
+    "gnc": Piece(
+        "`closures` believes whatever module 2 kept",
+        exchanged=((graduated, "BELIEVABLE", math.inf),),
     ),
     "robust-ranges": Piece(
         "module 3 squares the errors of ranges, whatever their size",

@@ -2,7 +2,7 @@
 
 Each pair's edges go through pairwise consistency maximisation in the order of time; what it keeps
 is the graph of a team whose robots optimise their own blocks in turns (`optimizer = "rbcd"`), with
-perfect radio, until nothing moves.
+perfect radio, until nothing moves. (Or every robot solves all of it: `optimizer = "closures"`.)
 """
 
 from __future__ import annotations
@@ -40,15 +40,19 @@ class Chains:
 
 
 def run(
-    recording: EdgeRecording, extra: str = "", progress: Callable[[float], None] | None = None
+    recording: EdgeRecording,
+    extra: str = "",
+    progress: Callable[[float], None] | None = None,
+    optimizer: str = "rbcd",
 ) -> tuple[Outcome, NDArray[np.bool_]]:
     """What the team makes of the edges, and which of them it kept (k,).
 
     Args:
         extra: TOML sections for every robot.
         progress: told how many rounds are done.
+        optimizer: `optimizer.algorithm` of every robot.
     """
-    configs = {robot: _config(robot, extra) for robot in recording.trails}
+    configs = {robot: _config(robot, optimizer, extra) for robot in recording.trails}
     noise = OdometryNoise.from_config(next(iter(configs.values())).odometry)
     chains = {robot: _chain(recording, trail) for robot, trail in recording.trails.items()}
     kept = consistent(recording, chains, noise, configs[min(configs)].consistency.epsilon)
@@ -61,11 +65,11 @@ def run(
     return _outcome(backs, recording, kept), kept
 
 
-def _config(robot: int, extra: str) -> Config:
+def _config(robot: int, optimizer: str, extra: str) -> Config:
     return parse(
         f'[robot]\nid = {robot}\n[team]\ninsecure = true\n[uwb]\nport = "/dev/uwb"\n'
         '[wheels]\nsource = "kobuki"\nport = "/dev/wheels"\n'
-        f'[optimizer]\nalgorithm = "rbcd"\n{extra}'
+        f'[optimizer]\nalgorithm = "{optimizer}"\n{extra}'
     )
 
 

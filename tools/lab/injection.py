@@ -72,16 +72,27 @@ def with_false_edges(
     return replace(recording, edges=edges[order]), is_true[order]
 
 
+def misled(recording: EdgeRecording, pair: Array, count: int, seed: int) -> EdgeRecording:
+    """A copy in which all edges of one pair (2,) are `count` ones that agree, and are wrong."""
+    others = recording.edges[(recording.edges[:, 1:3] != pair).any(axis=1)]
+    true = recording.edges[(recording.edges[:, 1:3] == pair).all(axis=1)]
+    false = _group(np.random.default_rng(seed), recording, true[:, 0], pair, count)
+    edges = np.concatenate([others, false])
+    return replace(recording, edges=edges[np.argsort(edges[:, 0], kind="stable")])
+
+
 def _places(rng: np.random.Generator, count: int) -> Array:
     """(count, 3) anywhere."""
     most = np.array([ROOM_M, ROOM_M, np.pi])
     return np.asarray(rng.uniform(-most, most, (count, 3)))
 
 
-def _group(rng: np.random.Generator, recording: EdgeRecording, t: Array, pair: Array) -> Array:
-    """(5, 6) edges that agree, and are wrong."""
+def _group(
+    rng: np.random.Generator, recording: EdgeRecording, t: Array, pair: Array, count: int = GROUP
+) -> Array:
+    """(count, 6) edges that agree, and are wrong; five within ten seconds."""
     start = rng.choice(t)
-    when = np.sort(rng.uniform(start, min(start + GROUP_S, t[-1]), GROUP))
+    when = np.sort(rng.uniform(start, min(start + GROUP_S * count / GROUP, t[-1]), count))
     a, b = (recording.trails[int(robot)] for robot in pair)
     a_poses = metrics.at_times(a.t, a.odometry, when)
     b_poses = metrics.at_times(b.t, b.odometry, when)
@@ -92,4 +103,4 @@ def _group(rng: np.random.Generator, recording: EdgeRecording, t: Array, pair: A
     poses = metrics.relative(a_poses, metrics.compose(origin, b_poses))
     metres, radians = recording.sigmas
     poses = poses + rng.normal(size=poses.shape) * [metres, metres, radians]
-    return np.column_stack([when, np.tile(pair, (GROUP, 1)), poses])
+    return np.column_stack([when, np.tile(pair, (count, 1)), poses])
