@@ -93,7 +93,7 @@ def test_a_long_valley_is_as_wide_as_its_arc_is_deep(apart: float) -> None:
     seen = off.T @ off / len(off)
     m = fit.by_step(centred)[0]
     straight = m @ covariance @ m.T
-    claimed = straight + fit.by_arcs(centred, covariance[None])[0]
+    claimed = fit.covariances(Minima(centred, covariance[None], np.zeros(1)))[0]
     sigma = np.sqrt(np.diag(seen))
     assert np.abs((claimed - seen) / np.outer(sigma, sigma)).max() < 0.05
     assert np.array_equal(claimed[2], straight[2])

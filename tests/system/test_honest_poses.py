@@ -2,7 +2,8 @@
 
 `tools/reproduce` holds the promise over its long drives: 0.8 to 1.25 per degree of freedom, 90 to
 99 % inside the ellipses. A few drives of 75 s scatter more, and most of what is wrong in one of
-them is constant; bounds here are those that a covariance wrong by a factor of two would break.
+them is constant; bounds here are those that a covariance wrong by a factor of two would break, and
+closures that claimed what is configured and not what ranges scatter (0.68 where they are better).
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from lab.reproduce.tally import Tally
 pytestmark = pytest.mark.slow
 
 SEEDS = range(100, 106)
-LEAST, MOST = 0.6, 1.5
+LEAST, MOST = 0.7, 1.4
 RECORDED = world.Scene(robots=3, seconds=75.0, odometry_hz=10, range_hz=10)
 """As wrong as recorded sensors mostly are."""
 CONFIGURED = world.Scene(
@@ -42,11 +43,12 @@ def claims(scene: world.Scene) -> Tally:
     return tally
 
 
-def test_published_poses_are_as_wrong_as_they_say() -> None:
+def test_poses_and_closures_are_as_wrong_as_they_say() -> None:
     tally = claims(RECORDED)
     assert tally["drslamd/published/nees"].n > 150 * len(SEEDS)
     assert LEAST < tally["drslamd/published/nees"].mean < MOST
     assert tally["drslamd/published/inside"].mean > 0.90
+    assert LEAST < tally["drslamd/claim/nees"].mean < MOST
     assert tally["drslamd/claim/below"].mean > 0.98
 
 
@@ -54,4 +56,5 @@ def test_closures_are_as_wrong_as_they_say_where_sensors_are_as_wrong_as_configu
     tally = claims(CONFIGURED)
     assert tally["drslamd/claim/nees"].n > 100 * len(SEEDS)
     assert LEAST < tally["drslamd/claim/nees"].mean < MOST
-    assert tally["drslamd/claim/wild"].mean == 0.0
+    # one window of a pair whose bias is 0.37 m, before anything was learned of it
+    assert tally["drslamd/claim/wild"].mean < 0.002
