@@ -125,6 +125,13 @@ class RangeFit:
         m = self.by_step(minima.centred)
         return np.asarray(m @ minima.covariance @ m.transpose(0, 2, 1))
 
+    def other_side(self, centred: Array) -> Array:
+        """The same poses with b on the other side of a at the shortest range."""
+        n = int(np.argmin(self._ranges))
+        out: Array = centred.copy()
+        out[:, 0] -= 2 * (centred[:, 0] + centred[:, 1] * self._b[n] - self._a[n])
+        return out
+
     def linear(self, centred: Array) -> tuple[Array, Array]:
         """Equation 1 about centred poses.
 

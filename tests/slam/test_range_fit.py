@@ -140,6 +140,20 @@ def test_a_window_is_vague_as_soon_as_one_minimum_that_counts_is(
     assert fit.is_vague(Minima(centred, covariance, worse)) is vague
 
 
+def test_the_other_side_is_as_far_away_where_both_were_nearest() -> None:
+    rng = np.random.default_rng(11)
+    window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [1.0, 0, 0])
+    fit = RangeFit(window.a_points, window.b_points, window.ranges)
+    other = fit.poses(fit.other_side(fit.centred(true[None])))[0]
+    n = int(np.argmin(window.ranges))
+    before, after = (
+        pose[:2] + matrix(pose)[:2, :2] @ window.b_points[n] - window.a_points[n]
+        for pose in (true, other)
+    )
+    assert np.allclose(after, -before)
+    assert other[2] == pytest.approx(true[2])
+
+
 def test_a_descent_that_is_settled_does_nothing_more() -> None:
     rng = np.random.default_rng(6)
     window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [6.0, 0, 0])

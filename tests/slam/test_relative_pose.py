@@ -117,6 +117,35 @@ def test_straight_paths_leave_the_mirror_image() -> None:
         assert not any(same_pose(pose, other, 0.1) for other in poses[:k])
 
 
+def passing(seed: int) -> tuple[Window, Array]:
+    """Two robots of which one passes the other at 0.7 m, under noise that does not average out."""
+    rng = np.random.default_rng(seed)
+    a, b = wander(rng, 60, 0.15), wander(rng, 60, 0.15)
+    side = a[20, 2] + math.pi / 2 * rng.choice([-1, 1])
+    b[:, :2] += a[20, :2] - b[20, :2] + 0.7 * np.array([math.cos(side), math.sin(side)])
+    window, true = window_of(a, b)
+    slow = np.convolve(rng.normal(0, 0.2, 80), np.full(10, 0.1), "valid")[:60]
+    return with_ranges(window, window.ranges + slow + rng.normal(0, 0.03, 60)), true
+
+
+@pytest.mark.parametrize("seed", [12, 53, 115, 232, 290, 380, 392])
+def test_a_robot_may_have_passed_on_the_other_side(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Seven of four hundred such windows in which the search ends on the wrong side."""
+    window, true = passing(seed)
+
+    def least_nees() -> float:
+        hypotheses = solved(window).hypotheses
+        return min(nees(Estimate(Verdict.UNIQUE, (one,)), true) for one in hypotheses)
+
+    nearest = float(window.ranges.min())
+    monkeypatch.setattr(relative_pose, "CLOSE_PASS_M", nearest * 1.001)
+    assert least_nees() < 14.2
+    monkeypatch.setattr(relative_pose, "CLOSE_PASS_M", nearest * 0.999)
+    assert least_nees() > 14.2
+
+
 def test_one_curve_is_enough_to_tell_left_from_right() -> None:
     window, true = window_of(
         straight((1, 3, 0), 60, 0.25), wander(np.random.default_rng(5), 60, 0.25)
