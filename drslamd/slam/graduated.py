@@ -29,7 +29,7 @@ BELIEVABLE = quantile3(0.99)
 GROWTH = 1.4
 """Of mu, from one solution to the next (Yang et al.)."""
 MOST_ROUNDS = 40
-"""Mu grows a millionfold on the way."""
+"""Mu grows half a millionfold on the way."""
 SECOND_CHANCE = 10.0
 """In the end those with up to so many times the believable squared error are believed once more,
 and judged anew: true ones beside the false may have lost their weight with them."""

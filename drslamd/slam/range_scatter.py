@@ -2,12 +2,13 @@
 
 How noisy ranges are differs from module to module and from room to room, and the configuration can
 only say what must be allowed for. A window has too few independent ranges to tell; the solution of
-a whole drive has enough. With prior ranges worth m and n measured ones with errors e_i in sigmas,
+a whole drive has enough. With a prior worth m ranges and n measured ones with errors e_i in sigmas,
 
     scatter^2 = (m + sum min(|e_i|, c)^2) / (m + n)
 
-is the posterior mean of a variance (1 where nothing is measured). Neighbouring ranges share their
-errors, so the prior counts as often as they do.
+is the posterior mean of a variance (1 where nothing is measured), and c is module 3's own threshold
+(`normal_equations.ROBUST_SIGMAS`). Neighbouring ranges share their errors, so the prior counts as
+often as they do.
 """
 
 from __future__ import annotations

@@ -6,9 +6,10 @@ driving do. Module 3 carries the bias of each pair, what that of all pairs does 
 is known of them, and its noise says what is still unknown:
 
     r' = r - bias - strong exp(-r / L)     p' = (1 - scale) p
-    sigma'^-2 = sigma^-2 + (k sigma_measured)^-2
+    sigma'^-2 = sigma^-2 + (k s sigma_measured)^-2
 
-k accounts for ranges that share their errors; nothing falls below what no constant can describe.
+k accounts for ranges that share their errors, s is how much those of the pair scatter
+(`range_scatter`); nothing falls below what no constant can describe.
 """
 
 from __future__ import annotations
@@ -36,7 +37,14 @@ LEAST_SCALE = 0.01
 
 
 class Sensors(NamedTuple):
-    """What is known of one pair's sensors."""
+    """What is known of one pair's sensors.
+
+    Attributes:
+        bias: of the pair, m.
+        scale_a, scale_b: of both odometries, fractions.
+        scatter: of the pair's ranges over the configured sigma, see `range_scatter`.
+        strong: of the team, m at range 0, see `problem.fading`.
+    """
 
     bias: Learned = Learned()
     scale_a: Learned = Learned()
