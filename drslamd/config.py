@@ -183,8 +183,8 @@ class RelativePoseSection(Section):
     """Step of the coarse search over phi and theta, radians."""
     window_max_s: Annotated[float, Field(ge=1, le=120)] = 40.0
     """Longest window of `algorithm = "drslamd"`."""
-    range_sigma_m: Annotated[float, Field(gt=0, le=5)] = 0.10
-    range_bias_sigma_m: Annotated[float, Field(gt=0, le=5)] = 0.30
+    range_sigma_m: Annotated[float, Field(ge=0.001, le=5)] = 0.10
+    range_bias_sigma_m: Annotated[float, Field(ge=0.001, le=5)] = 0.30
     """How far the constant bias of a pair may be from zero before anything is measured."""
     nlos_db: Annotated[float, Field(ge=0, le=60)] = 10.0
     """A first path so much weaker than all that is received is taken for blocked; 0 turns it off.

@@ -30,7 +30,8 @@ LOSS_STATUSES = 30
 """Heartbeats over which the loss is counted: the last half minute or so."""
 REMEMBERED_US = 40 * SECOND_US
 """How long it counts that a peer named a robot, when it hears too many for one status: 254 take ten
-heartbeats, which come every three seconds at the slowest; a few may be lost."""
+heartbeats, which come every three seconds at the slowest; a few may be lost. In such a crowd it
+also takes so long until it is known that a peer no longer hears a robot."""
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,7 @@ class Banded:
 
     def __init__(self, config: Config, own: Chain) -> None:
         self._bias_sigma = config.relative_pose.range_bias_sigma_m
+        self._range_sigma = config.relative_pose.range_sigma_m
 
     def job(
         self,
@@ -52,7 +53,8 @@ class Banded:
         public: Mapping[int, PublicPoses],
     ) -> Job:
         """See `Optimizer.job`; public poses are not needed."""
-        return partial(_solve, stated(graph, group, previous, self._bias_sigma), group)
+        team = stated(graph, group, previous, self._bias_sigma)
+        return partial(_solve, team, group, self._range_sigma)
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,7 @@ def stated(
     return Stated(problem, start, [items.chain for items in chains], pairs)
 
 
-def _solve(team: Stated, group: Group) -> TeamEstimate:
+def _solve(team: Stated, group: Group, range_sigma: float) -> TeamEstimate:
     """Solve, with the uncertainty of everybody's latest pose, and sort the answer by robot."""
     problem = team.problem
     mine: dict[int, Array] = {}
@@ -126,7 +128,7 @@ def _solve(team: Stated, group: Group) -> TeamEstimate:
     assert spread is not None
     ranges = problem.ranges
     errors = range_errors(solution.poses, ranges, learned)[0]
-    scatters = scatter(errors, ranges.sigma, ranges.pair, len(team.pairs)).tolist()
+    scatters = scatter(errors, ranges.sigma, ranges.pair, len(team.pairs), range_sigma).tolist()
     return TeamEstimate(
         group.frame,
         {

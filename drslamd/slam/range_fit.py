@@ -16,8 +16,8 @@ from drslamd.slam.se2 import Array
 from drslamd.slam.window_noise import RangeNoise
 
 FIRST_STEPS, STEPS = 3, 14
-"""Of a descent until a first look, and in all; what is not settled then lies in a valley without
-an end."""
+"""Of a descent until a first look, when most seeds are settled, and in all; what is not settled
+then lies in a valley without an end."""
 SETTLED_CHI2 = 0.3
 """A step that promises less than this (2 log-likelihood) is not worth the next one."""
 HOPELESS, HOPELESS_CHI2 = 5.0, 60.0
@@ -34,8 +34,11 @@ AROUND_M = 1.0
 MAX_SIGMA_M, MAX_SIGMA_RAD = 1.5, 0.5
 """A pose known worse than this helps nobody."""
 VAGUE, SURELY_CHI2 = 1.5, 10.0
-"""A minimum this many times vaguer, and no worse than the best by more than this, will not become
-known, nor be excluded, by the last steps."""
+"""A minimum this many times vaguer, and no worse than the best by more than this, hardly ever
+becomes known or is excluded by the last steps: one usable window in forty is lost to the first
+looks, and only among short ones; the time of all short ones is halved."""
+POOR_FIT = 4.0
+"""Chi-squared per degree of freedom beyond which the model does not explain the window."""
 
 
 class Minima(NamedTuple):
@@ -115,7 +118,9 @@ class RangeFit:
         return self._as_if_straight(minima) + self.by_arcs(minima.centred, minima.covariance)
 
     def is_vague(self, minima: Minima) -> bool:
-        """Whether a minimum that counts is far from being known, so that nothing else matters."""
+        """Whether the best fits, and one that counts is far from being known."""
+        if minima.chi2.min() > POOR_FIT * (len(self._ranges) - 3):
+            return False
         limits = np.array([MAX_SIGMA_M, MAX_SIGMA_M, MAX_SIGMA_RAD]) * VAGUE
         vague = np.einsum("kii->ki", self._as_if_straight(minima)) > limits**2
         counts = minima.chi2 < minima.chi2.min() + SURELY_CHI2
@@ -207,12 +212,12 @@ class Descent:
     def minima(self) -> Minima:
         """Best first, without those that are worse than the best beyond doubt.
 
-        What ranges scatter counts as white, which flatters.
+        What ranges scatter counts as white and never as more than was allowed for, which flatters.
         """
         order = np.argsort(self._cost, kind="stable")
         order = order[self._may_count()[order]]
         covariance = np.linalg.inv(self._normal[order, :4, :4])[:, :3, :3]
-        covariance *= self._noise.scatter**2
+        covariance *= min(1.0, self._noise.scatter) ** 2
         return Minima(self._x[order], covariance, self._cost[order])
 
     def _may_count(self) -> Array:

@@ -2,9 +2,10 @@
 
 How noisy ranges are differs from module to module and from room to room, and the configuration can
 only say what must be allowed for. A window has too few independent ranges to tell; the solution of
-a whole drive has enough. With a prior worth m ranges and n measured ones with errors e_i in sigmas,
+a whole drive has enough. With the configured sigma, a prior worth m ranges and n measured ones with
+errors e_i and sigmas sigma_i,
 
-    scatter^2 = (m + sum min(|e_i|, c)^2) / (m + n)
+    scatter^2 = (m + sum min(|e_i|, c sigma_i)^2 / sigma^2) / (m + n)
 
 is the posterior mean of a variance (1 where nothing is measured), and c is module 3's own threshold
 (`normal_equations.ROBUST_SIGMAS`). Neighbouring ranges share their errors, so the prior counts as
@@ -27,19 +28,21 @@ PLAIN = 1.05
 being short or blocked, and tells nothing of the others."""
 
 
-def scatter(errors: Array, sigmas: Array, pair: Index, pairs: int) -> Array:
+def scatter(errors: Array, sigmas: Array, pair: Index, pairs: int, configured: float) -> Array:
     """(pairs,) true sigma of ranges over the configured one.
 
     Args:
         errors: (n,) m, predicted minus measured, biases taken out.
-        sigmas: (n,) m, as configured, and more where a range is doubted.
+        sigmas: (n,) m, what each was sent with: more where a range is doubted.
         pair: (n,) which pair measured it.
+        configured: m, what windows allow for.
     """
     least = np.full(pairs, np.inf)
     np.minimum.at(least, pair, sigmas)
     plain = sigmas <= PLAIN * least[pair]
     # bursts are another matter: here as in the solution they count as far as they are credible
-    squares = np.minimum(np.abs(errors / sigmas), ROBUST_SIGMAS)[plain] ** 2
+    sizes = np.minimum(np.abs(errors), ROBUST_SIGMAS * sigmas)[plain]
+    squares = (sizes / configured) ** 2
     total = np.bincount(pair[plain], squares, pairs)
     count = np.bincount(pair[plain], minlength=pairs)
     return np.asarray(np.sqrt((PRIOR_RANGES + total) / (PRIOR_RANGES + count)))

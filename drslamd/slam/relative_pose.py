@@ -22,6 +22,7 @@ from drslamd.slam.range_fit import (
     LEAST_DAMPING,
     MAX_SIGMA_M,
     MAX_SIGMA_RAD,
+    POOR_FIT,
     STEPS,
     Descent,
     RangeFit,
@@ -40,8 +41,6 @@ MERGE_M, MERGE_RAD = 0.15, 0.10
 HYPOTHESES = 4
 EXCLUDED_CHI2 = 20.0
 """A minimum this much worse than the best (2 log-likelihood) is no longer carried."""
-POOR_FIT = 4.0
-"""Chi-squared per degree of freedom beyond which the model does not explain the window."""
 NEWEST, NEWEST_SIGMAS = 3, 2.0
 """So many last measurements may not lie off the rest by so much in the median: near the end of a
 window a burst and odometry that has just failed look alike."""

@@ -54,8 +54,8 @@ class Sensors(NamedTuple):
 
     @staticmethod
     def of(estimate: TeamEstimate | None, a: int, b: int) -> Sensors:
-        """Of robots a and b, as the team's last solution has them."""
-        if estimate is None:
+        """Of robots a and b, as the team's last solution has them, if it is one."""
+        if estimate is None or not estimate.converged:
             return Sensors()
         pair = (min(a, b), max(a, b))
         return Sensors(
@@ -102,4 +102,5 @@ def _scaled(poses: Array, scale: Learned) -> Array:
 
 
 def _narrowed(noise: OdometryNoise, scale: Learned, scatter: float) -> OdometryNoise:
+    """As if the ranges of this pair alone had taught the scale, which those of all pairs did."""
     return replace(noise, scale=remaining(scale, noise.scale, LEAST_SCALE, scatter))

@@ -140,6 +140,17 @@ def test_a_window_is_vague_as_soon_as_one_minimum_that_counts_is(
     assert fit.is_vague(Minima(centred, covariance, worse)) is vague
 
 
+@pytest.mark.parametrize(("share", "vague"), [(0.999, True), (1.001, False)])
+def test_a_window_that_fits_nothing_is_not_called_vague(share: float, vague: bool) -> None:
+    """Sensors that contradict each other are another verdict than too little motion."""
+    still = np.zeros((9, 2))
+    fit = RangeFit(still, still, np.full(9, 4.0))
+    covariance = np.tile(100.0 * np.eye(3), (1, 1, 1))
+    chi2 = np.array([share * range_fit.POOR_FIT * (9 - 3)])
+    minima = Minima(fit.centred(np.array([[4.0, 0.0, 1.0]])), covariance, chi2)
+    assert fit.is_vague(minima) is vague
+
+
 def test_the_other_side_is_as_far_away_where_both_were_nearest() -> None:
     rng = np.random.default_rng(11)
     window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [1.0, 0, 0])
@@ -169,9 +180,11 @@ def test_ranges_that_are_known_to_scatter_less_leave_a_window_less_vague() -> No
     rng = np.random.default_rng(6)
     window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [6.0, 0, 0])
     fit = RangeFit(window.a_points, window.b_points, window.ranges)
-    plain, quiet = (
+    plain, quiet, loud = (
         Descent(fit, fit.centred(true[None]), replace(NOISE, scatter=scatter)).minima()
-        for scatter in (1.0, 0.5)
+        for scatter in (1.0, 0.5, 2.0)
     )
     assert np.allclose(quiet.covariance, plain.covariance / 4)
     assert np.array_equal(quiet.centred, plain.centred)
+    # the look must not be gloomier than the whole truth: that is for the judge to say
+    assert np.array_equal(loud.covariance, plain.covariance)
