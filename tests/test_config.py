@@ -90,6 +90,14 @@ WRONG = {
     "a window of two samples": (
         GOOD + "[relative_pose]\ntau = 2", "relative_pose.tau", "2", "3",
     ),
+    "ranges without noise": (
+        GOOD + "[relative_pose]\nrange_sigma_m = 0.0009", "relative_pose.range_sigma_m", "0.0009",
+        "0.001",
+    ),
+    "modules without a bias": (
+        GOOD + "[relative_pose]\nrange_bias_sigma_m = 0.0009", "relative_pose.range_bias_sigma_m",
+        "0.0009", "0.001",
+    ),
     "a rate of zero": (GOOD + "[optimizer]\nrate_hz = 0", "optimizer.rate_hz", "0", "0"),
     "a rate that is not finite": (
         GOOD + "[optimizer]\nrate_hz = inf", "optimizer.rate_hz", "inf", "",
@@ -119,6 +127,11 @@ def test_a_fault_is_one_sentence_with_key_value_and_what_is_allowed(name: str) -
     assert value in matching[0]
     assert allowed in matching[0]
     assert "\n" not in matching[0]
+
+
+def test_a_millimetre_is_noise_enough() -> None:
+    section = parse(GOOD + "[relative_pose]\nrange_sigma_m = 0.001\nrange_bias_sigma_m = 0.001")
+    assert section.relative_pose.range_sigma_m == section.relative_pose.range_bias_sigma_m == 0.001
 
 
 def test_all_faults_are_named_at_once() -> None:

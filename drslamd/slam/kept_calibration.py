@@ -140,7 +140,7 @@ class Memory:
         Args:
             owned: peers of the pairs that robot `own` owns.
         """
-        if estimate is None:
+        if estimate is None or not estimate.converged:
             return
         used, kept, latest = self.used, self._kept, self.latest
         biases = dict(latest.bias)

@@ -276,25 +276,22 @@ async def test_a_team_that_says_nothing_is_no_reason_to_join_again(
     assert len(ear.states) == 1
 
 
+@pytest.mark.parametrize(
+    ("where", "why"),
+    [("wlan9", ("no interface with this name", "No such device")), ("192.0.2.1", "")],
+    ids=["no such interface", "an address that no interface has"],
+)
 @in_a_loop
-async def test_an_interface_that_does_not_exist_is_named_in_one_sentence() -> None:
-    transport, ear = native(section("wlan9"))
+async def test_where_it_cannot_join_is_named_in_one_sentence(
+    where: str, why: str | tuple[str, ...]
+) -> None:
+    transport, ear = native(section(where))
     async with running(transport):
         await until(ear.is_down)
         await asyncio.sleep(1.0)
     (state,) = ear.states
-    assert state.detail.startswith(f"cannot join {GROUP} on wlan9: ")
-    assert state.detail.endswith(("no interface with this name", "No such device"))
-
-
-@in_a_loop
-async def test_an_address_that_no_interface_has_is_named_in_one_sentence() -> None:
-    transport, ear = native(section("192.0.2.1"))
-    async with running(transport):
-        await until(ear.is_down)
-        await asyncio.sleep(0.5)
-    (state,) = ear.states
-    assert state.detail.startswith(f"cannot join {GROUP} on 192.0.2.1: ")
+    assert state.detail.startswith(f"cannot join {GROUP} on {where}: ")
+    assert state.detail.endswith(why)
 
 
 @in_a_loop

@@ -42,6 +42,13 @@ def after(memory: Memory, **learned: Learned) -> Constants:
     return memory.latest
 
 
+@pytest.mark.parametrize("converged", [True, False])
+def test_only_a_solution_that_came_to_an_end_is_kept(converged: bool) -> None:
+    memory = Memory(Constants(), SECTION)
+    memory.update(replace(estimate(scale=Learned(0.15, 0.005)), converged=converged), 5, [2])
+    assert (memory.latest.scale.value == pytest.approx(0.15)) is converged
+
+
 def test_what_is_written_is_read_back() -> None:
     for constants in (KEPT, Constants()):
         state = json.loads(json.dumps(constants.state()))

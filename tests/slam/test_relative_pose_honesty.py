@@ -45,8 +45,13 @@ def nees(hypothesis: Hypothesis, true: Array) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("span", "seeds"), [(20.0, range(100, 126)), (30.0, range(200, 227))])
-def test_errors_are_as_large_as_the_covariance_says(span: float, seeds: range) -> None:
+@pytest.mark.parametrize(
+    ("span", "seeds", "one_answer"),
+    [(20.0, range(100, 126), 0.65), (30.0, range(200, 227), 0.90)],
+)
+def test_errors_are_as_large_as_the_covariance_says(
+    span: float, seeds: range, one_answer: float
+) -> None:
     """At least 100 unique answers for each length: about 1 by degree, hardly one beyond 3 sigma.
 
     The band is wide below because the noise that is assumed is twice that of the simulation.
@@ -67,6 +72,7 @@ def test_errors_are_as_large_as_the_covariance_says(span: float, seeds: range) -
     assert 0.25 < np.median(normalised) / 3 < 1.0
     assert np.mean(normalised < BEYOND) >= 0.98
     # where several poses are left, the true one is among them
-    assert np.mean(np.array(ambiguous + [0.0]) < BEYOND) >= 0.9
-    # the rest are mostly close passes, of which either side may be the true one
-    assert verdicts[Verdict.UNIQUE] > 0.65 * verdicts.total()
+    assert np.mean(np.array(ambiguous + [0.0]) < BEYOND) >= 0.97
+    # the rest are close passes and short paths, of which either side may be the true one
+    assert verdicts[Verdict.UNIQUE] > one_answer * verdicts.total()
+    assert verdicts[Verdict.UNIQUE] + verdicts[Verdict.AMBIGUOUS] > 0.97 * verdicts.total()

@@ -114,3 +114,5 @@ def test_a_pair_is_found_whoever_owns_it() -> None:
     assert sensors.strong == (-0.1, 0.03)
     assert sensors.scale_a.value == 0.1
     assert math.isinf(sensors.scale_b.sigma)
+    # where module 3 has not come to an end, nothing has been learned
+    assert Sensors.of(replace(estimate, converged=False), 2, 1) == Sensors()
