@@ -27,7 +27,7 @@ from drslamd.gossip.team import Team
 from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.front_end import FrontEnd
-from drslamd.slam.neighbour import Neighbour
+from drslamd.slam.peer_in_range import Neighbour
 from drslamd.slam.se2 import Array
 
 QUIET_US = 3 * SECOND_US

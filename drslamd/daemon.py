@@ -46,7 +46,7 @@ from drslamd.io.systemd import Notifier
 from drslamd.io.transport import Transport
 from drslamd.io.worker import Finished, Worker
 from drslamd.robot import Robot
-from drslamd.slam.kept_calibration import Constants
+from drslamd.slam.calibration.calibration_store import Constants
 
 JOB_STUCK_US = 20 * SECOND_US
 """A computation that takes longer is no progress, and the watchdog is not fed."""

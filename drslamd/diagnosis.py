@@ -10,11 +10,11 @@ from drslamd.conventions import SECOND_US
 from drslamd.events import NetworkState, PortCondition, PortState
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.team import Team
-from drslamd.sensors.linktrack_input import LinkTrackInput
-from drslamd.sensors.wheel_input import WheelInput
+from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
+from drslamd.sensors.wheels.wheel_input import WheelInput
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.front_end import FrontEnd
-from drslamd.slam.neighbour import Neighbour
+from drslamd.slam.peer_in_range import Neighbour
 
 PATIENCE_US = 3 * SECOND_US
 """How long an open port may be silent before that is worth a word."""

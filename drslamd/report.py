@@ -14,8 +14,8 @@ from drslamd.conventions import GRID_US, SECOND_US
 from drslamd.events import PortCondition
 from drslamd.gossip.peer import Peer
 from drslamd.robot import Robot
-from drslamd.slam.pair import Pair
-from drslamd.slam.trajectory import bent
+from drslamd.slam.consistency.pair import Pair
+from drslamd.slam.graph.trajectory import bent
 
 
 def age_s(utime: int, then: int | None) -> float | None:

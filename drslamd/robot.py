@@ -46,16 +46,16 @@ from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
 from drslamd.health import Health
-from drslamd.sensors.linktrack_input import LinkTrackInput
-from drslamd.sensors.wheel_input import WheelInput
+from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
+from drslamd.sensors.wheels.wheel_input import WheelInput
 from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
+from drslamd.slam.calibration.calibration_store import UNLEARNED, Constants, Memory
+from drslamd.slam.consistency.pair import Pair
 from drslamd.slam.front_end import FrontEnd
-from drslamd.slam.items import GraphEntry
-from drslamd.slam.kept_calibration import UNLEARNED, Constants, Memory
-from drslamd.slam.neighbour import Neighbour
-from drslamd.slam.pair import Pair
-from drslamd.slam.pair_window import Request
+from drslamd.slam.graph.measurements import GraphEntry
+from drslamd.slam.peer_in_range import Neighbour
+from drslamd.slam.relative_pose.pair_window import Request
 from drslamd.slam.se2 import Array
 
 POLL_US = 10 * MILLISECOND_US

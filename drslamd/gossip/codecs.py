@@ -26,7 +26,7 @@ from drslamd.gossip.message_types import (
     Status,
 )
 from drslamd.slam import se2
-from drslamd.slam.items import (
+from drslamd.slam.graph.measurements import (
     ClosureItem,
     GraphEntry,
     Keyframe,

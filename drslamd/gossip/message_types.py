@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Union
 
-from drslamd.slam.items import GraphEntry, PublicPoses
+from drslamd.slam.graph.measurements import GraphEntry, PublicPoses
 from drslamd.slam.se2 import Array
 
 UNKNOWN_CLOCK = -(2**63)

@@ -17,9 +17,9 @@ from drslamd.gossip.message_types import (
     Status,
 )
 from drslamd.gossip.peer_clock import PeerClock
-from drslamd.slam.items import PublicPoses
-from drslamd.slam.neighbour import Neighbour
-from drslamd.slam.odometry import PEER_TRACK_SAMPLES, Track
+from drslamd.slam.graph.measurements import PublicPoses
+from drslamd.slam.odometry.track import PEER_TRACK_SAMPLES, Track
+from drslamd.slam.peer_in_range import Neighbour
 
 SILENCE_US = 5 * SECOND_US
 """A robot says something every second (its pose, its odometry or its status): at 50 % loss a living

@@ -14,7 +14,7 @@ from collections import deque
 from dataclasses import dataclass
 
 from drslamd.conventions import MILLISECOND_US, SECOND_US
-from drslamd.sensors.linktrack_input import SYSTEM_TIME_PERIOD_US
+from drslamd.sensors.linktrack.linktrack_input import SYSTEM_TIME_PERIOD_US
 
 WINDOW_S = 16
 """Over which the smallest delay is taken."""

@@ -14,7 +14,13 @@ from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.messages import UNKNOWN_CLOCK, Heard, Message, OdometryBatch, Pose, Status
 from drslamd.gossip.peer import SILENCE_US, Peer
 from drslamd.gossip.seal import Header, Seal, SealFault
-from drslamd.slam.items import ClosureItem, GraphEntry, Keyframe, PublicPoses, RangeItem
+from drslamd.slam.graph.measurements import (
+    ClosureItem,
+    GraphEntry,
+    Keyframe,
+    PublicPoses,
+    RangeItem,
+)
 
 FORGET_US = 600 * SECOND_US
 """A peer that was silent for ten minutes is no longer listed."""

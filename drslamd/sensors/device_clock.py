@@ -21,7 +21,7 @@ from collections import deque
 from typing import Final
 
 from drslamd.conventions import SECOND_US
-from drslamd.sensors.wrapping import wrapped_difference
+from drslamd.sensors.wheels.wrapping import wrapped_difference
 
 BUCKET_US: Final = SECOND_US // 2
 BUCKETS: Final = 8

@@ -8,17 +8,17 @@ import numpy as np
 
 from drslamd.config import Config
 from drslamd.conventions import Chain, Segment
-from drslamd.slam import team_frame
-from drslamd.slam.banded_optimizer import Banded
-from drslamd.slam.closure_optimizer import Closures
-from drslamd.slam.estimate import TeamEstimate, Trajectory
-from drslamd.slam.history import History
-from drslamd.slam.items import GraphEntry, PublicPoses
-from drslamd.slam.optimizer import Job, Optimizer
-from drslamd.slam.pose_graph import TeamGraph
-from drslamd.slam.rbcd_optimizer import Rbcd
-from drslamd.slam.team_frame import Group
-from drslamd.slam.thinning import Thinning
+from drslamd.slam.graph import team_frame
+from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
+from drslamd.slam.graph.history import History
+from drslamd.slam.graph.measurements import GraphEntry, PublicPoses
+from drslamd.slam.graph.pose_graph import TeamGraph
+from drslamd.slam.graph.team_frame import Group
+from drslamd.slam.graph.thinning import Thinning
+from drslamd.slam.optimizer.banded.banded_optimizer import Banded
+from drslamd.slam.optimizer.closures.closure_optimizer import Closures
+from drslamd.slam.optimizer.contract import Job, Optimizer
+from drslamd.slam.optimizer.rbcd.rbcd_optimizer import Rbcd
 
 OPTIMIZERS: dict[str, Callable[[Config, Chain], Optimizer]] = {
     "banded": Banded,

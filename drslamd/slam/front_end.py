@@ -10,19 +10,19 @@ import numpy as np
 from drslamd.config import Config
 from drslamd.conventions import SECOND_US, Chain
 from drslamd.sensors.samples import Motion, RangeSample
-from drslamd.slam import relative_pose
-from drslamd.slam.estimate import TeamEstimate
-from drslamd.slam.items import ClosureItem, Keyframe, RangeItem
-from drslamd.slam.kept_calibration import UNLEARNED, Constants
-from drslamd.slam.neighbour import Neighbour
-from drslamd.slam.odometry import STEPS, DeadReckoning, OdometryNoise
-from drslamd.slam.pair import Checked, Pair
-from drslamd.slam.pair_window import Request, Side, request
-from drslamd.slam.pose_graph import TeamGraph
-from drslamd.slam.range_buffer import RangeBuffer
-from drslamd.slam.relative_pose import Estimate
-from drslamd.slam.self_calibration import Sensors, calibrated
-from drslamd.slam.window_noise import RangeNoise
+from drslamd.slam.calibration.calibration_store import UNLEARNED, Constants
+from drslamd.slam.calibration.window_calibration import Sensors, calibrated
+from drslamd.slam.consistency.pair import Checked, Pair
+from drslamd.slam.graph.estimate import TeamEstimate
+from drslamd.slam.graph.measurements import ClosureItem, Keyframe, RangeItem
+from drslamd.slam.graph.pose_graph import TeamGraph
+from drslamd.slam.odometry.track import STEPS, DeadReckoning, OdometryNoise
+from drslamd.slam.peer_in_range import Neighbour
+from drslamd.slam.relative_pose import solver
+from drslamd.slam.relative_pose.pair_window import Request, Side, request
+from drslamd.slam.relative_pose.range_buffer import RangeBuffer
+from drslamd.slam.relative_pose.solver import Estimate
+from drslamd.slam.relative_pose.window_noise import RangeNoise
 
 KEYFRAME_M, KEYFRAME_RAD = 0.05, 0.05
 """A robot that moved less than this since its last keyframe makes no new one."""
@@ -163,14 +163,12 @@ class FrontEnd:
     ) -> Callable[[], Estimate]:
         section, peer = self._config.relative_pose, pair.peer.robot
         if section.algorithm == "paper":
-            return partial(
-                relative_pose.solve_paper, what.window, section.range_sigma_m, section.delta
-            )
+            return partial(solver.solve_paper, what.window, section.range_sigma_m, section.delta)
         bias_sigma = self._known.bias_sigma(peer, section.range_bias_sigma_m)
         ranges = RangeNoise(section.range_sigma_m, bias_sigma)
-        noise = relative_pose.Noise(ranges, self.noise, b.items.noise)
+        noise = solver.Noise(ranges, self.noise, b.items.noise)
         sensors = Sensors.of(estimate if section.self_calibration else None, self._own.robot, peer)
-        return partial(relative_pose.solve, *calibrated(what.window, noise, sensors), section.delta)
+        return partial(solver.solve, *calibrated(what.window, noise, sensors), section.delta)
 
     def module2(self, graph: TeamGraph) -> list[tuple[Pair, Callable[[], Checked]]]:
         """The consistency checks to be computed now: pair, computation."""

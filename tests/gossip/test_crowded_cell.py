@@ -7,8 +7,8 @@ from typing import cast
 
 import numpy as np
 import pytest
-from airwaves import Air
-from sealed import SECOND, a_seal, a_status, an_entry, sealed
+from gossip_team import Air
+from message_builders import SECOND, a_seal, a_status, an_entry, sealed
 
 from drslamd.broadcast import Broadcast
 from drslamd.config import Config

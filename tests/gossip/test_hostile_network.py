@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sealed import (
+from message_builders import (
     OTHER_SECRET,
     SECOND,
     a_seal,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 
 import pytest
-from sealed import MS, SECOND
+from message_builders import MS, SECOND
 
 from drslamd.conventions import Chain
 from drslamd.gossip import log_sync

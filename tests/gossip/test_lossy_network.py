@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from airwaves import Air
+from gossip_team import Air
 
 
 @pytest.mark.parametrize("seed", range(8))

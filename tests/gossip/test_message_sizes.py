@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from sealed import COVARIANCE, HEADER, a_seal, a_status, an_entry, sealed
+from message_builders import COVARIANCE, HEADER, a_seal, a_status, an_entry, sealed
 
 from drslamd.config import OptimizerSection
 from drslamd.conventions import Chain
@@ -12,7 +12,7 @@ from drslamd.events import ChannelMessage, Send
 from drslamd.gossip import lc02, messages
 from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose
 from drslamd.gossip.team import ITEMS_PER_ENTRY, Team
-from drslamd.slam.items import ClosureItem, Keyframe, PublicPoses, RangeItem
+from drslamd.slam.graph.measurements import ClosureItem, Keyframe, PublicPoses, RangeItem
 
 TRAITS = (0.5, 0.25, 0.125, 0.0625, 0.5, -0.5, 0.25)
 

@@ -9,14 +9,20 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from sealed import COVARIANCE, HEADER, kinds
+from message_builders import COVARIANCE, HEADER, kinds
 
 from drslamd import lcmtypes
 from drslamd.conventions import Chain
 from drslamd.gossip import messages
 from drslamd.gossip.codecs import CODECS
 from drslamd.gossip.message_types import Heard, LogState, Message, OdometryBatch, Pose, Status
-from drslamd.slam.items import ClosureItem, GraphEntry, Keyframe, PublicPoses, RangeItem
+from drslamd.slam.graph.measurements import (
+    ClosureItem,
+    GraphEntry,
+    Keyframe,
+    PublicPoses,
+    RangeItem,
+)
 
 i16 = st.integers(-(2**15), 2**15 - 1)
 i32 = st.integers(-(2**31), 2**31 - 1)

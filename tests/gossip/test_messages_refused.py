@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sealed import HEADER, a_status, kinds
+from message_builders import HEADER, a_status, kinds
 
 from drslamd import lcmtypes
 from drslamd.gossip import messages

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from sealed import MS, SECOND, a_status
+from message_builders import MS, SECOND, a_status
 
 from drslamd.conventions import Chain
 from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose, Status

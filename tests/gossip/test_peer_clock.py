@@ -6,7 +6,7 @@ import random
 from collections.abc import Callable
 
 import pytest
-from sealed import MS, SECOND
+from message_builders import MS, SECOND
 
 from drslamd.gossip.peer_clock import Offset, PeerClock
 

@@ -6,14 +6,14 @@ import math
 from typing import Any
 
 import pytest
-from sealed import HEADER, a_seal
+from message_builders import HEADER, a_seal
 
 from drslamd import lcmtypes
 from drslamd.conventions import Chain
 from drslamd.gossip import messages
 from drslamd.gossip.lc02 import MAX_PAYLOAD
 from drslamd.gossip.team import Team
-from drslamd.slam.items import GraphEntry, RelativePoses
+from drslamd.slam.graph.measurements import GraphEntry, RelativePoses
 
 
 def some(count: int, robot: int = 7) -> RelativePoses:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 
 import pytest
-from sealed import OTHER_SECRET, SECRET, a_seal, a_status, forged, kinds, resealed, sealed
+from message_builders import OTHER_SECRET, SECRET, a_seal, a_status, forged, kinds, resealed, sealed
 
 from drslamd.gossip import messages
 from drslamd.gossip.seal import Header, ReplayWindow, Seal, SealFault, team_key

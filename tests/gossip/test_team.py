@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from sealed import (
+from message_builders import (
     MS,
     OTHER_SECRET,
     SECOND,
@@ -21,7 +21,7 @@ from drslamd.gossip import lc02
 from drslamd.gossip.message_types import Heard, LogState, Message, OdometryBatch, Status
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
-from drslamd.slam.items import PublicPoses
+from drslamd.slam.graph.measurements import PublicPoses
 
 OWN = Chain(1, 10)
 T0 = 100 * SECOND

@@ -15,7 +15,7 @@ from drslamd.config import AgilexSection, CanSection, OdriveSection  # noqa: E40
 from drslamd.events import CanFrame, Event, PortCondition, PortState  # noqa: E402
 from drslamd.io.can_bus import CanBus  # noqa: E402
 from drslamd.io.clock import MonotonicClock  # noqa: E402
-from drslamd.sensors.wheel_input import WheelInput  # noqa: E402
+from drslamd.sensors.wheels.wheel_input import WheelInput  # noqa: E402
 
 
 async def until(so: Callable[[], bool], within_s: float = 8.0) -> None:

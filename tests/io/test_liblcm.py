@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ears import Ear, in_a_loop, running, until
 from namespace import run_in_namespace
+from transport_helpers import Ear, in_a_loop, running, until
 
 from drslamd.config import ConfigError, GossipSection
 from drslamd.events import ChannelMessage

@@ -12,8 +12,8 @@ import time
 from typing import Any, cast
 
 import pytest
-from ears import GROUP, Ear, in_a_loop, native, running, section, spoken_until, until
 from namespace import run_in_namespace
+from transport_helpers import GROUP, Ear, in_a_loop, native, running, section, spoken_until, until
 
 from drslamd.config import GossipSection
 from drslamd.events import Datagram, NetworkState

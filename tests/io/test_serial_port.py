@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
-from lab.real_team import PseudoPort
+from lab.play.real_team import PseudoPort
 
 from drslamd.events import Event, PortCondition, PortState, SerialData
 from drslamd.io.clock import MonotonicClock

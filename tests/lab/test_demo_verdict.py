@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lab import demo, metrics, outcome, real_team
-from lab.outcome import Outcome, dead_reckoning
-from lab.recording import Recording
+from lab import demo
+from lab.play import real_team
+from lab.recordings.recording import Recording
+from lab.score import metrics, outcome
+from lab.score.outcome import Outcome, dead_reckoning
 
 FRAME = np.array([[7.0, -3.0, 2.0]])
 SMALL = ["--robots", "2", "--seconds", "6"]

@@ -11,9 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lab import evaluate, progress, pyfg, real_team, table, world
-from lab.outcome import Outcome
-from lab.recording import Recording
+from lab import evaluate, progress
+from lab.play import real_team
+from lab.recordings import pyfg, world
+from lab.recordings.recording import Recording
+from lab.score import table
+from lab.score.outcome import Outcome
 
 SCENE = world.Scene(
     robots=2,

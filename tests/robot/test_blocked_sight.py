@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lab.playback import equip
+from lab.play.playback import equip
 from teams import EASY, VirtualTeam
 
 BLIND = replace(EASY, robots=2, seconds=60.0)

@@ -8,7 +8,7 @@ from typing import cast
 
 import numpy as np
 import pytest
-from lab.simulator import Network
+from lab.play.simulator import Network
 from teams import EASY, VirtualTeam
 
 from drslamd.broadcast import Broadcast

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lab.metrics import at_times
-from lab.playback import equip
+from lab.play.playback import equip
+from lab.score.metrics import at_times
 from teams import EASY, VirtualTeam
 
-from drslamd.slam.estimate import Learned
-from drslamd.slam.kept_calibration import UNLEARNED, Constants, is_sound
+from drslamd.slam.calibration.calibration_store import UNLEARNED, Constants, is_sound
+from drslamd.slam.graph.estimate import Learned
 from drslamd.slam.se2 import Array
 
 WRONG = replace(

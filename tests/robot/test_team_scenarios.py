@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from lab import world
-from lab.simulator import Network
+from lab.play.simulator import Network
+from lab.recordings import world
 from teams import EASY, VirtualTeam
 
 from drslamd.gossip import messages

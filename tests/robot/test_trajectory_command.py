@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lab import metrics, world
+from lab.recordings import world
+from lab.score import metrics
 from scipy.spatial.transform import Rotation
 from teams import EASY, VirtualTeam
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drslamd.sensors.device_clock import BUCKETS, CONTINUITY_US, WINDOW_US, DeviceClock
-from drslamd.sensors.wrapping import wrapped_difference
+from drslamd.sensors.wheels.wrapping import wrapped_difference
 
 MS = 1000
 

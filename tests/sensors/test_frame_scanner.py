@@ -19,8 +19,8 @@ from drslamd.sensors.frame_scanner import (
     FrameFormat,
     FrameScanner,
 )
-from drslamd.sensors.kobuki import KobukiFormat
-from drslamd.sensors.linktrack import LINKTRACK, LinkTrackFormat
+from drslamd.sensors.linktrack.codec import LINKTRACK, LinkTrackFormat
+from drslamd.sensors.wheels.kobuki import KobukiFormat
 
 
 def scanned(reads: list[bytes], frame_format: FrameFormat = LINKTRACK) -> tuple[object, ...]:

@@ -16,17 +16,17 @@ from frames import SECOND_US, cut
 
 from drslamd.config import DbcSection
 from drslamd.events import CanFrame
-from drslamd.sensors.agilex import AgilexDriver
-from drslamd.sensors.ascii_odometry import AsciiDriver
-from drslamd.sensors.dbc import DbcDriver
 from drslamd.sensors.frame_scanner import FrameScanner
-from drslamd.sensors.kobuki import KobukiDriver
-from drslamd.sensors.linktrack import LINKTRACK, Frame, Refusal, decode
-from drslamd.sensors.linktrack_frames import ModuleFault
-from drslamd.sensors.linktrack_input import LinkTrackInput
-from drslamd.sensors.odrive import OdriveDriver
-from drslamd.sensors.roboteq import RoboteqDriver
+from drslamd.sensors.linktrack.codec import LINKTRACK, Frame, Refusal, decode
+from drslamd.sensors.linktrack.linktrack_frames import ModuleFault
+from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.samples import Twist, WheelCounts, WheelSpeeds, WheelTurns
+from drslamd.sensors.wheels.agilex import AgilexDriver
+from drslamd.sensors.wheels.ascii_odometry import AsciiDriver
+from drslamd.sensors.wheels.dbc import DbcDriver
+from drslamd.sensors.wheels.kobuki import KobukiDriver
+from drslamd.sensors.wheels.odrive import OdriveDriver
+from drslamd.sensors.wheels.roboteq import RoboteqDriver
 
 MS = 1000
 T0 = 100 * SECOND_US

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lab import world
-from lab.emulators import as_heard_at
-from lab.real_team import GROUP, RealRobot, RealTeam
+from lab.play.emulators import as_heard_at
+from lab.play.real_team import GROUP, RealRobot, RealTeam
+from lab.recordings import world
 
 from drslamd.gossip import lc02
 from drslamd.io.status_socket import ask

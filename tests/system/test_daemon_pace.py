@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lab import world
-from lab.playback import equip, robot_toml
-from lab.real_team import PseudoPort, free_port
+from lab.play.playback import equip, robot_toml
+from lab.play.real_team import PseudoPort, free_port
+from lab.recordings import world
 
 from drslamd.config import parse
 from drslamd.daemon import Daemon
 from drslamd.events import Event, SerialData, Solve
-from drslamd.slam import relative_pose
-from drslamd.slam.odometry import OdometryNoise
-from drslamd.slam.window import Window
-from drslamd.slam.window_noise import RangeNoise
+from drslamd.slam.odometry.track import OdometryNoise
+from drslamd.slam.relative_pose import solver
+from drslamd.slam.relative_pose.window import Window
+from drslamd.slam.relative_pose.window_noise import RangeNoise
 
 pytestmark = pytest.mark.slow
 
@@ -31,10 +31,10 @@ def long_solve() -> int:
     window = Window(np.linspace(-30, 0, 60), rng.uniform(2, 8, 60), poses, poses[::-1],
                     np.zeros(2), np.zeros(2))  # fmt: skip
     odometry = OdometryNoise(0.03, 0.0026, 0.01, 0.0087)
-    noise = relative_pose.Noise(RangeNoise(0.1, 0.3), odometry, odometry)
+    noise = solver.Noise(RangeNoise(0.1, 0.3), odometry, odometry)
     count, end = 0, time.monotonic() + 3.0
     while time.monotonic() < end:
-        relative_pose.solve(window, noise, 0.1)
+        solver.solve(window, noise, 0.1)
         count += 1
     return count
 

@@ -9,7 +9,8 @@ closures that claimed what is configured and not what ranges scatter (0.68 where
 from __future__ import annotations
 
 import pytest
-from lab import virtual_team, world
+from lab.play import virtual_team
+from lab.recordings import world
 from lab.reproduce import team_column
 from lab.reproduce.experiment import Trial
 from lab.reproduce.tally import Tally

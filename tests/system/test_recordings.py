@@ -15,9 +15,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lab import outcome, pyfg, real_team, virtual_team, world
-from lab.outcome import Outcome
-from lab.recording import Recording
+from lab.play import real_team, virtual_team
+from lab.recordings import pyfg, world
+from lab.recordings.recording import Recording
+from lab.score import outcome
+from lab.score.outcome import Outcome
 from places import SHARED
 
 pytestmark = pytest.mark.slow

@@ -16,13 +16,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from lab import outcome, picture, real_team, table, world
-from lab.outcome import Outcome
-from lab.playback import equip
+from lab.play import real_team
+from lab.play.playback import equip
+from lab.play.virtual_team import SETTLE_S
 from lab.progress import Progress
-from lab.readers import read
-from lab.recording import BadRecording, Recording
-from lab.virtual_team import SETTLE_S
+from lab.recordings import world
+from lab.recordings.readers import read
+from lab.recordings.recording import BadRecording, Recording
+from lab.score import outcome, picture, table
+from lab.score.outcome import Outcome
 
 AT_MOST = 1.2
 NO_INPUT, FAILED = 66, 70

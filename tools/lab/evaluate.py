@@ -12,12 +12,13 @@ import sys
 from pathlib import Path
 
 from drslamd.config import ConfigError
-from lab import edge_run, outcome, real_team, table, virtual_team
-from lab.outcome import Outcome
+from lab.play import edge_run, real_team, virtual_team
+from lab.play.virtual_team import SETTLE_S
 from lab.progress import Progress
-from lab.readers import READERS, has_edges, read, read_edges
-from lab.recording import BadRecording, EdgeRecording, Recording
-from lab.virtual_team import SETTLE_S
+from lab.recordings.readers import READERS, has_edges, read, read_edges
+from lab.recordings.recording import BadRecording, EdgeRecording, Recording
+from lab.score import outcome, table
+from lab.score.outcome import Outcome
 
 NO_INPUT, FAILED, BAD_CONFIG = 66, 70, 78
 

@@ -45,7 +45,7 @@ def main(arguments: list[str] | None = None) -> int:
     steps = [
         ("lint", [python, "-m", "ruff", "check", "drslamd", "tools", "tests"]),
         ("format", [python, "-m", "ruff", "format", "--check", "drslamd", "tools", "tests"]),
-        ("types", [python, "-m", "mypy", "drslamd", "tools/lab", *_test_folders()]),
+        ("types", [python, "-m", "mypy", "drslamd", "tools/lab", *_test_files()]),
         ("quick tests", [python, "-m", "pytest", "-q", "-m", "not slow"]),
     ]
     if not options.quick:
@@ -57,10 +57,9 @@ def main(arguments: list[str] | None = None) -> int:
     return 1 if failed else 0
 
 
-def _test_folders() -> list[str]:
-    """mypy wants test folders one by one: they are no packages."""
-    return [str(path.relative_to(ROOT)) for path in sorted((ROOT / "tests").iterdir())
-            if path.suffix == ".py" or (path.is_dir() and any(path.glob("*.py")))]  # fmt: skip
+def _test_files() -> list[str]:
+    """mypy wants them one by one: their folders are no packages."""
+    return [str(path.relative_to(ROOT)) for path in sorted((ROOT / "tests").rglob("*.py"))]
 
 
 def _run(name: str, *command: str) -> int:

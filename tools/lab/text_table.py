@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lab.recording import Array, BadRecording
+from lab.recordings.recording import Array, BadRecording
 
 
 def columns(path: Path) -> dict[str, Array]:

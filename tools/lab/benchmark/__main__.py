@@ -31,7 +31,7 @@ from lab.benchmark import (
 )
 from lab.benchmark.rows import Row
 from lab.progress import Progress
-from lab.recording import BadRecording
+from lab.recordings.recording import BadRecording
 
 WORSE, NO_INPUT = 1, 66
 PARTS = {"1": module1, "sdp": sdp, "2": module2, "3": module3, "all": pipeline, "daemon": daemon,

@@ -10,9 +10,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from drslamd.io.status_socket import ask
-from lab import world
 from lab.benchmark.rows import Row
-from lab.real_team import RealRobot, RealTeam
+from lab.play.real_team import RealRobot, RealTeam
+from lab.recordings import world
 
 SCENE = world.Scene(robots=3, speed=0.2)
 """UWB at 50 Hz from both ends, odometry at 50 Hz."""

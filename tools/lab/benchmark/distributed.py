@@ -20,11 +20,11 @@ from drslamd.events import Datagram
 from drslamd.gossip import lc02
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
-from drslamd.slam.chordal import PoseGraph
-from drslamd.slam.items import GraphEntry, RelativePoses
-from drslamd.slam.pose_graph import TeamGraph
-from drslamd.slam.relative_graph import SolvedPoses, solve
+from drslamd.slam.graph.measurements import GraphEntry, RelativePoses
+from drslamd.slam.graph.pose_graph import TeamGraph
+from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraph
 from lab.benchmark.graphs import Graph
+from lab.benchmark.relative_graph import SolvedPoses, solve
 
 KEY = bytes(32)
 EDGES_PER_ENTRY = 27

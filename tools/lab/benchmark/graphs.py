@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from drslamd.slam.rbcd import ComplexEdges
-from lab import g2o
-from lab.recording import Array
+from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
+from lab.recordings import g2o
+from lab.recordings.recording import Array
 
 FOLDER = Path(
     os.environ.get(

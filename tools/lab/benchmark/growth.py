@@ -11,11 +11,12 @@ from drslamd.config import Config, parse
 from drslamd.conventions import ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain
 from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
-from drslamd.slam.items import ClosureItem, GraphEntry, Keyframe, RangeItem
-from lab import virtual_team, world
+from drslamd.slam.graph.measurements import ClosureItem, GraphEntry, Keyframe, RangeItem
 from lab.benchmark import timing
 from lab.benchmark.rows import Row
-from lab.recording import Array, Recording
+from lab.play import virtual_team
+from lab.recordings import world
+from lab.recordings.recording import Array, Recording
 
 HOURS = {"10 min": 600, "1 h": 3600, "8 h": 28_800}
 ROBOTS = 3

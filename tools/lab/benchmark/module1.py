@@ -8,13 +8,13 @@ from itertools import cycle
 import numpy as np
 from scipy.optimize import least_squares
 
-from drslamd.slam import coarse_search, relative_pose
-from drslamd.slam.pair_window import POINTS
-from drslamd.slam.range_fit import STEPS, Descent, RangeFit
-from drslamd.slam.window import Window, binned
+from drslamd.slam.relative_pose import coarse_search, solver
+from drslamd.slam.relative_pose.pair_window import POINTS
+from drslamd.slam.relative_pose.range_fit import STEPS, Descent, RangeFit
+from drslamd.slam.relative_pose.window import Window, binned
 from lab.benchmark import timing, windows
 from lab.benchmark.rows import Peer, Row
-from lab.recording import Array
+from lab.recordings.recording import Array
 
 DELTA = 0.1
 TAUS = (50, 100, 200)
@@ -60,7 +60,7 @@ def one_seed(window: Window) -> Array:
     return refined(window, 1)
 
 
-def full(window: Window) -> relative_pose.Estimate:
+def full(window: Window) -> solver.Estimate:
     """What the daemon does with every window: into bins, solved with a verdict."""
     width = max(1.0 / windows.HZ, np.ptp(window.t) / POINTS)
     t, ranges, _ = binned(window.t, window.ranges, float(width))
@@ -69,7 +69,7 @@ def full(window: Window) -> relative_pose.Estimate:
         for track in (window.a_poses, window.b_poses)
     ]
     thin = Window(t, ranges, poses[0], poses[1], window.a_antenna, window.b_antenna)
-    return relative_pose.solve(thin, windows.NOISE, DELTA)
+    return solver.solve(thin, windows.NOISE, DELTA)
 
 
 def refined(window: Window, seeds: int) -> Array:
@@ -126,7 +126,7 @@ def global_share(count: int, straight: bool) -> float:
     hits = 0
     for _ in range(count):
         window, truth = windows.window(rng, 100, straight)
-        ours = [polished(window, pose)[1] for pose in refined(window, relative_pose.SEEDS)]
+        ours = [polished(window, pose)[1] for pose in refined(window, solver.SEEDS)]
         phi = rng.uniform(-np.pi, np.pi, STARTS - 1)
         theta = rng.uniform(-np.pi, np.pi, STARTS - 1)
         place = window.ranges[-1] * np.stack([np.cos(phi), np.sin(phi)])

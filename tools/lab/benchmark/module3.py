@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from drslamd.slam import rbcd
-from drslamd.slam.chordal import PoseGraph
+from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraph
+from drslamd.slam.optimizer.rbcd import block_descent
 from lab.benchmark import distributed, graphs, timing
 from lab.benchmark.graphs import Graph
 from lab.benchmark.rows import Peer, Row
-from lab.recording import Array
+from lab.recordings.recording import Array
 
 TEAMS = {"team3_400": (14, 2), "team5_400": (26, 4), "team8_400": (48, 10), "team3_2000": (58, 10)}
 """Goals: ms from integrated odometry, ms for one more closure."""
@@ -36,7 +36,7 @@ def rows(quick: bool) -> Iterator[Row]:
             yield from in_space(graphs.load(name, 1))
     for name in ("team3_400", *SPACE):
         yield from shared(graphs.load(name), quick)
-    yield from block_descent(graphs.load("team3_400"), 40 if quick else 400)
+    yield from plain_block_descent(graphs.load("team3_400"), 40 if quick else 400)
 
 
 # ---- on one core -------------------------------------------------------------------------------
@@ -149,11 +149,11 @@ def shared(graph: Graph, quick: bool) -> Iterator[Row]:
               float(np.median([outcome.megabytes for outcome in lossy])), "MB")  # fmt: skip
 
 
-def block_descent(graph: Graph, rounds: int) -> Iterator[Row]:
+def plain_block_descent(graph: Graph, rounds: int) -> Iterator[Row]:
     """The paper's module 3 in rounds: every robot descends on its block, then all tell."""
     judge = PoseGraph(graph.edges, graph.count)
     rank = 5
-    lifted = rbcd.lift(judge.chordal_start(), rank)
+    lifted = block_descent.lift(judge.chordal_start(), rank)
     robot = graph.robot[np.argsort(graph.place)]
     began = timing.now_ms()
     for _ in range(rounds):
@@ -167,7 +167,7 @@ def block_descent(graph: Graph, rounds: int) -> Iterator[Row]:
             - len(np.unique(robot)) * lifted
         )
     taken = timing.now_ms() - began
-    gap = graph.gap(judge.cost(rbcd.rounded(lifted, lifted[0])))
+    gap = graph.gap(judge.cost(block_descent.rounded(lifted, lifted[0])))
     name = f"{graph.name}, plain block descent (rbcd)"
     yield Row(3, f"{name}, gap after {rounds} rounds", gap, "gap")
     yield Row(3, f"{name}, one round of all robots", taken / rounds, "ms")
@@ -181,17 +181,19 @@ def _descended(graph: Graph, lifted: Array, robot: Array, number: int) -> Array:
     place[mine] = np.arange(len(mine))
     inside_i, inside_j = robot[edges.i] == number, robot[edges.j] == number
 
-    def numbered(which: Array, own_i: bool, own_j: bool) -> rbcd.ComplexEdges:
+    def numbered(which: Array, own_i: bool, own_j: bool) -> block_descent.ComplexEdges:
         e = edges.chosen(which)
         i, j = place[e.i] if own_i else e.i, place[e.j] if own_j else e.j
-        return rbcd.ComplexEdges(i, j, e.turn, e.shift, e.kappa, e.tau)
+        return block_descent.ComplexEdges(i, j, e.turn, e.shift, e.kappa, e.tau)
 
-    block = rbcd.block(
+    block = block_descent.block(
         numbered(inside_i & inside_j, True, True),
         numbered(inside_i & ~inside_j, True, False),
         numbered(~inside_i & inside_j, False, True),
         lifted, len(mine),
     )  # fmt: skip
     out = lifted.copy()
-    out[mine] = rbcd.rows(rbcd.descend(block, rbcd.stacked(lifted[mine])))
+    out[mine] = block_descent.rows(
+        block_descent.descend(block, block_descent.stacked(lifted[mine]))
+    )
     return np.asarray(out)

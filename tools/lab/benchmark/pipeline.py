@@ -6,10 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from drslamd.slam import relative_pose, se2
-from drslamd.slam.chordal import PoseGraph
-from drslamd.slam.consistency import PairConsistency
-from drslamd.slam.rbcd import ComplexEdges
+from drslamd.slam import se2
+from drslamd.slam.consistency.pcm import PairConsistency
+from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraph
+from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
+from drslamd.slam.relative_pose import solver
 from lab.benchmark import closures, module1, timing, windows
 from lab.benchmark.rows import Peer, Row
 
@@ -47,7 +48,7 @@ class Update:
         for pair, waiting in zip(self._pairs, self._waiting, strict=True):
             window = self._windows[self._turn % len(self._windows)]
             self._turn += 1
-            relative_pose.solve(window, windows.NOISE, module1.DELTA)
+            solver.solve(window, windows.NOISE, module1.DELTA)
             pair.add(next(waiting))
         for _ in range(ROBOTS):
             PoseGraph(self._edges, ROBOTS * SECONDS).solve(self._solved)

@@ -19,11 +19,11 @@ from itertools import cycle
 import numpy as np
 from scipy import sparse
 
-from drslamd.slam import relative_pose
-from drslamd.slam.window import Window
+from drslamd.slam.relative_pose import solver
+from drslamd.slam.relative_pose.window import Window
 from lab.benchmark import module1, timing, windows
 from lab.benchmark.rows import Peer, Row
-from lab.recording import Array
+from lab.recordings.recording import Array
 
 ONE, C, S, TX, TY, UX, UY, Q = range(8)
 SIZE = 8
@@ -128,7 +128,7 @@ def _agreement(pool: list[Window]) -> tuple[float, float]:
         found = relaxed(window)
         tight.append(found.ratio < TIGHT)
         theirs = module1.polished(window, found.a_T_b)[1]
-        minima = module1.refined(window, relative_pose.SEEDS)
+        minima = module1.refined(window, solver.SEEDS)
         ours = min(module1.polished(window, pose)[1] for pose in minima)
         same.append(ours <= SAME_COST * theirs)
     return float(np.mean(tight)), float(np.mean(same))

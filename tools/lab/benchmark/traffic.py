@@ -6,10 +6,11 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 
-from lab import outcome, virtual_team
 from lab.benchmark.rows import Peer, Row
-from lab.recording import Recording
+from lab.play import virtual_team
+from lab.recordings.recording import Recording
 from lab.reproduce import experiment
+from lab.score import outcome
 
 GOAL_MB = {1: 0.45, 10: 1.4}
 PAPER_MB = {1: 4.3, 10: 13.8}

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from drslamd.slam import se2
-from drslamd.slam.odometry import OdometryNoise
-from drslamd.slam.relative_pose import Noise
-from drslamd.slam.window import Window
-from drslamd.slam.window_noise import RangeNoise
-from lab.recording import Array
+from drslamd.slam.odometry.track import OdometryNoise
+from drslamd.slam.relative_pose.solver import Noise
+from drslamd.slam.relative_pose.window import Window
+from drslamd.slam.relative_pose.window_noise import RangeNoise
+from lab.recordings.recording import Array
 
 SPEED_M_S, HZ, SIGMA_M = 0.5, 10, 0.1
 NEAREST_M, FARTHEST_M = 2.0, 15.0

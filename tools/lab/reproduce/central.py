@@ -14,13 +14,13 @@ from scipy.sparse import coo_array, csc_array, diags_array
 from scipy.sparse.linalg import spsolve
 
 from drslamd.slam import se2
-from drslamd.slam.graph_edges import chain_links
-from drslamd.slam.problem import PoseEdges, pose_errors
-from lab import metrics
-from lab.recording import Array
+from drslamd.slam.optimizer.factors import chain_links
+from drslamd.slam.optimizer.problem import PoseEdges, pose_errors
+from lab.recordings.recording import Array
 from lab.reproduce.dpgo import chain
 from lab.reproduce.experiment import GRID_S, POSE_TIMES, Trial
 from lab.reproduce.paper_column import SIGMA_R
+from lab.score import metrics
 
 STEPS = 50
 SETTLED = 1e-5

@@ -16,12 +16,12 @@ from scipy.sparse import coo_array, csc_array, diags_array
 from scipy.sparse.linalg import spsolve
 
 from drslamd.conventions import ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain
-from drslamd.slam.graph_edges import chain_links
-from drslamd.slam.items import Keyframe
-from drslamd.slam.pose_graph import ChainItems
-from drslamd.slam.problem import PoseEdges
-from drslamd.slam.rbcd import ComplexEdges
-from lab.recording import Array
+from drslamd.slam.graph.measurements import Keyframe
+from drslamd.slam.graph.pose_graph import ChainItems
+from drslamd.slam.optimizer.factors import chain_links
+from drslamd.slam.optimizer.problem import PoseEdges
+from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
+from lab.recordings.recording import Array
 from lab.reproduce.paper_column import NOISE, Closures
 
 STEPS = 60

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from lab.recording import Array
-from lab.world import STEP_S, Scene
+from lab.recordings.recording import Array
+from lab.recordings.world import STEP_S, Scene
 
 HOLD_S = (1.5, 5.0)
 STOP_S = (1.0, 3.0)

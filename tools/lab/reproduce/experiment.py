@@ -16,11 +16,12 @@ import numpy as np
 from scipy.optimize import brentq
 
 from drslamd.slam import se2
-from drslamd.slam.window import Window, binned
-from lab import metrics, world
-from lab.outcome import dead_reckoning
-from lab.recording import Array, Recording
+from drslamd.slam.relative_pose.window import Window, binned
+from lab.recordings import world
+from lab.recordings.recording import Array, Recording
 from lab.reproduce import driving
+from lab.score import metrics
+from lab.score.outcome import dead_reckoning
 
 WHEELS = world.OdometryModel(scale=0.072, yaw_deg_per_m=0.255)
 """Random parts as measured. The systematic ones, which differ most from robot to robot

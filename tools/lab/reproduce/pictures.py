@@ -12,14 +12,14 @@ matplotlib.use("Agg")
 import numpy as np
 from matplotlib import pyplot as plt
 
-from drslamd.slam import relative_pose
-from drslamd.slam.window import Window
-from lab import metrics
-from lab.recording import Array
+from drslamd.slam.relative_pose import solver
+from drslamd.slam.relative_pose.window import Window
+from lab.recordings.recording import Array
 from lab.reproduce import dpgo, paper_column
 from lab.reproduce.experiment import PAIRS, TYPICAL_SEED, Trial, trial
 from lab.reproduce.tally import Tally
 from lab.reproduce.window_columns import DELTAS, ODOMETRY_NOISE, RANGE_LIMITS, RANGE_NOISE
+from lab.score import metrics
 
 SHOWN_TAU, SHOWN_EPSILON = 50, 0.5
 """The paper's best row."""
@@ -45,7 +45,7 @@ def mean_residuals(window: Window) -> tuple[Array, Array]:
     phi, theta = (x.ravel() for x in np.meshgrid(angles, angles, indexing="ij"))
     r = window.ranges[-1]
     poses = np.stack([r * np.cos(phi), r * np.sin(phi), theta], axis=-1)
-    found = relative_pose.residuals(poses, window.a_points, window.b_points, window.ranges)[0]
+    found = solver.residuals(poses, window.a_points, window.b_points, window.ranges)[0]
     return angles, np.abs(found).mean(axis=1).reshape(len(angles), len(angles))
 
 

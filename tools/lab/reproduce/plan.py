@@ -6,10 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from lab import metrics, virtual_team
+from lab.play import virtual_team
 from lab.reproduce import central, table2, team_column, window_columns
 from lab.reproduce.experiment import PAIRS, TYPICAL_SEED, pose_errors, trial
 from lab.reproduce.tally import Tally
+from lab.score import metrics
 
 SEEDS = 20
 SWEEP_SEEDS = 4

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lab import metrics
-from lab.recording import Array
+from lab.recordings.recording import Array
 from lab.reproduce import dpgo, paper_column
 from lab.reproduce.experiment import PAIRS, Trial, odometry_errors, pose_errors
 from lab.reproduce.paper_column import Closures
 from lab.reproduce.tally import Tally
+from lab.score import metrics
 
 TAUS = (10, 50, 100)
 EPSILONS = (None, 0.01, 0.05, 0.1, 0.2, 0.5, 0.8)

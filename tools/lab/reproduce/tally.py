@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lab.recording import Array
+from lab.recordings.recording import Array
 
 Sums = list[float]
 """Count, sum, sum of squares, largest."""

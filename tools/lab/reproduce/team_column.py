@@ -12,12 +12,13 @@ import numpy as np
 
 from drslamd.gossip import messages
 from drslamd.slam import se2
-from lab import metrics, outcome, virtual_team
-from lab.outcome import Closure, Outcome
-from lab.recording import Array, Recording
+from lab.play import virtual_team
+from lab.play.simulator import Simulator
+from lab.recordings.recording import Array, Recording
 from lab.reproduce.experiment import PAIRS, POSE_TIMES, Trial, pose_errors
 from lab.reproduce.tally import Tally
-from lab.simulator import Simulator
+from lab.score import metrics, outcome
+from lab.score.outcome import Closure, Outcome
 
 ELLIPSE_95 = 5.991
 """Chi-squared quantile with two degrees of freedom: the ellipse that ought to hold 95 %."""

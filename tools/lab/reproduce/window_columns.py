@@ -10,13 +10,13 @@ import numpy as np
 
 from drslamd.config import OdometrySection, RelativePoseSection
 from drslamd.conventions import GRID_HZ
-from drslamd.slam import relative_pose
-from drslamd.slam.odometry import OdometryNoise
-from drslamd.slam.pair_window import POINTS
-from drslamd.slam.relative_pose import Estimate, Noise, Verdict
-from drslamd.slam.window import Window
-from drslamd.slam.window_noise import RangeNoise
-from lab.recording import Array
+from drslamd.slam.odometry.track import OdometryNoise
+from drslamd.slam.relative_pose import solver
+from drslamd.slam.relative_pose.pair_window import POINTS
+from drslamd.slam.relative_pose.solver import Estimate, Noise, Verdict
+from drslamd.slam.relative_pose.window import Window
+from drslamd.slam.relative_pose.window_noise import RangeNoise
+from lab.recordings.recording import Array
 from lab.reproduce import paper_column
 from lab.reproduce.experiment import PAIRS, Trial, pose_errors
 from lab.reproduce.paper_column import DELTA, SIGMA_R
@@ -85,7 +85,7 @@ def _paper_ways(tally: Tally, name: str, window: Window, case: Case, seed: int) 
     ways = {
         "nls": lambda: paper_column.nls(window, arbitrary),
         "coarse": lambda: paper_column.coarse(window, DELTA),
-        "both": lambda: relative_pose.solve_paper(window, SIGMA_R, DELTA).hypotheses[0].a_T_b,
+        "both": lambda: solver.solve_paper(window, SIGMA_R, DELTA).hypotheses[0].a_T_b,
     }
     for way, run in ways.items():
         pose, ms = paper_column.timed(run)
@@ -95,7 +95,7 @@ def _paper_ways(tally: Tally, name: str, window: Window, case: Case, seed: int) 
 
 def _ours(tally: Tally, name: str, window: Window, case: Case) -> None:
     start = time.perf_counter()
-    estimate = relative_pose.solve(window, default_noise(), DELTA)
+    estimate = solver.solve(window, default_noise(), DELTA)
     tally.add(f"{name}/ms", (time.perf_counter() - start) * 1e3)
     tally.add(f"{name}/unique", float(estimate.verdict is Verdict.UNIQUE))
     tally.add(f"{name}/ambiguous", float(estimate.verdict is Verdict.AMBIGUOUS))
@@ -136,9 +136,9 @@ def _by_delta(tally: Tally, trial: Trial, every: int, delta: float) -> None:
         start = time.perf_counter()
         coarse = paper_column.coarse(window, delta)
         searched = time.perf_counter()
-        paper = relative_pose.solve_paper(window, SIGMA_R, delta)
+        paper = solver.solve_paper(window, SIGMA_R, delta)
         refined = time.perf_counter()
-        answer = relative_pose.solve(own, default_noise(), delta)
+        answer = solver.solve(own, default_noise(), delta)
         tally.add(f"{name}/coarse/ms", (searched - start) * 1e3)
         tally.add(f"{name}/paper/ms", (refined - searched) * 1e3)
         tally.add(f"{name}/drslamd/ms", (time.perf_counter() - refined) * 1e3)
@@ -153,11 +153,9 @@ def _both(tally: Tally, name: str, trial: Trial, every: int, farthest: float = n
         window = trial.window(case.pair, case.k, SWEPT_TAU, farthest)
         own = trial.window(case.pair, case.k, OWN_TAU, farthest, POINTS)
         if window is not None and own is not None:
-            paper = relative_pose.solve_paper(window, SIGMA_R, DELTA)
+            paper = solver.solve_paper(window, SIGMA_R, DELTA)
             _answer(tally, f"{name}/paper", paper, case)
-            _answer(
-                tally, f"{name}/drslamd", relative_pose.solve(own, default_noise(), DELTA), case
-            )
+            _answer(tally, f"{name}/drslamd", solver.solve(own, default_noise(), DELTA), case)
 
 
 def _answer(tally: Tally, name: str, estimate: Estimate, case: Case) -> None:

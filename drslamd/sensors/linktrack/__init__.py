@@ -1,0 +1,1 @@
+"""Nooploop LinkTrack modules: bytes become ranges. Entry: `linktrack_input.LinkTrackInput.feed`."""

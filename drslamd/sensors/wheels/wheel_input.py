@@ -1,0 +1,213 @@
+"""The wheel odometry of one robot: from its configuration to motions of its body.
+
+A table says which driver and which geometry belong to each section of the configuration; what a
+driver reads, `WheelBase` turns into motions. `advice` puts the present trouble into one sentence
+with a remedy.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+from drslamd.config import (
+    AgilexSection,
+    AsciiSection,
+    DbcSection,
+    KobukiSection,
+    OdriveSection,
+    RoboteqSection,
+    WheelSection,
+)
+from drslamd.conventions import SECOND_US
+from drslamd.events import CanFrame
+from drslamd.sensors.samples import Motion, WheelSample
+from drslamd.sensors.wheels import agilex
+from drslamd.sensors.wheels.agilex import AgilexDriver
+from drslamd.sensors.wheels.ascii_odometry import AsciiDriver
+from drslamd.sensors.wheels.dbc import DbcDriver
+from drslamd.sensors.wheels.kobuki import KobukiDriver
+from drslamd.sensors.wheels.odrive import OdriveDriver
+from drslamd.sensors.wheels.roboteq import RoboteqDriver
+from drslamd.sensors.wheels.wheel_base import DriveGeometry, Gap, ReadingRefusal, WheelBase
+from drslamd.sensors.wheels.wheel_driver import CanDriver, PolledDriver, SerialDriver
+
+SILENCE_US: Final = SECOND_US
+"""The slowest base that is any use sends twice a second."""
+NO_MOTION_US: Final = 5 * SECOND_US
+"""Input for this long without a motion is a finding."""
+
+
+class Source(NamedTuple):
+    """What a section of the configuration asks for: `per_metre` counts or turns of the driver."""
+
+    driver: SerialDriver | CanDriver
+    per_metre: float
+
+
+def _kobuki(section: KobukiSection, _dbc_text: str) -> Source:
+    return Source(KobukiDriver(), section.counts_per_metre)
+
+
+def _roboteq(section: RoboteqSection, _dbc_text: str) -> Source:
+    driver = RoboteqDriver(section.poll_hz, section.swap_channels)
+    return Source(driver, section.counts_per_metre)
+
+
+def _ascii(section: AsciiSection, _dbc_text: str) -> Source:
+    return Source(AsciiDriver(), section.counts_per_metre)
+
+
+def _odrive(section: OdriveSection, _dbc_text: str) -> Source:
+    driver = OdriveDriver(section.left_axis, section.right_axis)
+    return Source(driver, section.gear / (2 * math.pi * section.wheel_radius_m))
+
+
+def _agilex(_section: AgilexSection, _dbc_text: str) -> Source:
+    return Source(AgilexDriver(), agilex.COUNTS_PER_METRE)
+
+
+def _dbc(section: DbcSection, dbc_text: str) -> Source:
+    return Source(DbcDriver(section, dbc_text), section.counts_per_metre or 1.0)
+
+
+SOURCES: Final[dict[type[WheelSection], Callable[[Any, str], Source]]] = {
+    KobukiSection: _kobuki,
+    RoboteqSection: _roboteq,
+    AsciiSection: _ascii,
+    OdriveSection: _odrive,
+    AgilexSection: _agilex,
+    DbcSection: _dbc,
+}
+
+
+_TOO_FAST: Final = (
+    "the wheels seem to move faster than wheels.max_speed_mps: are it and counts_per_metre (or "
+    "unit) right?"
+)
+_TOO_RARE: Final = "the wheel samples come too rarely: make the base send 20 or more a second"
+
+_REMEDIES: Final[dict[Gap | ReadingRefusal | None, str]] = {
+    ReadingRefusal.TOO_FAST: _TOO_FAST,
+    ReadingRefusal.JUMP: _TOO_FAST,
+    Gap.JUMP: _TOO_FAST,
+    Gap.WRAP: _TOO_RARE,
+    Gap.SILENCE: _TOO_RARE,
+}
+
+
+class WheelInput:
+    """The wheel sensor of one robot.
+
+    Args:
+        section: the ``wheels`` section of the configuration.
+        dbc_text: content of its DBC file, for ``source = "dbc"``.
+
+    Raises:
+        ConfigError: the DBC file cannot be used with this section.
+
+    Attributes:
+        driver: the codec, with a tally of its packets, lines or frames.
+        base: the kinematics, with tallies of samples and gaps.
+        last_motion_utime: arrival of the input that gave the last motion without ``gap``.
+    """
+
+    def __init__(self, section: WheelSection, dbc_text: str = "") -> None:
+        self.driver, per_metre = SOURCES[type(section)](section, dbc_text)
+        self._serial = self.driver if isinstance(self.driver, SerialDriver) else None
+        self._polled = self.driver if isinstance(self.driver, PolledDriver) else None
+        self._can = self.driver if isinstance(self.driver, CanDriver) else None
+        self.base = WheelBase(
+            DriveGeometry(
+                track_m=section.track_m,
+                max_speed_mps=section.max_speed_mps,
+                per_metre=per_metre,
+                reverse_left=section.reverse_left,
+                reverse_right=section.reverse_right,
+            )
+        )
+        self._last_input: int | None = None
+        self._trying_since = 0
+        self._samples_before = 0
+        self.last_motion_utime: int | None = None
+
+    def feed(self, data: bytes, utime: int) -> list[Motion]:
+        """Motions in `data` of the serial port, which arrived at `utime` (us).
+
+        Raises:
+            TypeError: this base is on a CAN bus.
+        """
+        if self._serial is None:
+            raise TypeError(f"{type(self.driver).__name__} reads CAN frames, not bytes")
+        if data:
+            self._note_input(utime)
+        return self._motions(self._serial.feed(data, utime), utime)
+
+    def on_frame(self, frame: CanFrame) -> list[Motion]:
+        """Motions that a frame of the CAN bus completes.
+
+        Raises:
+            TypeError: this base is on a serial port.
+        """
+        if self._can is None:
+            raise TypeError(f"{type(self.driver).__name__} reads bytes, not CAN frames")
+        self._note_input(frame.utime)
+        return self._motions(self._can.on_frame(frame), frame.utime)
+
+    @property
+    def must_be_asked(self) -> bool:
+        """Does this base say nothing by itself?"""
+        return self._polled is not None
+
+    def poll(self, utime: int) -> bytes:
+        """What has to be written to the serial port at `utime` (us); mostly nothing."""
+        return b"" if self._polled is None else self._polled.poll(utime)
+
+    def counters(self) -> dict[str, int]:
+        """Everything that is counted, by flat names."""
+        gaps = {f"gaps.{gap.name}": count for gap, count in self.base.gaps.items()}
+        return {
+            **self.driver.tally.counters("messages"),
+            "messages.unpaired": self.driver.unpaired(),
+            **self.base.tally.counters("samples"),
+            **gaps,
+        }
+
+    def advice(self, utime: int) -> str | None:
+        """One sentence about the present trouble and its remedy, or None.
+
+        Ask once the port has been open for some seconds: before, silence is no trouble.
+        """
+        return self._silence(utime) or self.driver.fault() or self._no_motion(utime)
+
+    def _note_input(self, utime: int) -> None:
+        if self._last_input is None or utime - self._last_input > SILENCE_US:
+            self._trying_since = utime
+        self._last_input = utime
+
+    def _motions(self, samples: list[WheelSample], utime: int) -> list[Motion]:
+        outcomes = [self.base.add(sample) for sample in samples]
+        motions = [motion for motion in outcomes if motion is not None]
+        if any(not motion.gap for motion in motions):
+            self.last_motion_utime = self._trying_since = utime
+            self._samples_before = self.base.tally.received
+        return motions
+
+    def _silence(self, utime: int) -> str | None:
+        if self._last_input is None:
+            return "nothing from the wheels yet: check the power of the base and the cable"
+        silent_us = utime - self._last_input
+        if silent_us <= SILENCE_US:
+            return None
+        seconds = silent_us // SECOND_US
+        return f"nothing from the wheels for {seconds} s: check the power of the base and the cable"
+
+    def _no_motion(self, utime: int) -> str | None:
+        if utime - self._trying_since < NO_MOTION_US:
+            return None
+        if self.base.tally.received > self._samples_before:
+            return _REMEDIES.get(self.base.trouble, "the wheel samples make no sense")
+        seconds = (utime - self._trying_since) // SECOND_US
+        remedy = "is wheels.baud right?" if self._serial else "is this the bus of the base?"
+        return f"input, but no {self.driver.expects} for {seconds} s: {remedy}"

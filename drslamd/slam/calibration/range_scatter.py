@@ -1,0 +1,48 @@
+"""How much ranges scatter about what module 3 makes of them, pair by pair.
+
+How noisy ranges are differs from module to module and from room to room, and the configuration can
+only say what must be allowed for. A window has too few independent ranges to tell; the solution of
+a whole drive has enough. With the configured sigma, a prior worth m ranges and n measured ones with
+errors e_i and sigmas sigma_i,
+
+    scatter^2 = (m + sum min(|e_i|, c sigma_i)^2 / sigma^2) / (m + n)
+
+is the posterior mean of a variance (1 where nothing is measured), and c is module 3's own threshold
+(`normal_equations.ROBUST_SIGMAS`). Neighbouring ranges share their errors, so the prior counts as
+often as they do.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drslamd.slam.optimizer.banded.normal_equations import ROBUST_SIGMAS
+from drslamd.slam.optimizer.problem import Index
+from drslamd.slam.se2 import Array
+
+PRIOR_RANGES = 20
+"""m: as much as five independent ranges (see `self_calibration.SHARED`) would say, which leaves
+what was configured uncertain by a third."""
+PLAIN = 1.05
+"""A range with a sigma so many times the smallest of its pair is doubted for reasons of its own,
+being short or blocked, and tells nothing of the others."""
+
+
+def scatter(errors: Array, sigmas: Array, pair: Index, pairs: int, configured: float) -> Array:
+    """(pairs,) true sigma of ranges over the configured one.
+
+    Args:
+        errors: (n,) m, predicted minus measured, biases taken out.
+        sigmas: (n,) m, what each was sent with: more where a range is doubted.
+        pair: (n,) which pair measured it.
+        configured: m, what windows allow for.
+    """
+    least = np.full(pairs, np.inf)
+    np.minimum.at(least, pair, sigmas)
+    plain = sigmas <= PLAIN * least[pair]
+    # bursts are another matter: here as in the solution they count as far as they are credible
+    sizes = np.minimum(np.abs(errors), ROBUST_SIGMAS * sigmas)[plain]
+    squares = (sizes / configured) ** 2
+    total = np.bincount(pair[plain], squares, pairs)
+    count = np.bincount(pair[plain], minlength=pairs)
+    return np.asarray(np.sqrt((PRIOR_RANGES + total) / (PRIOR_RANGES + count)))

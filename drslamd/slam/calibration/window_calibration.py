@@ -1,0 +1,106 @@
+"""Self-calibration: what module 3 learned of the sensors serves module 1.
+
+A window alone hardly tells a range bias from distance, or a wheel's scale from speed; hours of
+driving do. Module 3 carries the bias of each pair, what that of all pairs does at short range
+(`problem.fading`) and the scale of each robot's odometry as unknowns. Here a window is rid of what
+is known of them, and its noise says what is still unknown:
+
+    r' = r - bias - strong exp(-r / L)     p' = (1 - scale) p
+    sigma'^-2 = sigma^-2 + (k s sigma_measured)^-2
+
+k accounts for ranges that share their errors, s is how much those of the pair scatter
+(`range_scatter`); nothing falls below what no constant can describe.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from drslamd.slam.graph.estimate import Learned, TeamEstimate
+from drslamd.slam.odometry.track import OdometryNoise
+from drslamd.slam.optimizer.problem import fading
+from drslamd.slam.relative_pose.solver import Noise
+from drslamd.slam.relative_pose.window import Window
+from drslamd.slam.relative_pose.window_noise import RangeNoise
+from drslamd.slam.se2 import Array
+
+SHARED = 2.0
+"""k: ranges of one second and the next have a correlation of 0.3 to 0.7, so four of them say about
+as much as one would alone."""
+LEAST_BIAS_M = 0.05
+"""Biases move by so much with distance and bearing."""
+LEAST_SCALE = 0.01
+"""Floors and loads change wheels by so much."""
+
+
+class Sensors(NamedTuple):
+    """What is known of one pair's sensors.
+
+    Attributes:
+        bias: of the pair, m.
+        scale_a, scale_b: of both odometries, fractions.
+        scatter: of the pair's ranges over the configured sigma, see `range_scatter`.
+        strong: of the team, m at range 0, see `problem.fading`.
+    """
+
+    bias: Learned = Learned()
+    scale_a: Learned = Learned()
+    scale_b: Learned = Learned()
+    scatter: float = 1.0
+    strong: Learned = Learned()
+
+    @staticmethod
+    def of(estimate: TeamEstimate | None, a: int, b: int) -> Sensors:
+        """Of robots a and b, as the team's last solution has them, if it is one."""
+        if estimate is None or not estimate.converged:
+            return Sensors()
+        pair = (min(a, b), max(a, b))
+        return Sensors(
+            estimate.bias_m.get(pair, Learned()),
+            estimate.scale.get(a, Learned()),
+            estimate.scale.get(b, Learned()),
+            estimate.scatter.get(pair, 1.0),
+            estimate.strong_m,
+        )
+
+
+def remaining(learned: Learned, before: float, least: float, scatter: float = 1.0) -> float:
+    """Sigma of what is left of a constant when its learned value is taken out.
+
+    Args:
+        before: its sigma before anything was measured.
+        least: what no constant can describe.
+        scatter: of the ranges from which it was learned, see `range_scatter`.
+    """
+    spread = float(np.hypot(SHARED * scatter * learned.sigma, least))
+    return float((before**-2.0 + spread**-2.0) ** -0.5)
+
+
+def calibrated(window: Window, noise: Noise, sensors: Sensors) -> tuple[Window, Noise]:
+    """The window without its known errors, and the noise that is left."""
+    near = sensors.strong.value * fading(window.ranges)
+    better = replace(
+        window,
+        ranges=window.ranges - sensors.bias.value - near,
+        a_poses=_scaled(window.a_poses, sensors.scale_a),
+        b_poses=_scaled(window.b_poses, sensors.scale_b),
+    )
+    scatter = sensors.scatter
+    bias = remaining(sensors.bias, noise.ranges.bias_sigma, LEAST_BIAS_M, scatter)
+    return better, Noise(
+        RangeNoise(noise.ranges.sigma, bias, scatter),
+        _narrowed(noise.a, sensors.scale_a, scatter),
+        _narrowed(noise.b, sensors.scale_b, scatter),
+    )
+
+
+def _scaled(poses: Array, scale: Learned) -> Array:
+    return np.asarray(poses * [1 - scale.value, 1 - scale.value, 1.0])
+
+
+def _narrowed(noise: OdometryNoise, scale: Learned, scatter: float) -> OdometryNoise:
+    """As if the ranges of this pair alone had taught the scale, which those of all pairs did."""
+    return replace(noise, scale=remaining(scale, noise.scale, LEAST_SCALE, scatter))

@@ -1,0 +1,201 @@
+"""The edges of a connected group: the graph's items between poses that are numbered by time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drslamd.conventions import GRID_US, Segment
+from drslamd.slam import se2
+from drslamd.slam.graph.pose_graph import ChainItems, PairItems, TeamGraph
+from drslamd.slam.odometry.track import OdometryNoise, link_covariance
+from drslamd.slam.optimizer.banded.normal_equations import busiest
+from drslamd.slam.optimizer.problem import Index, Links, PoseEdges, Ranges
+from drslamd.slam.se2 import Array
+
+LINK_FLOOR_M, LINK_FLOOR_RAD = 5e-4, 5e-4
+"""No wheel is better than this over one link, and a robot that stands may still be pushed."""
+SAME_TIME = 20
+"""Samples: the keyframes of one measurement are at most 1.5 s from it (`pair_window.NEAR_US`)."""
+FAR, STANDING = 128, 64
+"""So many poses lie between the ends of an edge that joins different times, and so many poses may
+have such edges: those of robots that stood while the others drove on. What is beyond is nonsense,
+and would make the team's problem too wide to be solved."""
+
+
+@dataclass(frozen=True)
+class Numbering:
+    """Places of the keyframes of some segments in one list, ordered by time.
+
+    Attributes:
+        robot, n: (k,) whose keyframe each one is, and which.
+        place: for each robot, the place of every row of its chain, -1 where it is left out.
+    """
+
+    robot: Index
+    n: Index
+    place: dict[int, Index]
+
+    def of(self, items: ChainItems, n: Array) -> Index:
+        """Places of keyframes n (m,) of one chain, -1 where one is not there."""
+        place = self.place.get(items.chain.robot)
+        if place is None or not len(place):
+            return np.full(len(n), -1)
+        at, there = items.find(n)
+        return np.where(there, place[at], -1)
+
+
+def numbering(graph: TeamGraph, members: set[Segment], shift_us: dict[int, int]) -> Numbering:
+    """Number all keyframes of `members`.
+
+    Args:
+        shift_us: clock of each robot minus ours, us, as far as it is known; only the order depends
+            on it.
+    """
+    shifts = clock_shifts(graph, {s.robot for s in members}, shift_us)
+    place, when, robots, keyframes = {}, [], [], []
+    for robot, shift in sorted(shifts.items()):
+        items = graph.chains[robot]
+        wanted = [s.segment for s in members if s.chain == items.chain]
+        inside = np.isin(items.rows[:, 1], wanted)
+        place[robot] = np.where(inside, 0, -1)
+        keyframes.append(items.n[inside])
+        when.append(keyframes[-1] - shift)
+        robots.append(np.full(len(keyframes[-1]), robot))
+    robot_of, n_of = np.concatenate(robots), np.concatenate(keyframes)
+    order = np.lexsort((robot_of, np.concatenate(when)))
+    robot_of, n_of = robot_of[order], n_of[order]
+    for robot, places in place.items():
+        places[places == 0] = np.flatnonzero(robot_of == robot)
+    return Numbering(robot_of, n_of, place)
+
+
+def clock_shifts(graph: TeamGraph, robots: set[int], shift_us: dict[int, int]) -> dict[int, float]:
+    """Clocks of robots minus ours in grid samples.
+
+    We know the clocks of those whom we hear. The graph may hold others, and some that left long
+    ago: their clocks follow from what they measured with the rest, because the keyframes of one
+    measurement are of one time unless a robot stood still.
+    """
+    shifts = {robot: shift_us[robot] / GRID_US for robot in robots if robot in shift_us}
+    shifts = shifts or {min(robots): 0.0}
+    pairs = [p for p in graph.usable() if {p.a.robot, p.b.robot} <= robots]
+    while len(shifts) < len(robots):
+        reached = [p for p in pairs if (p.a.robot in shifts) != (p.b.robot in shifts)]
+        for pair in reached:
+            closed = [c.b_n - c.a_n for c in pair.kept()]
+            ahead = _mode(np.concatenate([pair.ranges[:, 1] - pair.ranges[:, 0], closed]))
+            if pair.a.robot in shifts:
+                shifts.setdefault(pair.b.robot, shifts[pair.a.robot] + ahead)
+            else:
+                shifts.setdefault(pair.a.robot, shifts[pair.b.robot] - ahead)
+        if not reached:
+            shifts |= dict.fromkeys(robots - set(shifts), 0.0)
+    return shifts
+
+
+def _mode(values: Array) -> float:
+    """Where most of the values are, to some seconds of samples; 0 of none."""
+    if not len(values):
+        return 0.0
+    bins, counts = np.unique(np.floor(values / SAME_TIME), return_counts=True)
+    inside = np.floor(values / SAME_TIME) == bins[np.argmax(counts)]
+    return float(np.median(values[inside]))
+
+
+def links(graph: TeamGraph, numbers: Numbering, robots: list[int]) -> Links:
+    """Odometry between neighbouring keyframes of each segment, its scale and yaw rate left in."""
+    parts: list[tuple[Array, ...]] = []
+    for index, robot in enumerate(robots):
+        edges = chain_links(graph.chains[robot], calibrated=True)
+        place = numbers.place[robot]
+        i, j = place[edges.i], place[edges.j]
+        path = np.hypot(edges.measured[:, 0], edges.measured[:, 1])
+        used = (i >= 0) & (j >= 0)
+        rows = (i, j, edges.measured, edges.covariance, np.full(len(i), index), path)
+        parts.append(tuple(row[used] for row in rows))
+    return Links(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def chain_links(items: ChainItems, calibrated: bool) -> PoseEdges:
+    """Odometry between neighbouring rows of one chain, across no break.
+
+    Args:
+        calibrated: scale and constant yaw rate are unknowns of the optimiser, so the covariance
+            holds only what is random; otherwise they are part of it.
+    """
+    rows, noise = items.rows, items.noise
+    i = np.flatnonzero(rows[1:, 1] == rows[:-1, 1])
+    if calibrated:
+        noise = OdometryNoise(0.0, 0.0, noise.translation_per_sqrt_m, noise.yaw_rad_per_sqrt_m)
+    measured = se2.between(items.poses[i], items.poses[i + 1])
+    # a left twist at pose i moves the end of the link by its turn times the lever
+    lever = np.tile(np.eye(3), (len(i), 1, 1))
+    lever[:, 0, 2], lever[:, 1, 2] = -measured[:, 1], measured[:, 0]
+    twist = link_covariance(noise, measured)
+    floor = np.diag([LINK_FLOOR_M**2, LINK_FLOOR_M**2, LINK_FLOOR_RAD**2])
+    return PoseEdges(i, i + 1, measured, lever @ twist @ np.swapaxes(lever, 1, 2) + floor)
+
+
+def closures(graph: TeamGraph, numbers: Numbering) -> PoseEdges:
+    """All kept closures between numbered poses."""
+    ends, upper = [np.zeros((2, 0), dtype=np.int64)], [np.zeros((0, 9))]
+    for pair in graph.usable():
+        kept = pair.kept()
+        places = np.array([(c.a_n, c.b_n) for c in kept]).reshape(-1, 2)
+        both = np.stack(_ends(graph, numbers, pair, places))
+        used = (both >= 0).all(axis=0)
+        ends.append(both[:, used])
+        upper.append(np.array([(*c.a_T_b, *c.covariance) for c in kept]).reshape(-1, 9)[used])
+    i, j = np.concatenate(ends, axis=1)
+    values = np.concatenate(upper)
+    full = values[:, 3 + np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])]
+    return PoseEdges(i, j, values[:, :3], full)
+
+
+def pose_edges(rows: Sequence[tuple[int, int, Sequence[float], Array]]) -> PoseEdges:
+    """Edges out of (i, j, measured (3,), covariance (3, 3)), also of none."""
+    return PoseEdges(
+        np.array([r[0] for r in rows], dtype=np.int64),
+        np.array([r[1] for r in rows], dtype=np.int64),
+        np.array([r[2] for r in rows], dtype=float).reshape(-1, 3),
+        np.array([r[3] for r in rows], dtype=float).reshape(-1, 3, 3),
+    )
+
+
+def ranges(graph: TeamGraph, numbers: Numbering) -> tuple[Ranges, list[tuple[int, int]]]:
+    """All ranges between numbered poses, and the pairs of robots that `pair` numbers."""
+    found: list[tuple[tuple[int, int], Array, Array]] = []
+    for pair in graph.usable():
+        rows = pair.ranges
+        ends = np.stack(_ends(graph, numbers, pair, rows[:, :2]))
+        used = (ends >= 0).all(axis=0)
+        if used.any():
+            found.append((_name(pair), ends[:, used], rows[used]))
+    names = sorted({name for name, _, _ in found})
+    i, j = np.concatenate([np.zeros((2, 0), dtype=np.int64), *(e for _, e, _ in found)], axis=1)
+    row = np.concatenate([np.zeros((0, 8)), *(r for _, _, r in found)])
+    index = [np.full(len(rows), names.index(name)) for name, _, rows in found]
+    pair_of = np.concatenate([np.zeros(0, dtype=np.int64), *index])
+    return Ranges(i, j, row[:, 2:4], row[:, 4:6], row[:, 6], row[:, 7], pair_of), names
+
+
+def sensible(i: Index, j: Index) -> NDArray[np.bool_]:
+    """Which of the edges (m,) that ought to join poses of the same time do so, more or less."""
+    far = np.abs(i - j) > FAR
+    standing = busiest(i[far], j[far], STANDING)
+    return np.asarray(~far | np.isin(i, standing) | np.isin(j, standing))
+
+
+def _name(pair: PairItems) -> tuple[int, int]:
+    low, high = sorted((pair.a.robot, pair.b.robot))
+    return low, high
+
+
+def _ends(graph: TeamGraph, numbers: Numbering, pair: PairItems, n: Array) -> tuple[Index, Index]:
+    """Places of the keyframes n (m, 2) of a pair."""
+    a, b = graph.chains[pair.a.robot], graph.chains[pair.b.robot]
+    return numbers.of(a, n[:, 0]), numbers.of(b, n[:, 1])

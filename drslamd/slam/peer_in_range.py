@@ -1,0 +1,30 @@
+"""A living peer as the front end sees it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from drslamd.conventions import Chain
+from drslamd.slam.odometry.track import Track
+
+
+@dataclass(frozen=True)
+class Neighbour:
+    """One start of one robot within UWB range.
+
+    Attributes:
+        uwb_id: of its module.
+        ranges_to_us: does it measure ranges to us?
+        track: its odometry of the last minutes.
+        ahead_us: its clock minus ours; None while that is not known well enough.
+        wanted_n: first sample of our odometry that it lacked and needed when it last said so, at
+            wanted_at, us; -1 when it needs none.
+    """
+
+    chain: Chain
+    uwb_id: int
+    ranges_to_us: bool
+    track: Track
+    ahead_us: int | None
+    wanted_n: int = -1
+    wanted_at: int = 0

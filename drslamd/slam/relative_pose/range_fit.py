@@ -1,0 +1,254 @@
+"""Least squares on the ranges of one window, from several start poses at once.
+
+All of it works on centred poses: where the centroid of b's points lies, seen from the centroid of
+a's points in frame a, and how b is turned. A window that says little leaves a valley, and the
+valley is an arc about that centroid: steps go along the line between both centroids and around it,
+so that what is an arc in x and y is straight here.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from drslamd.slam.relative_pose.window_noise import RangeNoise
+from drslamd.slam.se2 import Array
+
+FIRST_STEPS, STEPS = 3, 14
+"""Of a descent until a first look, when most seeds are settled, and in all; what is not settled
+then lies in a valley without an end."""
+SETTLED_CHI2 = 0.3
+"""A step that promises less than this (2 log-likelihood) is not worth the next one."""
+HOPELESS, HOPELESS_CHI2 = 5.0, 60.0
+"""A minimum that is worse by this factor and sum cannot come back under correlated noise."""
+LEAST_DAMPING, MOST_DAMPING = 1e-12, 1e6
+"""Relative to the diagonal: above rounding, so that no step meets a singular matrix however
+little a window says."""
+PRIOR = 1e-9
+"""Information, 1/m^2 and 1/rad^2, of directions of which a window says nothing at all."""
+ROBUST_SIGMAS = 2.5
+"""Huber's threshold: beyond it a range loses weight (bursts are 0.3 m and more)."""
+AROUND_M = 1.0
+"""Centroids nearer than this have no direction to speak of: steps are straight."""
+MAX_SIGMA_M, MAX_SIGMA_RAD = 1.5, 0.5
+"""A pose known worse than this helps nobody."""
+VAGUE, SURELY_CHI2 = 1.5, 10.0
+"""A minimum this many times vaguer, and no worse than the best by more than this, hardly ever
+becomes known or is excluded by the last steps: one usable window in forty is lost to the first
+looks, and only among short ones; the time of all short ones is halved."""
+POOR_FIT = 4.0
+"""Chi-squared per degree of freedom beyond which the model does not explain the window."""
+
+
+class Minima(NamedTuple):
+    """k minima of one window.
+
+    Attributes:
+        centred: (k, 2).
+        covariance: (k, 3, 3) in parts of a step (see `stepped`).
+        chi2: (k,) 2 log-likelihood.
+    """
+
+    centred: Array
+    covariance: Array
+    chi2: Array
+
+
+class RangeFit:
+    """The ranges of one window and the points between which they were measured.
+
+    Centred poses are complex (k, 2): place x + iy in m, and heading as a unit number.
+    """
+
+    def __init__(self, a: Array, b: Array, ranges: Array) -> None:
+        """Points a, b (n, 2) in the reference frames of both robots; ranges (n,) m."""
+        a_points, b_points = a[:, 0] + 1j * a[:, 1], b[:, 0] + 1j * b[:, 1]
+        self._a_mean, self._b_mean = a_points.mean(), b_points.mean()
+        self._a, self._b = a_points - self._a_mean, b_points - self._b_mean
+        self._ranges = ranges
+
+    def centred(self, poses: Array) -> Array:
+        """Centred poses of poses a_T_b (k, 3)."""
+        out = np.empty((len(poses), 2), dtype=complex)
+        out[:, 1] = np.exp(1j * poses[:, 2])
+        out[:, 0] = poses[:, 0] + 1j * poses[:, 1] + out[:, 1] * self._b_mean - self._a_mean
+        return out
+
+    def poses(self, centred: Array) -> Array:
+        """Poses a_T_b (k, 3) of centred ones."""
+        place = centred[:, 0] + self._a_mean - centred[:, 1] * self._b_mean
+        return np.stack([place.real, place.imag, _angle(centred[:, 1])], axis=-1)
+
+    def by_step(self, centred: Array) -> Array:
+        """Derivatives (k, 3, 3) of poses a_T_b by a step (see `stepped`)."""
+        away, arm = _direction(centred[:, 0]), centred[:, 1] * self._b_mean
+        m = np.zeros((len(centred), 3, 3))
+        m[:, 0, 0], m[:, 0, 1], m[:, 0, 2] = away.real, -away.imag, arm.imag
+        m[:, 1, 0], m[:, 1, 1], m[:, 1, 2] = away.imag, away.real, -arm.real
+        m[:, 2, 2] = 1.0
+        return m
+
+    def by_arcs(self, centred: Array, covariance: Array) -> Array:
+        """(k, 3, 3): what `by_step` leaves out of the covariance of poses a_T_b, because x and y
+        of a step are not straight: to second order, about the pose itself.
+
+        With the second derivatives D of x or y by a step, covariance C of a step and x, y as i, j:
+        tr(D_i C D_j C) / 2 + tr(D_i C) tr(D_j C) / 4.
+        """
+        distance = np.abs(centred[:, 0])
+        curved = _direction(centred[:, 0]) / np.maximum(distance, AROUND_M)
+        curved[distance <= AROUND_M] = 0.0
+        d = np.zeros((len(centred), 3, 3), dtype=complex)
+        d[:, 1, 1], d[:, 2, 2] = -curved, centred[:, 1] * self._b_mean
+        d[:, 0, 1] = d[:, 1, 0] = 1j * curved
+        # both at once, as x + iy: E[z z] = xx - yy + 2i xy and E[z conj(z)] = xx + yy
+        once = d @ covariance
+        other = once.conj()
+        drift = np.einsum("kaa->k", once)
+        zz = (once * once.transpose(0, 2, 1)).sum(axis=(1, 2)) / 2 + drift**2 / 4
+        size = (once * other.transpose(0, 2, 1)).sum(axis=(1, 2)).real / 2 + np.abs(drift) ** 2 / 4
+        out = np.zeros((len(centred), 3, 3))
+        out[:, 0, 0], out[:, 1, 1] = (size + zz.real) / 2, (size - zz.real) / 2
+        out[:, 0, 1] = out[:, 1, 0] = zz.imag / 2
+        return out
+
+    def covariances(self, minima: Minima) -> Array:
+        """(k, 3, 3) of x, y, theta in frame a."""
+        return self._as_if_straight(minima) + self.by_arcs(minima.centred, minima.covariance)
+
+    def is_vague(self, minima: Minima) -> bool:
+        """Whether the best fits, and one that counts is far from being known."""
+        if minima.chi2.min() > POOR_FIT * (len(self._ranges) - 3):
+            return False
+        limits = np.array([MAX_SIGMA_M, MAX_SIGMA_M, MAX_SIGMA_RAD]) * VAGUE
+        vague = np.einsum("kii->ki", self._as_if_straight(minima)) > limits**2
+        counts = minima.chi2 < minima.chi2.min() + SURELY_CHI2
+        return bool((vague.any(axis=1) & counts).any())
+
+    def _as_if_straight(self, minima: Minima) -> Array:
+        m = self.by_step(minima.centred)
+        return np.asarray(m @ minima.covariance @ m.transpose(0, 2, 1))
+
+    def other_side(self, centred: Array) -> Array:
+        """The same poses with b on the other side of a at the shortest range."""
+        n = int(np.argmin(self._ranges))
+        out: Array = centred.copy()
+        out[:, 0] -= 2 * (centred[:, 0] + centred[:, 1] * self._b[n] - self._a[n])
+        return out
+
+    def linear(self, centred: Array) -> tuple[Array, Array]:
+        """Equation 1 about centred poses.
+
+        Returns:
+            Unit lines of sight from a to b in frame a, complex (k, n); and (k, 5, n): derivatives
+            of the range by the three parts of a step (see `stepped`), by the bias, and the
+            predicted range minus the measured one.
+        """
+        turned = centred[:, 1:] * self._b
+        sight = turned - self._a
+        sight += centred[:, :1]
+        distance = np.maximum(np.abs(sight), 1e-6)
+        u = sight / distance
+        along = u * _direction(centred[:, :1]).conj()
+        rows = np.empty((len(centred), 5, len(self._ranges)))
+        rows[:, 0], rows[:, 1] = along.real, along.imag
+        rows[:, 2] = (u * turned.conj()).imag
+        rows[:, 3] = 1.0
+        np.subtract(distance, self._ranges, out=rows[:, 4])
+        return u, rows
+
+
+def stepped(centred: Array, step: Array) -> Array:
+    """Centred poses after steps (k, 3): away from a, around a (both m), heading (rad)."""
+    place = centred[:, 0]
+    distance = np.abs(place)
+    angles = step[:, 1:3].copy()
+    angles[:, 0] /= np.maximum(distance, AROUND_M)
+    out: Array = np.exp(1j * angles)
+    away = distance + step[:, 0]
+    arc, straight = away * out[:, 0], away + 1j * step[:, 1]
+    out[:, 0] = _direction(place) * np.where(distance > AROUND_M, arc, straight)
+    out[:, 1] *= centred[:, 1]
+    return out
+
+
+def _angle(number: Array) -> Array:
+    return np.asarray(np.arctan2(number.imag, number.real))
+
+
+def _direction(place: Array) -> Array:
+    return np.asarray(np.exp(1j * _angle(place)))
+
+
+class Descent:
+    """Robust Levenberg-Marquardt from all seeds at once, the pair's bias a fourth unknown."""
+
+    def __init__(self, fit: RangeFit, seeds: Array, noise: RangeNoise) -> None:
+        """From centred poses (k, 2)."""
+        self._fit, self._noise = fit, noise
+        self._x, self._bias = seeds, np.zeros(len(seeds))
+        self._damping = np.full(len(seeds), 1e-3)
+        self._cost, self._normal = _normal_equations(fit, seeds, self._bias, noise)
+        self._is_settled = False
+
+    def run(self, steps: int) -> None:
+        """At most so many steps, until all that may still count are settled."""
+        for _ in range(steps):
+            if self._is_settled:
+                break
+            step, promise = _damped_step(self._normal, self._damping)
+            x, bias = stepped(self._x, step), self._bias + step[:, 3]
+            cost, normal = _normal_equations(self._fit, x, bias, self._noise)
+            settled = (promise < SETTLED_CHI2) | (self._damping > MOST_DAMPING)
+            better = cost <= self._cost
+            self._x = np.where(better[:, None], x, self._x)
+            self._bias = np.where(better, bias, self._bias)
+            self._cost = np.where(better, cost, self._cost)
+            self._normal = np.where(better[:, None, None], normal, self._normal)
+            self._damping *= np.where(better, 0.2, 8.0)
+            self._is_settled = bool((settled | ~self._may_count()).all())
+
+    def minima(self) -> Minima:
+        """Best first, without those that are worse than the best beyond doubt.
+
+        What ranges scatter counts as white and never as more than was allowed for, which flatters.
+        """
+        order = np.argsort(self._cost, kind="stable")
+        order = order[self._may_count()[order]]
+        covariance = np.linalg.inv(self._normal[order, :4, :4])[:, :3, :3]
+        covariance *= min(1.0, self._noise.scatter) ** 2
+        return Minima(self._x[order], covariance, self._cost[order])
+
+    def _may_count(self) -> Array:
+        return np.asarray(self._cost < self._cost.min() * HOPELESS + HOPELESS_CHI2)
+
+
+def _damped_step(normal: Array, damping: Array) -> tuple[Array, Array]:
+    """Steps (k, 4), and (k,) what they promise to take off the cost: at most that much."""
+    hessian, gradient = normal[:, :4, :4].copy(), normal[:, :4, 4:]
+    diagonal = np.einsum("kii->ki", hessian)
+    diagonal *= 1 + np.maximum(damping, LEAST_DAMPING)[:, None]
+    step = np.linalg.solve(hessian, gradient)[..., 0]
+    return -step, (step * gradient[..., 0]).sum(axis=1)
+
+
+def _normal_equations(
+    fit: RangeFit, x: Array, bias: Array, noise: RangeNoise
+) -> tuple[Array, Array]:
+    """Huber's cost (k,), and (k, 5, 5): Gauss-Newton Hessian, gradient in the last column."""
+    _, rows = fit.linear(x)
+    e = rows[:, 4]
+    e += bias[:, None]
+    beyond = ROBUST_SIGMAS * noise.sigma
+    weighted = rows * (ROBUST_SIGMAS / noise.sigma / np.maximum(np.abs(e), beyond))[:, None]
+    normal = weighted @ rows.transpose(0, 2, 1)
+    # e^2 within the threshold, 2 c |e| - c^2 beyond it
+    shrunk = weighted[:, 4]
+    cost = 2 * normal[:, 4, 4] - np.einsum("kn,kn->k", shrunk, shrunk) * noise.sigma**2
+    prior = noise.bias_sigma**-2.0
+    cost += bias * bias * prior
+    normal[:, 3, 4] += bias * prior
+    normal[:, 3, 3] += prior
+    np.einsum("kii->ki", normal)[:, :4] += PRIOR
+    return cost, normal

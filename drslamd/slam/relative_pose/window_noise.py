@@ -1,0 +1,193 @@
+"""The noise of one window: how wrong the residuals of module 1 may be, all of them together.
+
+Ranges of one pair share a constant bias and a slowly varying part; what odometry got wrong on the
+way bends all earlier positions at once. With the covariance of the whole residual vector the pose
+is a generalised least-squares problem in three unknowns, its covariance is honest, and a longer
+window is never worse than a shorter one, because old measurements lose weight by themselves.
+
+What odometry adds up between the reference time and a measurement is a twist, and the nearer of two
+measurements shares all of its twist with the farther one. So the covariance of two residuals is a
+product of one vector of the farther and one of the nearer: the lower triangle of all of it is one
+matrix product of rank ten.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drslamd.slam.odometry.track import OdometryNoise, growth
+from drslamd.slam.relative_pose.window import Window
+from drslamd.slam.se2 import Array
+
+SLOW_TIME_S = 2.5
+"""Correlation time of the slow range bias (0.7 at 1 s, 0.45 at 2 s in LinkTrack recordings)."""
+SLOW_SHARE = 0.8
+"""Share of the range sigma that is slow; the rest is white."""
+
+NEAR_BIAS_M, NEAR_REACH_M = 0.20, 1.5
+"""Modules misjudge strong signals, each in its own way: what of that one curve for the whole team
+(`problem.fading`) does not describe. In the MURP recordings a range of below 1 m is 0.11 m shorter
+than one of 2 to 4 m, one of 1 to 2 m 0.05 m."""
+
+_TERMS = np.array([[3, 4, 1], [4, 5, 2], [1, 2, 0], [1, 2, 0]])
+"""Where `growth` has the covariance of the twist that random yaw adds up to, and a twist of yaw."""
+
+
+@dataclass(frozen=True)
+class RangeNoise:
+    """Sigmas of a range in metres: around its bias, and of the constant bias of the pair.
+
+    `sigma` is what must be allowed for and weighs ranges against odometry; where more is known,
+    they scatter by `scatter` times as much, and that is what a pose is as wrong by.
+    """
+
+    sigma: float
+    bias_sigma: float
+    scatter: float = 1.0
+
+
+def near_bias(ranges: Array | float) -> Array:
+    """Sigma, m, of what the bias of a pair does at short range and not elsewhere."""
+    return np.asarray(NEAR_BIAS_M * np.exp(-np.maximum(ranges, 0.0) / NEAR_REACH_M))
+
+
+def scatter_covariance(t: Array, sigma: float) -> Array:
+    """(n, n): the slow and the white part of ranges at times t (n,), s, around their bias."""
+    slow = (SLOW_SHARE * sigma) ** 2
+    covariance = np.exp(np.abs(t[:, None] - t) * (-1 / SLOW_TIME_S))
+    covariance *= slow
+    covariance.ravel()[:: len(t) + 1] += sigma**2 - slow
+    return np.asarray(covariance)
+
+
+def range_covariance(t: Array, ranges: Array, noise: RangeNoise) -> Array:
+    """(n, n): white, slow and constant parts, and what the bias does at short range.
+
+    Args:
+        t: (n,) s.
+        ranges: (n,) m.
+        noise: sigmas.
+    """
+    near = near_bias(ranges)
+    covariance = scatter_covariance(t, noise.sigma)
+    covariance += near[:, None] * near + noise.bias_sigma**2
+    return covariance
+
+
+def twists(paths: Array, noises: Sequence[OdometryNoise], before: int) -> Array:
+    """What the noise of odometry adds up to between measurements and reference time.
+
+    Args:
+        paths: (m, n, 2) body positions of m robots, each in its body frame at the reference time,
+            m; between them, and between them and the origin, the noise arises.
+        noises: sigmas of each robot.
+        before: how many measurements lie before the reference time.
+
+    Returns:
+        (m, 5, 3, n): covariance (3, 3) of the random part of the twist [x, y, theta], the twist of
+        one sigma of the yaw rate, and that of one sigma of the scale. (A twist is the same from one
+        end to the other as back, but for its sign.)
+    """
+    m, n = paths.shape[:2]
+    track, there = np.zeros((m, n + 1, 2)), np.arange(n)
+    there[before:] += 1
+    track[:, there] = paths
+    sums = growth(track)
+    sums = (sums[:, there] - sums[:, before, None]).transpose(0, 2, 1)
+    of_robot = [(v.scale, v.yaw_rad_per_m, v.translation_per_sqrt_m, v.yaw_rad_per_sqrt_m)
+                for v in noises]  # fmt: skip
+    scale, bend, shift, turn = np.array(of_robot).T[..., None]
+    out = np.zeros((m, 5, 3, n))
+    out[:, :4] = sums[:, _TERMS]
+    out[:, :3] *= np.copysign(turn**2, sums[:, 0])[:, None, None]
+    shift = shift**2 * np.abs(sums[:, 0])
+    out[:, 0, 0] += shift
+    out[:, 1, 1] += shift
+    out[:, 3] *= bend[:, None]
+    out[:, 4, :2] = scale[:, None] * paths.transpose(0, 2, 1)
+    return out
+
+
+def moments(points: Array, directions: Array) -> Array:
+    """(..., 3, n): how a twist [x, y, theta] moves points along directions (complex, (..., n))."""
+    turned = (points.conj() * directions).imag
+    return np.stack([directions.real, directions.imag, turned], axis=-2)
+
+
+def odometry_covariance(twist: Array, moment: Array, before: int) -> Array:
+    """(k, n, n): what odometry noise does to the residuals; only the lower triangles are meant.
+
+    Args:
+        twist: (m, 5, 3, n) `twists` of m robots.
+        moment: (k, m, 3, n) `moments` of the antennas along the lines of sight.
+        before: how many measurements lie before the reference time.
+    """
+    k, n = len(moment), moment.shape[-1]
+    far = (twist * moment[:, :, None]).sum(axis=3)
+    near = far.copy()
+    # of two measurements before the reference time the first is the farther one; after it the
+    # noise is another, and the last is
+    near[:, :, :3, :before] = moment[..., :before]
+    constant = far[:, :, 3:].reshape(k, -1, n)
+    far[:, :, :3, before:] = moment[..., before:]
+    lower = far.reshape(k, -1, n).transpose(0, 2, 1) @ near.reshape(k, -1, n)
+    across = constant[:, :, before:].transpose(0, 2, 1) @ constant[:, :, :before]
+    lower[:, before:, :before] = across
+    return np.asarray(lower)
+
+
+class WindowNoise:
+    """The covariance of the residuals of one window, for any relative pose."""
+
+    def __init__(
+        self,
+        window: Window,
+        a_points: Array,
+        b_points: Array,
+        ranges: RangeNoise,
+        a: OdometryNoise,
+        b: OdometryNoise,
+    ) -> None:
+        """Noise of a window with antennas at a_points, b_points (n, 2), of its sensors."""
+        self.sigma = ranges.sigma
+        self._before = window.before
+        self._ranges = range_covariance(window.t, window.ranges, ranges)
+        self._t = window.t
+        self._excess = ranges.scatter**2 - 1
+        self._points = np.stack([_complex(a_points), _complex(b_points)])
+        paths = np.stack([window.a_poses[:, :2], window.b_poses[:, :2]])
+        self._twists = twists(paths, (a, b), self._before)
+
+    def covariance(self, u: Array, heading: Array, weights: Array) -> Array:
+        """(k, n, n), of which only the lower triangles are meant.
+
+        Args:
+            u: (k, n) unit lines of sight in frame a, complex.
+            heading: (k,) of b in frame a, complex.
+            weights: (k, n) in (0, 1], thin out outliers.
+        """
+        directions = np.stack([u, u * heading[:, None].conj()], axis=1)
+        moment = moments(self._points, directions)
+        covariance = odometry_covariance(self._twists, moment, self._before)
+        covariance += self._ranges
+        np.einsum("kii->ki", covariance)[:] += self.sigma**2 * (1 / weights - 1)
+        return covariance
+
+    def excess(self, gain: Array) -> Array:
+        """(k, 3, 3) what ranges that scatter otherwise than allowed for add to a covariance.
+
+        Args:
+            gain: (k, 3, n) how the estimate follows the residuals, gain G: with true noise V' in
+                the place of V the covariance G V G' becomes G V' G' (a sandwich).
+        """
+        if not self._excess:
+            return np.zeros((len(gain), 3, 3))
+        scatter = scatter_covariance(self._t, self.sigma)
+        return np.asarray(self._excess * (gain @ scatter @ gain.transpose(0, 2, 1)))
+
+
+def _complex(points: Array) -> Array:
+    return np.asarray(points[:, 0] + 1j * points[:, 1])

@@ -1,0 +1,216 @@
+"""Problems for the optimisers of module 3, and the same problems as dense residuals."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from slam_scenes import Array, inverted, product, wander
+
+from drslamd.slam.optimizer.banded.normal_equations import (
+    GAUGE_SIGMA,
+    ROBUST_SIGMAS,
+    Layout,
+    System,
+)
+from drslamd.slam.optimizer.problem import (
+    FADING_M,
+    Calibration,
+    Links,
+    PoseEdges,
+    Priors,
+    Problem,
+    Ranges,
+)
+
+
+def random_covariance(rng: np.random.Generator, sigma: tuple[float, float, float]) -> Array:
+    root = np.diag(sigma) @ (np.eye(3) + 0.3 * rng.normal(size=(3, 3)))
+    return np.asarray(root @ root.T)
+
+
+def pose_edges(
+    rng: np.random.Generator,
+    truth: Array,
+    pairs: list[tuple[int, int]],
+    sigma: tuple[float, float, float],
+    error: float = 1.0,
+) -> PoseEdges:
+    """Relative poses of pairs of true poses; `error` scales the noise that is drawn."""
+    measured, covariances = [], []
+    for i, j in pairs:
+        covariance = random_covariance(rng, sigma)
+        noise = rng.multivariate_normal(np.zeros(3), covariance)
+        measured.append(product(inverted(truth[i]), truth[j]) + error * noise)
+        covariances.append(covariance)
+    i, j = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    return PoseEdges(i, j, np.reshape(measured, (-1, 3)), np.reshape(covariances, (-1, 3, 3)))
+
+
+def no_ranges() -> Ranges:
+    none = np.zeros(0, dtype=np.int64)
+    return Ranges(none, none, np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0), none)
+
+
+def team_problem(
+    seed: int,
+    robots: int = 2,
+    count: int = 12,
+    biases: tuple[float, ...] = (0.0, 0.0, 0.0),
+    scale: tuple[float, ...] = (0.0, 0.0, 0.0),
+    yaw: tuple[float, ...] = (0.0, 0.0, 0.0),
+    strong: float = 0.0,
+    range_error: float = 0.05,
+    link_error: float = 1.0,
+    closures: int = 3,
+    link_sigma: tuple[float, float, float] = (0.01, 0.01, 0.008),
+) -> tuple[Problem, Array]:
+    """Robots whose poses alternate in time, with every kind of edge; and the truth.
+
+    Pose robots * k + r is keyframe k of robot r. Each pair has its ranges, between antennas off
+    the middle, wrong by `strong` where they are near; neighbouring poses of a robot have their
+    odometry, wrong by `scale` and `yaw`.
+    """
+    rng = np.random.default_rng(seed)
+    paths = [wander(rng, count, 0.4) for _ in range(robots)]
+    truth = np.stack(paths, axis=1).reshape(-1, 3)
+    chain = [
+        (robots * k + r, robots * (k + 1) + r) for k in range(count - 1) for r in range(robots)
+    ]
+    links = pose_edges(rng, truth, chain, link_sigma, link_error)
+    robot = links.i % robots
+    path = np.hypot(links.measured[:, 0], links.measured[:, 1])
+    measured = links.measured.copy()
+    for k, r in enumerate(robot):
+        bend = yaw[r] * path[k]
+        x, y = (1 + scale[r]) * measured[k, :2]
+        measured[k] = [x - bend / 2 * y, y + bend / 2 * x, measured[k, 2] + bend]
+    odometry = Links(links.i, links.j, measured, links.covariance, robot, path)
+    names = [(a, b) for a in range(robots) for b in range(a + 1, robots)]
+    rows = []
+    q = rng.normal(0, 0.2, (robots, 2))
+    for k in range(count):
+        for number, (a, b) in enumerate(names):
+            i, j = robots * k + a, robots * k + b
+            ends = [product(truth[i], (*q[a], 0)), product(truth[j], (*q[b], 0))]
+            distance = math.hypot(*(ends[1] - ends[0])[:2])
+            measured_m = distance + biases[number]
+            # the term is of what is measured, itself included
+            for _ in range(30):
+                measured_m = distance + biases[number] + strong * math.exp(-measured_m / FADING_M)
+            rows.append((i, j, *q[a], *q[b], measured_m, number))
+    table = np.reshape(rows, (-1, 8))
+    ranges = Ranges(
+        table[:, 0].astype(int), table[:, 1].astype(int), table[:, 2:4], table[:, 4:6],
+        table[:, 6] + range_error * rng.normal(size=len(table)), np.full(len(table), 0.05),
+        table[:, 7].astype(int),
+    )  # fmt: skip
+    joined = [(robots * k, robots * k + 1) for k in np.linspace(1, count - 2, closures).astype(int)]
+    priors = Priors(
+        np.full(len(names), 0.3), np.full(robots, 0.03), np.full(robots, 0.01), np.full(1, 0.1)
+    )
+    start = truth + rng.normal(0, 0.03, truth.shape)
+    problem = Problem(
+        np.arange(len(truth)) % robots, np.arange(len(truth)) // robots, start, 0, odometry,
+        pose_edges(rng, truth, [(int(i), int(j)) for i, j in joined], (0.05, 0.05, 0.03)),
+        ranges, priors,
+    )  # fmt: skip
+    return problem, truth
+
+
+# ---- the same written once more, plainly -------------------------------------------------------
+
+
+def unpacked(problem: Problem, x: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Poses, biases, scales, yaw rates and bias of strong signals of one vector of all unknowns."""
+    count, priors = len(problem.initial), problem.priors
+    ends = np.cumsum([3 * count, len(priors.bias), len(priors.scale), len(priors.yaw)])
+    poses, bias, scale, yaw, strong = np.split(x, ends)
+    return poses.reshape(-1, 3), bias, scale, yaw, strong
+
+
+def packed(poses: Array, c: Calibration) -> Array:
+    return np.concatenate([poses.ravel(), c.bias, c.scale, c.yaw, c.strong])
+
+
+def residual_vector(problem: Problem, x: Array, robust: bool = True) -> Array:
+    """Whose sum of squares is the cost, one residual after the other.
+
+    Args:
+        robust: ranges, biases and scales by the root of Cauchy's cost; otherwise by the error
+            itself, which Gauss and Newton weigh by `range_weights`.
+    """
+    poses, bias, scale, yaw, strong = unpacked(problem, x)
+    out: list[float] = []
+    links = problem.links
+    for m in range(len(links)):
+        mx, my, mt = links.measured[m]
+        s, b = scale[links.robot[m]], yaw[links.robot[m]] * links.path[m]
+        right = ((1 - s) * mx + b / 2 * my, (1 - s) * my - b / 2 * mx, mt - b)
+        out += whitened(poses[links.i[m]], poses[links.j[m]], right, links.covariance[m])
+    closures = problem.closures
+    for m in range(len(closures)):
+        ends = poses[closures.i[m]], poses[closures.j[m]]
+        out += whitened(*ends, closures.measured[m], closures.covariance[m])
+    r = problem.ranges
+    for m in range(len(r)):
+        i, j = (product(poses[k], (*q, 0)) for k, q in ((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m])))
+        wrong = bias[r.pair[m]] + strong[0] * math.exp(-r.measured[m] / FADING_M)
+        e = (math.hypot(*(j - i)[:2]) + wrong - r.measured[m]) / r.sigma[m]
+        out.append(cauchy_root(e, ROBUST_SIGMAS) if robust else e)
+    for e in np.concatenate([bias / problem.priors.bias, scale / problem.priors.scale]):
+        out.append(cauchy_root(e, 1.0) if robust else e)
+    out += (yaw / problem.priors.yaw).tolist() + (strong / problem.priors.strong).tolist()
+    out += ((poses[problem.gauge] - problem.initial[problem.gauge]) / GAUGE_SIGMA).tolist()
+    return np.array(out)
+
+
+def cauchy_root(e: float, c: float) -> float:
+    """Whose square is c^2 log(1 + (e / c)^2)."""
+    return math.copysign(c * math.sqrt(math.log1p((e / c) ** 2)), e)
+
+
+def whitened(
+    i: Array, j: Array, measured: Array | tuple[float, ...], covariance: Array
+) -> list[float]:
+    seen = product(inverted(i), j)
+    error = np.array([*(seen[:2] - np.array(measured[:2])),
+                      math.remainder(seen[2] - measured[2], 2 * math.pi)])  # fmt: skip
+    return list(np.linalg.solve(np.linalg.cholesky(covariance), error))
+
+
+def range_weights(problem: Problem, x: Array) -> Array:
+    """Cauchy's weight of every residual of `residual_vector`; 1 where there is none."""
+    plain = residual_vector(problem, x, robust=False)
+    first = 3 * (len(problem.links) + len(problem.closures))
+    weights = np.ones(len(plain))
+    part = slice(first, first + len(problem.ranges))
+    weights[part] = 1 / (1 + (plain[part] / ROBUST_SIGMAS) ** 2)
+    loose = len(problem.priors.bias) + len(problem.priors.scale)
+    sensors = slice(part.stop, part.stop + loose)
+    weights[sensors] = 1 / (1 + plain[sensors] ** 2)
+    return weights
+
+
+def jacobian(problem: Problem, x: Array, robust: bool, h: float = 1e-6) -> Array:
+    columns = []
+    for k in range(len(x)):
+        step = np.zeros(len(x))
+        step[k] = h
+        ahead, behind = (residual_vector(problem, x + s, robust) for s in (step, -step))
+        columns.append((ahead - behind) / (2 * h))
+    return np.stack(columns, axis=1)
+
+
+def dense(system: System, layout: Layout) -> Array:
+    """The whole matrix of a system in the order of `packed`."""
+    n, b = layout.band, layout.border
+    full = np.zeros((n + b, n + b))
+    for d in range(len(system.band)):
+        below = np.arange(n - d)
+        full[below + d, below] = full[below, below + d] = system.band[d, : n - d]
+    full[:n, n:], full[n:, :n], full[n:, n:] = system.border, system.border.T, system.corner
+    order = np.concatenate(
+        [layout.poses.ravel(), layout.bias, layout.scale, layout.yaw, layout.strong]
+    )
+    return np.asarray(full[np.ix_(order, order)])

@@ -1,0 +1,112 @@
+"""The optimisers of tools/reproduce, against truth, finite differences and the daemon's RBCD."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from lab.recordings.recording import Array
+from lab.reproduce import central, dpgo, experiment
+from lab.reproduce.experiment import PAIRS
+from lab.reproduce.paper_column import Closures
+from lab.score import metrics
+
+from drslamd.slam.optimizer.rbcd import block_descent
+
+POSES = 40
+
+
+def paths(rng: np.random.Generator, wrong: float) -> tuple[dict[int, Array], dict[int, Array]]:
+    """True poses of three robots and what their odometry says of them."""
+    truth, odometry = {}, {}
+    for robot in range(3):
+        step = np.column_stack(
+            [np.full(POSES, 0.2), np.zeros(POSES), np.cumsum(rng.normal(0, 0.1, POSES)) * 0.3]
+        )
+        poses = [rng.uniform(-3, 3, 3)]
+        reckoned = [np.zeros(3)]
+        for move in step[1:]:
+            poses.append(metrics.compose(poses[-1], move))
+            error = rng.normal(0, wrong, 3) * [1, 1, 0.5]
+            reckoned.append(metrics.compose(reckoned[-1], move + error))
+        truth[robot], odometry[robot] = np.array(poses), np.array(reckoned)
+    return truth, odometry
+
+
+def closures(rng: np.random.Generator, truth: dict[int, Array], wrong: float) -> dict[
+    tuple[int, int], Closures
+]:  # fmt: skip
+    out = {}
+    for a, b in PAIRS:
+        k = np.arange(0, POSES, 4)
+        true = metrics.relative(truth[a][k], truth[b][k])
+        noise = rng.normal(0, wrong, true.shape)
+        out[a, b] = Closures(k, true + noise, np.tile(0.01 * np.eye(3), (len(k), 1, 1)))
+    return out
+
+
+def test_dpgo_finds_the_truth_when_nothing_is_wrong() -> None:
+    rng = np.random.default_rng(1)
+    truth, odometry = paths(rng, 0.0)
+    solved = dpgo.solve(dpgo.graph(odometry, closures(rng, truth, 0.0)))
+    for robot in range(3):
+        expected = metrics.relative(truth[0][:1], truth[robot])
+        # odometry is rounded to 0.1 mm and 0.1 mrad
+        assert solved[robot][:, :2] == pytest.approx(expected[:, :2], abs=5e-3)
+
+
+def test_riemannian_descent_finds_nothing_below_the_minimum() -> None:
+    rng = np.random.default_rng(2)
+    truth, odometry = paths(rng, 0.02)
+    problem = dpgo.graph(odometry, closures(rng, truth, 0.1))
+    poses = dpgo.minimum(problem, dpgo.chordal(problem))
+    nothing = problem.edges.chosen(np.zeros(0, dtype=np.int64))
+    block = block_descent.block(
+        problem.edges, nothing, nothing, np.zeros((0, 10), dtype=complex), problem.size
+    )
+    reached = block_descent.stacked(block_descent.lift(poses, 5))
+    start = block_descent.stacked(block_descent.lift(dpgo.chordal(problem), 5))
+    assert block.cost(reached) < block.cost(start)
+    # from another rank too: the relaxation has no lower point nearby
+    shaken = block_descent.retract(reached + 0.01 * rng.normal(size=reached.shape))
+    assert block.cost(block_descent.descend(block, shaken, 300)) > block.cost(reached) * (1 - 1e-6)
+
+
+def test_dpgos_slope_is_that_of_its_error() -> None:
+    rng = np.random.default_rng(3)
+    truth, odometry = paths(rng, 0.02)
+    problem = dpgo.graph(odometry, closures(rng, truth, 0.1))
+    poses = rng.normal(size=(problem.size, 3))
+    _, slope = dpgo._linearised(problem, poses)
+    direction = rng.normal(size=poses.shape)
+    direction[0] = 0
+    ahead, _ = dpgo._linearised(problem, poses + 1e-6 * direction)
+    behind, _ = dpgo._linearised(problem, poses - 1e-6 * direction)
+    expected = (ahead - behind) / 2e-6
+    assert slope @ direction.ravel()[3:] == pytest.approx(expected, rel=1e-5, abs=1e-3)
+
+
+def test_the_centralised_rivals_slope_is_that_of_its_error() -> None:
+    data = central.measured(experiment.trial(0))
+    rng = np.random.default_rng(4)
+    size = 3 * len(experiment.POSE_TIMES)
+    poses = rng.normal(size=(size, 3)) * [5, 5, 1]
+    _, slope = central._linearised(data, poses)
+    direction = rng.normal(size=poses.shape)
+    ahead, _ = central._linearised(data, poses + 1e-6 * direction)
+    behind, _ = central._linearised(data, poses - 1e-6 * direction)
+    scale = np.abs(ahead - behind).max() / 2e-6
+    error = slope @ direction.ravel() - (ahead - behind) / 2e-6
+    # headings that cross the half turn between the two sides are no slope
+    assert np.quantile(np.abs(error), 0.99) < 1e-5 * scale
+
+
+def test_the_centralised_rival_is_better_than_odometry_and_starts_at_the_truth() -> None:
+    trial = experiment.trial(0)
+    solved = central.solve(trial)
+    for robot, poses in solved.items():
+        assert poses[0] == pytest.approx(trial.truth[robot][0], abs=1e-2)
+    metres = [
+        experiment.pose_errors(metrics.relative(solved[a], solved[b]), trial.true_pairs(a, b))[0]
+        for a, b in PAIRS
+    ]
+    assert np.mean(metres) < 0.7 * experiment.odometry_errors(trial.recording)[0].mean()

@@ -1,0 +1,253 @@
+"""Any base with a DBC file: counters, wheel speeds or the twist of the body."""
+
+from __future__ import annotations
+
+import struct
+import sys
+from typing import Any
+
+import pytest
+from frames import SECOND_US, i24
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drslamd.config import ConfigError, DbcSection
+from drslamd.events import CanFrame
+from drslamd.sensors.samples import Twist, WheelCounts, WheelSample, WheelSpeeds
+from drslamd.sensors.wheels.wheel_driver import WheelRefusal
+
+pytest.importorskip("cantools")
+
+from drslamd.sensors.wheels.dbc import DbcDriver
+
+MS = 1000
+T0 = 100 * SECOND_US
+
+DBC = """
+VERSION ""
+NS_ :
+BS_:
+BU_: Base
+BO_ 256 Encoders: 8 Base
+ SG_ CountL : 0|24@1- (0.5,0) [0|0] "" Vector__XXX
+ SG_ CountR : 24|24@1- (0.5,0) [0|0] "" Vector__XXX
+BO_ 257 Speeds: 8 Base
+ SG_ SpeedL : 7|16@0- (0.01,0) [0|0] "km/h" Vector__XXX
+ SG_ SpeedR : 23|16@0- (0.01,0) [0|0] "km/h" Vector__XXX
+BO_ 258 LeftWheel: 4 Base
+ SG_ Count : 0|32@1+ (1,0) [0|0] "" Vector__XXX
+BO_ 259 RightWheel: 4 Base
+ SG_ Count : 0|32@1+ (1,0) [0|0] "" Vector__XXX
+BO_ 2147485952 Node: 4 Base
+ SG_ Ticks : 0|32@1- (1,0) [0|0] "" Vector__XXX
+BO_ 9 Estimates: 8 Base
+ SG_ Turns : 0|32@1- (1,0) [0|0] "rev" Vector__XXX
+ SG_ Rate : 32|32@1- (1,0) [0|0] "rev/s" Vector__XXX
+BO_ 260 Muxed: 8 Base
+ SG_ Page M : 0|8@1+ (1,0) [0|0] "" Vector__XXX
+ SG_ MuxL m1 : 8|16@1- (1,0) [0|0] "" Vector__XXX
+ SG_ MuxR m1 : 24|16@1- (1,0) [0|0] "" Vector__XXX
+ SG_ Other m2 : 8|16@1- (1,0) [0|0] "" Vector__XXX
+SIG_VALTYPE_ 9 Turns : 1;
+SIG_VALTYPE_ 9 Rate : 1;
+"""
+
+
+NO_ROOM = 'BO_ 1 A: 8 X\n SG_ B : 60|8@1+ (1,0) [0|0] "" X\n'
+
+
+def section(**keys: Any) -> DbcSection:
+    return DbcSection(
+        **{"source": "dbc", "track_m": 0.5, "dbc_file": "x.dbc", "measures": "counts", **keys}
+    )
+
+
+def counts(**keys: Any) -> DbcDriver:
+    both = {"left": "Encoders.CountL", "right": "Encoders.CountR", "counter_bits": 24}
+    return DbcDriver(section(counts_per_metre=1000.0, **{**both, **keys}), DBC)
+
+
+def frame(can_id: int, data: bytes, utime: int = T0, extended: bool = False) -> CanFrame:
+    return CanFrame(utime, can_id, extended, data)
+
+
+# ---- what is measured --------------------------------------------------------------------------
+
+
+def test_counts_of_one_frame_are_taken_raw() -> None:
+    data = i24(-5) + i24(77) + bytes(2)
+    assert counts().on_frame(frame(0x100, data)) == [WheelCounts(T0, -5, 77, 24)]
+
+
+def test_wheel_speeds_are_scaled_by_the_file_and_by_unit() -> None:
+    driver = DbcDriver(
+        section(measures="wheel_speeds", left="Speeds.SpeedL", right="Speeds.SpeedR", unit=0.5),
+        DBC,
+    )
+    (sample,) = driver.on_frame(frame(0x101, struct.pack(">hh4x", 360, -720)))
+    assert isinstance(sample, WheelSpeeds)
+    assert (sample.left_mps, sample.right_mps) == pytest.approx((1.8, -3.6))
+
+
+def test_a_twist_is_scaled_too() -> None:
+    driver = DbcDriver(
+        section(measures="twist", linear="Speeds.SpeedL", angular="Speeds.SpeedR", unit=2.0), DBC
+    )
+    (sample,) = driver.on_frame(frame(0x101, struct.pack(">hh4x", 50, -100)))
+    assert isinstance(sample, Twist)
+    assert (sample.linear_mps, sample.angular_radps) == pytest.approx((1.0, -2.0))
+
+
+def test_sides_in_two_messages_are_brought_to_a_common_time() -> None:
+    driver = counts(left="LeftWheel.Count", right="RightWheel.Count", counter_bits=32)
+    samples: list[WheelSample] = []
+    top = (1 << 32) - 10
+    for can_id, after, value in (
+        (0x103, 0, top),
+        (0x102, 5, 1000),
+        (0x103, 10, 10),
+        (0x102, 15, 1010),
+        (0x103, 20, 30),
+    ):
+        samples += driver.on_frame(frame(can_id, struct.pack("<I", value), T0 + after * MS))
+    assert samples == [
+        WheelCounts(T0 + 5 * MS, 1000, 0, 32),
+        WheelCounts(T0 + 15 * MS, 1010, 20, 32),
+    ]
+    assert driver.expects == "CAN id 0x102 and CAN id 0x103"
+
+
+@pytest.mark.parametrize(
+    ("id_mask", "left", "right", "can_id_of"),
+    [
+        ({"id_mask": 0x1FFFFF00}, 5, 6, lambda node: 0x900 | node),
+        ({"id_mask": 0x1FFFFFF0}, 1, 2, lambda node: 0x900 | node),
+    ],
+)
+def test_one_message_of_two_nodes(
+    id_mask: dict[str, int], left: int, right: int, can_id_of: Any
+) -> None:
+    driver = counts(
+        left="Node.Ticks",
+        right="Node.Ticks",
+        counter_bits=32,
+        left_node=left,
+        right_node=right,
+        **id_mask,
+    )
+    samples: list[WheelSample] = []
+    for node, value in ((right, 7), (left, -7), (9, 99)):
+        data = struct.pack("<i", value)
+        samples += driver.on_frame(frame(can_id_of(node), data, T0, extended=True))
+        assert driver.on_frame(frame(can_id_of(node), data, T0, extended=False)) == []
+    samples += driver.on_frame(frame(can_id_of(right), struct.pack("<i", 8), T0, extended=True))
+    assert samples == [WheelCounts(T0, -7, 8, 32)]
+    assert driver.tally.ignored == 3 + 1
+
+
+def test_the_node_is_what_stands_outside_the_mask_shifted_down() -> None:
+    driver = DbcDriver(
+        section(
+            measures="wheel_speeds",
+            left="Estimates.Rate",
+            right="Estimates.Rate",
+            id_mask=0x1F,
+            left_node=1,
+            right_node=63,
+        ),
+        DBC,
+    )
+    samples = []
+    for node, rate in ((63, 2.0), (1, -0.25), (63, 2.0)):
+        samples += driver.on_frame(frame(node << 5 | 9, struct.pack("<ff", 1.5, rate)))
+    assert samples == [WheelSpeeds(T0, -0.25, 2.0)]
+
+
+# ---- what cannot be used -----------------------------------------------------------------------
+
+
+def test_other_frames_are_ignored() -> None:
+    driver = counts()
+    assert driver.on_frame(frame(0x101, bytes(8))) == []
+    assert driver.on_frame(frame(0x100, bytes(8), extended=True)) == []
+    assert (driver.tally.ignored, driver.tally.received) == (2, 2)
+
+
+@pytest.mark.parametrize(("length", "used"), [(5, False), (6, True), (8, True), (12, True)])
+def test_a_short_frame_is_used_as_far_as_it_goes(length: int, used: bool) -> None:
+    driver = counts()
+    assert len(driver.on_frame(frame(0x100, bytes(length)))) == used
+    assert driver.tally.refused[WheelRefusal.SHORT] == (not used)
+
+
+def test_a_speed_that_is_not_finite_is_refused() -> None:
+    driver = DbcDriver(
+        section(measures="wheel_speeds", left="Estimates.Rate", right="Estimates.Turns"), DBC
+    )
+    for value in (float("nan"), float("inf")):
+        assert driver.on_frame(frame(9, struct.pack("<ff", value, 1.0))) == []
+    assert driver.tally.refused == {WheelRefusal.NOT_FINITE: 2}
+
+
+def test_another_page_of_a_multiplexed_message_is_ignored() -> None:
+    driver = counts(left="Muxed.MuxL", right="Muxed.MuxR", counter_bits=16)
+    assert driver.on_frame(frame(0x104, struct.pack("<Bhh3x", 1, -3, 4))) == [
+        WheelCounts(T0, -3, 4, 16)
+    ]
+    assert driver.on_frame(frame(0x104, struct.pack("<Bhh3x", 2, -3, 4))) == []
+    assert driver.tally.ignored == 1
+
+
+@pytest.mark.parametrize("data", [b"", b"\x01", bytes([7, 0, 0, 0, 0, 0, 0, 0])])
+def test_a_multiplexed_message_that_cannot_be_read_is_refused(data: bytes) -> None:
+    driver = counts(left="Muxed.MuxL", right="Muxed.MuxR", counter_bits=16)
+    assert driver.on_frame(frame(0x104, data)) == []
+    assert driver.tally.refused == {WheelRefusal.MALFORMED: 1}
+
+
+@pytest.mark.parametrize(
+    ("keys", "sentence"),
+    [
+        ({"left": "Nothing.Count"}, 'wheels.left = "Nothing.Count": no message Nothing in the DBC'),
+        ({"right": "Encoders.X"}, "no signal X in the DBC file; there are CountL, CountR"),
+        ({"counter_bits": 32}, "the signal has only 24 bits, counter_bits = 32"),
+        ({"left": "Estimates.Turns"}, "counts must be an integer signal"),
+        ({"left_node": 1}, "give both left_node and right_node"),
+        ({"left_node": 1, "right_node": 2}, "needs an id_mask that leaves room"),
+    ],
+)
+def test_a_section_that_does_not_fit_the_file_is_one_sentence(
+    keys: dict[str, Any], sentence: str
+) -> None:
+    with pytest.raises(ConfigError) as caught:
+        counts(**keys)
+    (fault,) = caught.value.faults
+    assert fault.startswith("wheels")
+    assert sentence in fault
+
+
+@pytest.mark.parametrize("text", ["not a DBC file", 'VERSION "', NO_ROOM])
+def test_a_file_that_is_no_dbc_is_one_sentence(text: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        DbcDriver(section(counts_per_metre=1.0, left="A.B", right="A.B"), text)
+    (fault,) = caught.value.faults
+    assert fault.startswith("wheels.dbc_file: not a DBC file")
+    assert "\n" not in fault
+
+
+def test_without_cantools_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "cantools.database", None)
+    with pytest.raises(ConfigError, match=r"pip install drslamd\[can\]"):
+        counts()
+
+
+@settings(derandomize=True, max_examples=200, deadline=None)
+@given(st.sampled_from([0x100, 0x102, 0x103, 0x104, 9]), st.binary(max_size=12), st.booleans())
+def test_no_frame_makes_the_driver_raise(can_id: int, data: bytes, extended: bool) -> None:
+    for driver in (
+        counts(),
+        counts(left="LeftWheel.Count", right="RightWheel.Count", counter_bits=32),
+        counts(left="Muxed.MuxL", right="Muxed.MuxR", counter_bits=16),
+    ):
+        driver.on_frame(frame(can_id, data, extended=extended))
+        assert driver.tally.received == 1

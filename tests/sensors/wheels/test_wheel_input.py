@@ -1,0 +1,221 @@
+"""The wheel sensor as the robot uses it: from a section of the configuration to motions."""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import Any
+
+import pytest
+from frames import SECOND_US, ascii_line, kobuki_core, kobuki_packet
+
+from drslamd.config import (
+    SOURCES,
+    AgilexSection,
+    AsciiSection,
+    KobukiSection,
+    OdriveSection,
+    RoboteqSection,
+)
+from drslamd.events import CanFrame
+from drslamd.sensors.samples import Motion
+from drslamd.sensors.wheels import wheel_input
+from drslamd.sensors.wheels.wheel_input import WheelInput
+
+MS = 1000
+T0 = 100 * SECOND_US
+
+
+def kobuki(**keys: Any) -> WheelInput:
+    return WheelInput(KobukiSection(source="kobuki", port="x", **keys))
+
+
+def ascii_base(**keys: Any) -> WheelInput:
+    section = {"source": "ascii", "port": "x", "track_m": 0.5, "counts_per_metre": 1000.0}
+    return WheelInput(AsciiSection.model_validate({**section, **keys}))
+
+
+def roboteq(**keys: Any) -> WheelInput:
+    section = {"source": "roboteq", "port": "x", "track_m": 0.5, "counts_per_metre": 1000.0}
+    return WheelInput(RoboteqSection.model_validate({**section, **keys}))
+
+
+def agilex() -> WheelInput:
+    return WheelInput(AgilexSection(source="agilex", track_m=0.5))
+
+
+def odometry(utime: int, left: int, right: int) -> CanFrame:
+    return CanFrame(utime, 0x311, False, struct.pack(">ii", left, right))
+
+
+# ---- every section -----------------------------------------------------------------------------
+
+
+def test_there_is_a_driver_for_every_section_of_the_configuration() -> None:
+    assert set(wheel_input.SOURCES) == set(SOURCES.values())
+
+
+def test_kobuki_from_bytes_to_metres() -> None:
+    wheels = kobuki()
+    moved = []
+    for k in range(5):
+        packet = kobuki_packet(kobuki_core(65530 + 20 * k, 65500 + 117 * k, 65500 + 117 * k))
+        moved += wheels.feed(packet, T0 + k * 20 * MS)
+    assert moved[0] == Motion(T0 + 20 * MS, 0.0, 0.0, gap=True)
+    assert [m.distance_m for m in moved[1:]] == pytest.approx([117 / 11_724.4] * 3)
+
+
+def test_roboteq_from_polls_to_metres() -> None:
+    wheels = roboteq(swap_channels=True, poll_hz=50.0, reverse_left=True)
+    moved = []
+    for k in range(3):
+        assert wheels.poll(T0 + k * 20 * MS).endswith(b"?C\r")
+        moved += wheels.feed(b"C=%d:%d\r" % (10 * k, -10 * k), T0 + k * 20 * MS + 3 * MS)
+    assert [m.distance_m for m in moved] == pytest.approx([0.0, 0.01, 0.01])
+
+
+def test_the_ascii_line_from_bytes_to_metres() -> None:
+    wheels = ascii_base()
+    lines = b"".join(ascii_line(1000 + 20 * k, 10 * k, 20 * k) for k in range(4))
+    moved = wheels.feed(lines, T0)
+    # all came at once: with one arrival there is one time, and no motion is lost
+    moved += wheels.feed(ascii_line(1080, 40, 80), T0 + 20 * MS)
+    assert sum(m.turn_rad for m in moved) == pytest.approx((60 - 30) / 1000 / 0.5)
+
+
+def test_odrive_from_frames_to_metres_by_gear_and_radius() -> None:
+    wheels = WheelInput(
+        OdriveSection(
+            source="odrive", track_m=0.5, left_axis=0, right_axis=1, wheel_radius_m=0.1, gear=10.0
+        )
+    )
+    moved = []
+    for k in range(4):
+        for axis in (1, 0):
+            data = struct.pack("<ff", 0.5 * k, 0.0)
+            moved += wheels.on_frame(CanFrame(T0 + k * 10 * MS, axis << 5 | 9, False, data))
+    distance = 0.5 / 10 * 2 * math.pi * 0.1
+    assert [m.distance_m for m in moved] == pytest.approx([0.0, distance, distance])
+
+
+def test_agilex_from_frames_to_metres() -> None:
+    wheels = agilex()
+    moved = wheels.on_frame(odometry(T0, 22_059, 25_650))
+    moved += wheels.on_frame(odometry(T0 + 20 * MS, 22_069, 25_640))
+    assert (moved[1].utime, moved[1].gap) == (T0 + 20 * MS, False)
+    assert (moved[1].distance_m, moved[1].turn_rad) == pytest.approx((0.0, -0.04))
+
+
+def test_a_power_cycle_of_the_base_is_a_gap() -> None:
+    wheels = agilex()
+    wheels.on_frame(odometry(T0, 50_000, 50_000))
+    (motion,) = wheels.on_frame(odometry(T0 + 3 * SECOND_US, 0, 0))
+    assert motion.gap
+
+
+# ---- the wrong kind of input is a mistake of the programmer ------------------------------------
+
+
+def test_a_serial_base_reads_no_can_frames() -> None:
+    with pytest.raises(TypeError, match="KobukiDriver reads bytes"):
+        kobuki().on_frame(odometry(T0, 0, 0))
+
+
+def test_a_can_base_reads_no_bytes_and_asks_nothing() -> None:
+    with pytest.raises(TypeError, match="AgilexDriver reads CAN frames"):
+        agilex().feed(b"x", T0)
+    assert agilex().poll(T0) == b""
+    assert kobuki().poll(T0) == b""
+
+
+# ---- advice and counters -----------------------------------------------------------------------
+
+
+def driving(until_ms: int = 1000) -> WheelInput:
+    wheels = ascii_base()
+    for k in range(0, until_ms + 1, 20):
+        wheels.feed(ascii_line(1000 + k, k, k), T0 + k * MS)
+    return wheels
+
+
+def test_a_base_that_drives_needs_no_advice() -> None:
+    wheels = driving()
+    assert wheels.advice(T0 + SECOND_US) is None
+    assert wheels.last_motion_utime == T0 + SECOND_US
+
+
+def test_before_anything_came_the_power_is_suspected() -> None:
+    assert "nothing from the wheels yet" in str(kobuki().advice(T0))
+
+
+@pytest.mark.parametrize(("after_ms", "told"), [(2000, False), (2001, True)])
+def test_silence_is_told(after_ms: int, told: bool) -> None:
+    advice = driving().advice(T0 + after_ms * MS)
+    expected = "nothing from the wheels for 1 s: check the power of the base and the cable"
+    assert advice == (expected if told else None)
+
+
+@pytest.mark.parametrize(("after_s", "told"), [(4.9, False), (5.0, True)])
+def test_bytes_without_samples_lead_to_the_baud_rate(after_s: float, told: bool) -> None:
+    wheels = kobuki()
+    for k in range(51):
+        wheels.feed(b"\x00\x80" * 10, T0 + k * 100 * MS)
+    advice = wheels.advice(T0 + round(after_s * SECOND_US))
+    assert (advice is not None) == told
+    assert not told or advice == (
+        "input, but no Kobuki packets (AA 55 ...) for 5 s: is wheels.baud right?"
+    )
+
+
+def test_other_can_frames_lead_to_the_bus() -> None:
+    wheels = agilex()
+    for k in range(60):
+        wheels.on_frame(CanFrame(T0 + k * 100 * MS, 0x7FF, False, b""))
+    assert "CAN id 0x311 (or 0x221) for 5 s: is this the bus" in str(
+        wheels.advice(T0 + 59 * 100 * MS)
+    )
+
+
+def test_odometry_that_stops_on_a_busy_bus_leads_to_the_bus() -> None:
+    wheels = agilex()
+    for k in range(120):
+        utime = T0 + k * 100 * MS
+        wheels.on_frame(odometry(utime, k, k) if k < 60 else CanFrame(utime, 0x7FF, False, b""))
+    assert "no AgileX CAN id 0x311 (or 0x221) for 6 s" in str(wheels.advice(utime))
+
+
+def test_counters_that_are_always_too_fast_lead_to_the_scale() -> None:
+    wheels = ascii_base(counts_per_metre=1.0)
+    for k in range(300):
+        wheels.feed(ascii_line(1000 + 20 * k, 100 * k, 100 * k), T0 + k * 20 * MS)
+    advice = str(wheels.advice(T0 + 299 * 20 * MS))
+    assert "max_speed_mps" in advice
+    assert "counts_per_metre" in advice
+
+
+def test_speeds_that_come_too_rarely_lead_to_the_rate() -> None:
+    wheels = agilex()
+    for k in range(12):
+        data = struct.pack(">hh", 500, 0)
+        wheels.on_frame(CanFrame(T0 + k * 600 * MS, 0x221, False, data))
+    assert "too rarely" in str(wheels.advice(T0 + 11 * 600 * MS))
+
+
+def test_what_the_base_reports_is_passed_on() -> None:
+    wheels = agilex()
+    wheels.on_frame(CanFrame(T0, 0x211, False, bytes([2, 0, 1, 0, 0, 4, 0, 0])))
+    assert "the base reports a fault" in str(wheels.advice(T0))
+
+
+def test_counters_have_flat_names() -> None:
+    wheels = driving(60)
+    wheels.feed(b"hello\r\n", T0 + 60 * MS)
+    assert wheels.counters() == {
+        "messages.accepted": 3,
+        "messages.ignored": 1,
+        "messages.unpaired": 0,
+        "messages.refused.TIME": 1,
+        "samples.accepted": 3,
+        "samples.ignored": 0,
+        "gaps.START": 1,
+    }

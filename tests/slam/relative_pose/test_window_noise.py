@@ -1,0 +1,193 @@
+"""The noise of a window, against the residuals of many noisy windows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from slam_scenes import NOISE, Array, seen_from_last, wander
+
+from drslamd.slam import se2
+from drslamd.slam.odometry.track import OdometryNoise
+from drslamd.slam.relative_pose.window import Window
+from drslamd.slam.relative_pose.window_noise import (
+    SLOW_SHARE,
+    SLOW_TIME_S,
+    RangeNoise,
+    WindowNoise,
+    moments,
+    near_bias,
+    odometry_covariance,
+    range_covariance,
+    twists,
+)
+
+QUIET = OdometryNoise(1e-12, 1e-12, 1e-12, 1e-12)
+PARTS = {
+    "scale": replace(QUIET, scale=0.03),
+    "yaw": replace(QUIET, yaw_rad_per_m=math.radians(0.15)),
+    "random translation": replace(QUIET, translation_per_sqrt_m=0.01),
+    "random yaw": replace(QUIET, yaw_rad_per_sqrt_m=math.radians(0.5)),
+    "everything": NOISE,
+}
+
+FAR = np.full(4, 50.0)
+"""Where the bias of short ranges is none."""
+
+
+def from_lower(lower: Array) -> Array:
+    """The whole of a symmetric matrix."""
+    return np.asarray(np.tril(lower) + np.tril(lower, -1).T)
+
+
+def of_one_robot(
+    points: Array, path: Array, directions: Array, noise: OdometryNoise, before: int
+) -> Array:
+    moment = moments(points @ [1, 1j], directions @ [1, 1j])
+    twist = twists(path[None], [noise], before)
+    return from_lower(odometry_covariance(twist, moment[None, None], before)[0])
+
+
+def noisy_windows(
+    rng: np.random.Generator, path: Array, noise: OdometryNoise, drives: int, reference: int
+) -> Array:
+    """(drives, n, 3) a path as noisy odometry has it, each seen from its own pose `reference`."""
+    step = se2.between(path[:-1], path[1:])
+    length = np.hypot(step[:, 0], step[:, 1])
+    scale = 1 + rng.normal(0, noise.scale, drives)
+    bend = rng.normal(0, noise.yaw_rad_per_m, drives)
+    poses = [np.zeros((drives, 3))]
+    for m in range(len(step)):
+        root = math.sqrt(length[m])
+        turn = bend * length[m] + rng.normal(0, noise.yaw_rad_per_sqrt_m * root, drives)
+        shift = rng.normal(0, noise.translation_per_sqrt_m * root, (drives, 2))
+        nothing = np.zeros(drives)
+        half_turn = np.column_stack([nothing, nothing, turn / 2])
+        move = np.column_stack([scale[:, None] * step[m, :2] + shift, nothing + step[m, 2]])
+        pose = poses[-1]
+        for part in (half_turn, move, half_turn):
+            pose = se2.compose(pose, part)
+        poses.append(pose)
+    stack = np.stack(poses, axis=1)
+    return se2.between(stack[:, reference, None], stack)
+
+
+@pytest.mark.parametrize("reference", [39, 30])
+@pytest.mark.parametrize("part", PARTS)
+def test_what_odometry_does_to_residuals_is_what_noisy_drives_do(part: str, reference: int) -> None:
+    noise, rng, drives = PARTS[part], np.random.default_rng(11), 6000
+    path = wander(rng, 40, 0.25)
+    true = se2.between(path[reference], path)
+    antenna = np.array([0.15, -0.1])
+    points = se2.transform(true, antenna)
+    target = np.array([3.0, 5.0])
+    sight = target - points
+    directions = sight / np.hypot(*sight.T)[:, None]
+    wrong = se2.transform(noisy_windows(rng, path, noise, drives, reference), antenna)
+    # first order: the range changes by the error along the line of sight
+    residuals = -np.sum((wrong - points) * directions, axis=2)
+    seen = residuals.T @ residuals / drives
+    predicted = of_one_robot(points, true[:, :2], directions, noise, reference + 1)
+    sigma = np.sqrt(np.diag(predicted) + 1e-6)  # of less than a millimetre nothing is claimed
+    assert np.abs((seen - predicted) / np.outer(sigma, sigma)).max() < 0.13
+    assert sigma[0] > 2 * sigma[reference - 4]
+
+
+def test_the_measurement_at_the_reference_time_is_not_touched_by_odometry() -> None:
+    path = seen_from_last(wander(np.random.default_rng(12), 20, 0.25))
+    directions = np.tile([0.6, 0.8], (20, 1))
+    covariance = of_one_robot(path[:, :2], path[:, :2], directions, NOISE, 20)
+    assert np.abs(covariance[-1]).max() < 1e-15
+
+
+def test_one_measurement_has_no_odometry_in_it() -> None:
+    one = np.zeros((1, 2))
+    assert of_one_robot(one, one, np.array([[1.0, 0.0]]), NOISE, 1).tolist() == [[0.0]]
+
+
+def test_ranges_share_a_bias_and_a_slow_part() -> None:
+    noise = RangeNoise(0.1, 0.3)
+    t = np.array([-9.0, -8.0, -3.0, 0.0])
+    rng, count = np.random.default_rng(13), 200_000
+    slow = np.empty((count, 4))
+    slow[:, 0] = rng.normal(size=count)
+    for k, gap in enumerate(np.diff(t)):
+        keep = math.exp(-gap / SLOW_TIME_S)
+        slow[:, k + 1] = keep * slow[:, k] + math.sqrt(1 - keep**2) * rng.normal(size=count)
+    white = math.sqrt(1 - SLOW_SHARE**2)
+    errors = 0.1 * (SLOW_SHARE * slow + white * rng.normal(size=(count, 4)))
+    errors += 0.3 * rng.normal(size=(count, 1))
+    seen = errors.T @ errors / count
+    assert np.allclose(range_covariance(t, FAR, noise), seen, atol=1e-3)
+
+
+def drive(reference: int) -> tuple[Window, Array, Array]:
+    """A window of 40 measurements, and the antennas of both robots (complex)."""
+    rng = np.random.default_rng(14)
+    a, b = (wander(rng, 40, 0.25) for _ in range(2))
+    a, b = se2.between(a[reference], a), se2.between(b[reference], b)
+    t = 0.5 * (np.arange(40.0) - reference)
+    antennas = np.array([0.15, -0.1]), np.array([-0.2, 0.3])
+    window = Window(t, np.full(40, 50.0), a, b, *antennas)
+    return window, window.a_points, window.b_points
+
+
+@pytest.mark.parametrize("reference", [39, 30, 0])
+def test_the_noise_of_a_window_is_that_of_its_ranges_and_both_robots(reference: int) -> None:
+    window, a, b = drive(reference)
+    ranges, of_b = RangeNoise(0.1, 0.3), replace(NOISE, scale=0.06)
+    heading = np.array([0.7, -2.0])
+    u = np.exp(1j * np.random.default_rng(15).uniform(-0.5, 0.5, (2, 40)))
+    covariance = WindowNoise(window, a, b, ranges, NOISE, of_b).covariance(
+        u, np.exp(1j * heading), np.ones((2, 40))
+    )
+    for k in range(2):
+        in_a = np.stack([u[k].real, u[k].imag], axis=-1)
+        in_b = se2.rotate(-heading[k], in_a)
+        expected = (
+            range_covariance(window.t, window.ranges, ranges)
+            + of_one_robot(a, window.a_poses[:, :2], in_a, NOISE, reference + 1)
+            + of_one_robot(b, window.b_poses[:, :2], in_b, of_b, reference + 1)
+        )
+        assert np.allclose(from_lower(covariance[k]), expected, rtol=0, atol=1e-12)
+        assert np.linalg.eigvalsh(expected)[0] > 0
+
+
+def test_an_outlier_that_weighs_a_quarter_is_twice_as_uncertain() -> None:
+    window, a, b = drive(39)
+    noise = WindowNoise(window, a, b, RangeNoise(0.1, 0.3), QUIET, QUIET)
+    weights = np.ones((2, 40))
+    weights[1, 7] = 0.25
+    plain, thinned = noise.covariance(np.ones((2, 40)) + 0j, np.ones(2) + 0j, weights)
+    assert plain[7, 7] == pytest.approx(0.1**2 + 0.3**2)
+    assert thinned[7, 7] == pytest.approx(0.2**2 + 0.3**2)
+    assert np.count_nonzero(np.tril(thinned - plain)) == 1
+
+
+def test_short_ranges_share_a_bias_of_their_own() -> None:
+    """As LinkTrack modules were measured: 0.13 m more at 0.5 m, 0.07 m at 1.5 m, none beyond."""
+    assert near_bias(np.array([0.5, 1.5, 8.0])) == pytest.approx([0.14, 0.07, 0.0], abs=0.01)
+    assert near_bias(-0.3) == near_bias(0.0)
+    t, noise = np.array([-100.0, 0.0]), RangeNoise(0.1, 0.3)
+    near = range_covariance(t, np.array([0.5, 1.5]), noise)
+    far = range_covariance(t, FAR[:2], noise)
+    # at one short range as at the other, so their errors add to each other's covariance
+    assert near[0, 1] - far[0, 1] == pytest.approx(0.143 * 0.074, abs=1e-3)
+    assert near[1, 1] - far[1, 1] == pytest.approx(0.074**2, abs=1e-3)
+
+
+@pytest.mark.parametrize("scatter", [0.6, 1.5])
+def test_what_follows_ranges_is_as_wrong_as_they_scatter(scatter: float) -> None:
+    window, a, b = drive(30)
+    said = WindowNoise(window, a, b, RangeNoise(0.1, 0.3, scatter), NOISE, NOISE)
+    true = WindowNoise(window, a, b, RangeNoise(0.1 * scatter, 0.3), NOISE, NOISE)
+    rng = np.random.default_rng(16)
+    u, heading, ones = np.exp(1j * rng.uniform(size=(2, 40))), np.ones(2) + 0j, np.ones((2, 40))
+    gain = rng.normal(size=(2, 3, 40))
+    for k, excess in enumerate(said.excess(gain)):
+        covariances = [from_lower(n.covariance(u, heading, ones)[k]) for n in (said, true)]
+        wrong, right = (gain[k] @ c @ gain[k].T for c in covariances)
+        assert np.allclose(wrong + excess, right, rtol=0, atol=1e-9)
+        assert np.abs(excess).max() > 0.01

@@ -1,0 +1,1 @@
+"""tools/accuracy: every real recording, one set of parameters, one table."""

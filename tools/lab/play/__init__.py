@@ -1,0 +1,1 @@
+"""Recordings played to the team: emulated hardware, virtual time, real processes."""

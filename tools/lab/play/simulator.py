@@ -1,0 +1,247 @@
+"""Virtual time: N robots and one heap of times, a lossy network, one seed.
+
+The robots are the very objects that the daemon runs; only the clock, the wires and the radio are
+made up. A computation takes the virtual time that it took in reality, unless `solve_us` says how
+long, which makes a run repeatable to the bit.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import time
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from drslamd.config import Config
+from drslamd.events import (
+    Datagram,
+    Effect,
+    Event,
+    JobDone,
+    Note,
+    Restart,
+    Save,
+    Send,
+    SerialData,
+    Solve,
+    Stop,
+    Tick,
+    Write,
+)
+from drslamd.gossip import lc02
+from drslamd.gossip.seal import team_key
+from drslamd.robot import Robot
+from drslamd.slam.calibration.calibration_store import UNLEARNED, Constants
+from lab.play.playback import Chunk, Hardware
+
+
+@dataclass(frozen=True)
+class Clock:
+    """A robot's own clock: how far ahead of the world it is, and how fast it runs."""
+
+    offset_us: int = 0
+    ppm: float = 0.0
+
+    def local(self, t_us: int) -> int:
+        return t_us + self.offset_us + round(t_us * self.ppm * 1e-6)
+
+    def world(self, local_us: int) -> int:
+        """The first moment at which this clock shows `local_us` or more."""
+        t_us = int((local_us - self.offset_us) / (1 + self.ppm * 1e-6)) - 1
+        while self.local(t_us) < local_us:
+            t_us += 1
+        return t_us
+
+
+@dataclass
+class Network:
+    """A shared channel. Times in us."""
+
+    loss: float = 0.0
+    delay_us: int = 2_000
+    jitter_us: int = 2_000
+    duplicate: float = 0.0
+    connected: Callable[[int, int, int], bool] = lambda a, b, t: True
+    """Does a message from a reach b at time t?"""
+
+    def arrivals(self, rng: np.random.Generator, t_us: int) -> list[int]:
+        copies = 2 if rng.random() < self.duplicate else 1
+        return [
+            t_us + self.delay_us + int(rng.integers(0, self.jitter_us + 1))
+            for _ in range(copies)
+            if rng.random() >= self.loss
+        ]
+
+
+@dataclass
+class Traces:
+    """What left a robot."""
+
+    sent: list[tuple[int, str, bytes]] = field(default_factory=list)
+    notes: list[tuple[int, Note]] = field(default_factory=list)
+    saved: list[Save] = field(default_factory=list)
+    solve_ms: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+
+
+@dataclass
+class Member:
+    """One robot of the simulated team."""
+
+    robot: Robot
+    renew: Callable[[int], Robot]
+    clock: Clock
+    hardware: Hardware | None
+    traces: Traces
+    running: bool = True
+    tick_at: int = -1
+
+
+class Simulator:
+    """A team in virtual time."""
+
+    def __init__(
+        self, seed: int = 0, network: Network | None = None, solve_us: int | None = 20_000
+    ) -> None:
+        self.now = 0
+        self.network = network or Network()
+        self.members: dict[int, Member] = {}
+        """By robot id, the latest start of each."""
+        self._everyone: list[Member] = []
+        self._rng = np.random.default_rng(seed)
+        self._solve_us = solve_us
+        self._heap: list[tuple[int, int, Callable[[], None]]] = []
+        self._order = itertools.count()
+        self._sequence = itertools.count()
+
+    def add(
+        self,
+        config: Config,
+        clock: Clock | None = None,
+        hardware: Hardware | None = None,
+        secret: bytes | None = None,
+        epoch: int = 1,
+        epochs: dict[int, int] | None = None,
+        kept: Constants = UNLEARNED,
+    ) -> Member:
+        """Switch a robot on, now."""
+
+        def renew(fresh: int) -> Robot:
+            return Robot(config, team_key(secret), fresh, dict(epochs or {}), kept)
+
+        member = Member(renew(epoch), renew, clock or Clock(), hardware, Traces())
+        self.members[config.robot.id] = member
+        self._everyone.append(member)
+        self._tick(member)
+        return member
+
+    def play(self, member: Member, chunks: Sequence[Chunk]) -> None:
+        """Let a robot's devices print."""
+        iterator = iter(chunks)
+
+        def step() -> None:
+            chunk = next(iterator, None)
+            if chunk is None or not member.running:
+                return
+
+            def deliver() -> None:
+                self.feed(member, chunk.port, chunk.printed())
+                step()
+
+            self.at(round(chunk.t * 1e6), deliver)
+
+        step()
+
+    def feed(self, member: Member, port: Any, data: bytes) -> None:
+        """Bytes arrive at a port of a robot, now."""
+        if data:
+            self.handle(member, lambda utime: SerialData(utime, port, data))
+
+    def at(self, t_us: int, action: Callable[[], None]) -> None:
+        heapq.heappush(self._heap, (max(t_us, self.now), next(self._order), action))
+
+    def run(self, until_s: float) -> None:
+        """Let time pass."""
+        until = round(until_s * 1e6)
+        while self._heap and self._heap[0][0] <= until:
+            self.now, _, action = heapq.heappop(self._heap)
+            action()
+        self.now = until
+
+    def stop(self, member: Member) -> None:
+        """Orderly end of one robot."""
+        self.handle(member, Stop)
+        member.running = False
+
+    def kill(self, member: Member) -> None:
+        """The robot's power is cut."""
+        member.running = False
+
+    def handle(self, member: Member, make: Callable[[int], Event]) -> None:
+        if not member.running:
+            return
+        effects = member.robot.handle(make(member.clock.local(self.now)))
+        for effect in effects:
+            self._carry_out(member, effect)
+        self._tick(member)
+
+    def _tick(self, member: Member) -> None:
+        """Wake the robot when it wants to be woken."""
+        due = max(member.clock.world(member.robot.next_tick), self.now)
+        if self.now < member.tick_at <= due:
+            return
+        member.tick_at = due
+
+        def tick() -> None:
+            if member.tick_at == due:
+                member.tick_at = -1
+                self.handle(member, Tick)
+
+        self.at(due, tick)
+
+    def _carry_out(self, member: Member, effect: Effect) -> None:
+        if isinstance(effect, Send):
+            self._send(member, effect)
+        elif isinstance(effect, Solve):
+            self._solve(member, effect)
+        elif isinstance(effect, Write):
+            if member.hardware is not None:
+                self.feed(member, effect.port, member.hardware.base.answer(effect.data))
+        elif isinstance(effect, Note):
+            member.traces.notes.append((self.now, effect))
+        elif isinstance(effect, Save):
+            member.traces.saved.append(effect)
+        elif isinstance(effect, Restart):
+            member.robot = member.renew(effect.epoch)
+
+    def _send(self, sender: Member, effect: Send) -> None:
+        data = lc02.encode(next(self._sequence), effect.channel, effect.payload)
+        sender.traces.sent.append((self.now, effect.channel, effect.payload))
+        source = sender.robot.own.robot
+        for member in self._everyone:
+            target = member.robot.own.robot
+            if member is not sender and self.network.connected(source, target, self.now):
+                for arrival in self.network.arrivals(self._rng, self.now):
+                    self.at(arrival, lambda m=member: self._arrive(m, data, source))  # type: ignore[misc]
+
+    def _arrive(self, member: Member, data: bytes, source: int) -> None:
+        self.handle(member, lambda utime: Datagram(utime, data, f"robot {source}"))
+
+    def _solve(self, member: Member, effect: Solve) -> None:
+        robot, start = member.robot, time.perf_counter()
+        result = effect.run()
+        elapsed = time.perf_counter() - start
+        member.traces.solve_ms[effect.name].append(elapsed * 1e3)
+        took = round(elapsed * 1e6) if self._solve_us is None else self._solve_us
+        self.at(
+            self.now + took,
+            lambda: self._done(member, robot, effect.job_id, result, took),
+        )
+
+    def _done(self, member: Member, robot: Robot, job: int, result: Any, took: int) -> None:
+        if member.robot is robot:
+            self.handle(member, lambda utime: JobDone(utime, job, result, took))

@@ -1,0 +1,1 @@
+"""What came out: errors against the truth, tables, pictures."""
