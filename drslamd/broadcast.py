@@ -27,7 +27,7 @@ from drslamd.gossip.team import Team
 from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.front_end import FrontEnd
-from drslamd.slam.peer_in_range import Neighbour
+from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.se2 import Array
 
 QUIET_US = 3 * SECOND_US
@@ -58,7 +58,7 @@ class Broadcast:
     # ---- heartbeat ----
 
     def heartbeat(
-        self, neighbours: list[Neighbour], uwb_clock: int | None, utime: int
+        self, neighbours: list[PeerInRange], uwb_clock: int | None, utime: int
     ) -> list[Effect]:
         """Our status, unless it says what it said a second ago.
 
@@ -83,7 +83,7 @@ class Broadcast:
 
     def status(
         self,
-        neighbours: list[Neighbour],
+        neighbours: list[PeerInRange],
         uwb_clock: int | None,
         utime: int,
         leaving: bool = False,
@@ -105,7 +105,7 @@ class Broadcast:
 
     # ---- odometry ----
 
-    def odometry(self, neighbours: list[Neighbour], utime: int) -> list[Effect]:
+    def odometry(self, neighbours: list[PeerInRange], utime: int) -> list[Effect]:
         """Short-term odometry, for peers whose windows need it (paper III-C)."""
         track = self._front.reckoning.track
         wants = [self._lacked(peer) for peer in neighbours if peer.wanted_n != NOTHING_WANTED]
@@ -118,7 +118,7 @@ class Broadcast:
         batch = OdometryBatch(track.segment_start, n0, track.steps(n0, track.end - n0))
         return [self._team.send(batch, utime)]
 
-    def _lacked(self, peer: Neighbour) -> int:
+    def _lacked(self, peer: PeerInRange) -> int:
         """First sample to say to a peer: what we said counts as heard until it should know."""
         said = self._odometry_said
         known = [end for at, end in said if at + ON_THE_AIR_US < peer.wanted_at]

@@ -46,7 +46,7 @@ from drslamd.io.systemd import Notifier
 from drslamd.io.transport import Transport
 from drslamd.io.worker import Finished, Worker
 from drslamd.robot import Robot
-from drslamd.slam.calibration.calibration_store import Constants
+from drslamd.slam.calibration.calibration_store import SensorCalibration
 
 JOB_STUCK_US = 20 * SECOND_US
 """A computation that takes longer is no progress, and the watchdog is not fed."""
@@ -71,7 +71,7 @@ class Daemon:
         state = self._store.load()
         self._start_faults = [self._store.fault]
         epochs = {int(robot): int(epoch) for robot, epoch in state.get("epochs", {}).items()}
-        kept = Constants.of_state(state.get("calibration", {}))
+        kept = SensorCalibration.of_state(state.get("calibration", {}))
         self._new_robot = partial(Robot, config, team_key(secret), dbc_text=_dbc_text(config))
         self.robot = self._new_robot(next_epoch(state, wall_epoch()), epochs, kept)
         # the new epoch is on disk before anything is sent under it

@@ -14,7 +14,7 @@ from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.wheels.wheel_input import WheelInput
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.front_end import FrontEnd
-from drslamd.slam.peer_in_range import Neighbour
+from drslamd.slam.peer_in_range import PeerInRange
 
 PATIENCE_US = 3 * SECOND_US
 """How long an open port may be silent before that is worth a word."""
@@ -40,7 +40,7 @@ class Stages(Protocol):
     network: NetworkState | None
     cycles: dict[str, tuple[int, int]]
 
-    def neighbours(self, utime: int) -> list[Neighbour]: ...
+    def neighbours(self, utime: int) -> list[PeerInRange]: ...
 
 
 def conditions(robot: Stages, utime: int) -> Iterator[Condition]:

@@ -14,8 +14,8 @@ from drslamd.conventions import GRID_US, SECOND_US
 from drslamd.events import PortCondition
 from drslamd.gossip.peer import Peer
 from drslamd.robot import Robot
-from drslamd.slam.consistency.pair import Pair
-from drslamd.slam.graph.trajectory import bent
+from drslamd.slam.consistency.pair import PairTracker
+from drslamd.slam.graph.trajectory import deform_track
 
 
 def age_s(utime: int, then: int | None) -> float | None:
@@ -130,7 +130,7 @@ def _peer(robot: Robot, peer: Peer, utime: int) -> dict[str, Any]:
     }
 
 
-def _pair(pair: Pair) -> dict[str, Any]:
+def _pair(pair: PairTracker) -> dict[str, Any]:
     return {
         "connected": pair.established,
         "windows": dict(pair.verdicts),
@@ -171,7 +171,9 @@ def trajectories(robot: Robot) -> dict[str, Any]:
     for number, solved in sorted(estimate.trajectories.items()):
         n, poses = solved.n, solved.poses
         if number == robot.own.robot:
-            n, poses = bent(robot.front.reckoning.track, robot.back.history.latest or solved)
+            n, poses = deform_track(
+                robot.front.reckoning.track, robot.back.history.latest or solved
+            )
         out[str(number)] = {
             "epoch": solved.chain.epoch,
             "utime": (n * GRID_US).astype(int).tolist(),

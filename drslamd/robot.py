@@ -50,11 +50,15 @@ from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.wheels.wheel_input import WheelInput
 from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
-from drslamd.slam.calibration.calibration_store import UNLEARNED, Constants, Memory
-from drslamd.slam.consistency.pair import Pair
+from drslamd.slam.calibration.calibration_store import (
+    UNLEARNED,
+    CalibrationStore,
+    SensorCalibration,
+)
+from drslamd.slam.consistency.pair import PairTracker
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.graph.measurements import GraphEntry
-from drslamd.slam.peer_in_range import Neighbour
+from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.relative_pose.pair_window import Request
 from drslamd.slam.se2 import Array
 
@@ -74,7 +78,7 @@ class _Job:
     """A computation under way: its module, the pair it is about, and its question."""
 
     module: str
-    pair: Pair | None = None
+    pair: PairTracker | None = None
     request: Request | None = None
 
 
@@ -83,7 +87,7 @@ class Robot:
 
     def __init__(
         self, config: Config, key: bytes, epoch: int, epochs: dict[int, int],
-        kept: Constants = UNLEARNED, dbc_text: str = "",
+        kept: SensorCalibration = UNLEARNED, dbc_text: str = "",
     ) -> None:  # fmt: skip
         """
         Args:
@@ -98,7 +102,7 @@ class Robot:
         self.uwb = LinkTrackInput(config.uwb_id, config.uwb.max_range_m)
         self.wheels = WheelInput(config.wheels, dbc_text)
         self.team = Team(Seal(key, config.robot.id, epoch, epochs))
-        self.memory = Memory(kept, config.relative_pose)
+        self.memory = CalibrationStore(kept, config.relative_pose)
         self.front = FrontEnd(config, self.own, self.memory.used)
         self.back = BackEnd(config, self.own)
         self.broadcast = Broadcast(config, self.team, self.front, self.back)
@@ -196,7 +200,7 @@ class Robot:
     def _send_odometry(self, utime: int) -> list[Effect]:
         return self.broadcast.odometry(self.neighbours(utime), utime)
 
-    def neighbours(self, utime: int) -> list[Neighbour]:
+    def neighbours(self, utime: int) -> list[PeerInRange]:
         """Living peers within UWB range of us, as either side measures it."""
         mine = set(self.front.ranged(utime))
         peers = (peer.neighbour(self.own, utime) for peer in self.team.living(utime).values())

@@ -27,11 +27,11 @@ from drslamd.gossip.message_types import (
 )
 from drslamd.slam import se2
 from drslamd.slam.graph.measurements import (
-    ClosureItem,
+    ClosureMeasurement,
     GraphEntry,
     Keyframe,
     PublicPoses,
-    RangeItem,
+    RangeMeasurement,
     RelativePoses,
 )
 
@@ -156,7 +156,7 @@ def _filled_peer(chain: Chain) -> Any:
     return out
 
 
-def _filled_range(item: RangeItem, peer: int) -> Any:
+def _filled_range(item: RangeMeasurement, peer: int) -> Any:
     out = lcmtypes.range_t()
     out.a_n, out.peer, out.b_n = item.a_n, peer, item.b_n
     out.qa, out.qb = ([round(v / MILLIMETRE_M) for v in q] for q in (item.q_a, item.q_b))
@@ -165,15 +165,15 @@ def _filled_range(item: RangeItem, peer: int) -> Any:
     return out
 
 
-def _read_range(r: Any, peers: list[Chain]) -> RangeItem:
+def _read_range(r: Any, peers: list[Chain]) -> RangeMeasurement:
     if min(r.peer, r.a_n, r.b_n) < 0 or r.sigma < 1:
         raise ValueError("range without peer, keyframe or sigma")
     q_a, q_b = ((q[0] * MILLIMETRE_M, q[1] * MILLIMETRE_M) for q in (r.qa, r.qb))
-    return RangeItem(r.a_n, peers[r.peer], r.b_n, q_a, q_b,
+    return RangeMeasurement(r.a_n, peers[r.peer], r.b_n, q_a, q_b,
                      r.range * TRANSLATION_STEP_M, r.sigma * MILLIMETRE_M)  # fmt: skip
 
 
-def _filled_closure(item: ClosureItem, peer: int) -> Any:
+def _filled_closure(item: ClosureMeasurement, peer: int) -> Any:
     out = lcmtypes.closure_t()
     out.number, out.kept = item.number, int(item.kept)
     out.a_n, out.peer, out.b_n = item.a_n, peer, item.b_n
@@ -183,14 +183,14 @@ def _filled_closure(item: ClosureItem, peer: int) -> Any:
     return out
 
 
-def _read_closure(c: Any, peers: list[Chain]) -> ClosureItem:
+def _read_closure(c: Any, peers: list[Chain]) -> ClosureMeasurement:
     if min(c.peer, c.number, c.a_n, c.b_n) < 0:
         raise ValueError("closure without peer, number or keyframe")
     full = se2.unpacked(c.covariance)
     if not np.isfinite(full).all() or np.linalg.eigvalsh(full)[0] <= 0:
         raise ValueError("closure with a covariance that is none")
     pose = (c.x * TRANSLATION_STEP_M, c.y * TRANSLATION_STEP_M, c.theta * ROTATION_STEP_RAD)
-    return ClosureItem(c.number, bool(_flag(c.kept)), c.a_n, peers[c.peer], c.b_n, pose,
+    return ClosureMeasurement(c.number, bool(_flag(c.kept)), c.a_n, peers[c.peer], c.b_n, pose,
                        tuple(c.covariance))  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from drslamd.gossip.message_types import (
 from drslamd.gossip.peer_clock import PeerClock
 from drslamd.slam.graph.measurements import PublicPoses
 from drslamd.slam.odometry.track import PEER_TRACK_SAMPLES, Track
-from drslamd.slam.peer_in_range import Neighbour
+from drslamd.slam.peer_in_range import PeerInRange
 
 SILENCE_US = 5 * SECOND_US
 """A robot says something every second (its pose, its odometry or its status): at 50 % loss a living
@@ -142,12 +142,12 @@ class Peer:
         """Whom it hears."""
         return {Chain(robot, named.heard.epoch) for robot, named in self._named.items()}
 
-    def neighbour(self, own: Chain, utime: int) -> Neighbour:
+    def neighbour(self, own: Chain, utime: int) -> PeerInRange:
         """What the front end must know of a living peer."""
         assert self.status is not None
         offset, of_us = self.clock.offset(utime), self._named_as(own)
         known = offset is not None and offset.uncertainty_us <= GRID_US
-        return Neighbour(
+        return PeerInRange(
             self.chain,
             self.status.uwb_id,
             of_us is not None and of_us.is_ranged,

@@ -15,11 +15,11 @@ from drslamd.gossip.messages import UNKNOWN_CLOCK, Heard, Message, OdometryBatch
 from drslamd.gossip.peer import SILENCE_US, Peer
 from drslamd.gossip.seal import Header, Seal, SealFault
 from drslamd.slam.graph.measurements import (
-    ClosureItem,
+    ClosureMeasurement,
     GraphEntry,
     Keyframe,
     PublicPoses,
-    RangeItem,
+    RangeMeasurement,
 )
 
 FORGET_US = 600 * SECOND_US
@@ -113,8 +113,8 @@ class Team:
         self,
         traits: tuple[float, ...],
         keyframes: Sequence[Keyframe],
-        ranges: Sequence[RangeItem],
-        closures: Sequence[ClosureItem],
+        ranges: Sequence[RangeMeasurement],
+        closures: Sequence[ClosureMeasurement],
     ) -> Iterator[GraphEntry]:
         """The next entries of our log, each small enough for one datagram."""
         items = [*keyframes, *ranges, *closures]
@@ -125,8 +125,8 @@ class Team:
                 seq,
                 traits if seq % TRAITS_EVERY == 0 else (),
                 tuple(i for i in part if isinstance(i, Keyframe)),
-                tuple(i for i in part if isinstance(i, RangeItem)),
-                tuple(i for i in part if isinstance(i, ClosureItem)),
+                tuple(i for i in part if isinstance(i, RangeMeasurement)),
+                tuple(i for i in part if isinstance(i, ClosureMeasurement)),
             )
 
     def send_sealed(self, owner: int, sealed: bytes) -> Send:

@@ -12,18 +12,18 @@ from drslamd.slam.graph import team_frame
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.history import History
 from drslamd.slam.graph.measurements import GraphEntry, PublicPoses
-from drslamd.slam.graph.pose_graph import TeamGraph
+from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.graph.thinning import Thinning
-from drslamd.slam.optimizer.banded.banded_optimizer import Banded
-from drslamd.slam.optimizer.closures.closure_optimizer import Closures
+from drslamd.slam.optimizer.banded.banded_optimizer import BandedOptimizer
+from drslamd.slam.optimizer.closures.closure_optimizer import ClosureOptimizer
 from drslamd.slam.optimizer.contract import Job, Optimizer
-from drslamd.slam.optimizer.rbcd.rbcd_optimizer import Rbcd
+from drslamd.slam.optimizer.rbcd.rbcd_optimizer import RbcdOptimizer
 
 OPTIMIZERS: dict[str, Callable[[Config, Chain], Optimizer]] = {
-    "banded": Banded,
-    "closures": Closures,
-    "rbcd": Rbcd,
+    "banded": BandedOptimizer,
+    "closures": ClosureOptimizer,
+    "rbcd": RbcdOptimizer,
 }
 """By `optimizer.algorithm`."""
 
@@ -34,7 +34,7 @@ class BackEnd:
     def __init__(self, config: Config, own: Chain) -> None:
         self._own = own
         self._optimizer = OPTIMIZERS[config.optimizer.algorithm](config, own)
-        self.graph = TeamGraph()
+        self.graph = PoseGraph()
         self._thinning = Thinning(self.graph)
         self.history = History()
         """Where we were."""

@@ -10,18 +10,18 @@ import numpy as np
 from drslamd.config import Config
 from drslamd.conventions import SECOND_US, Chain
 from drslamd.sensors.samples import Motion, RangeSample
-from drslamd.slam.calibration.calibration_store import UNLEARNED, Constants
-from drslamd.slam.calibration.window_calibration import Sensors, calibrated
-from drslamd.slam.consistency.pair import Checked, Pair
+from drslamd.slam.calibration.calibration_store import UNLEARNED, SensorCalibration
+from drslamd.slam.calibration.window_calibration import PairCalibration, calibrated_window
+from drslamd.slam.consistency.pair import Checked, PairTracker
 from drslamd.slam.graph.estimate import TeamEstimate
-from drslamd.slam.graph.measurements import ClosureItem, Keyframe, RangeItem
-from drslamd.slam.graph.pose_graph import TeamGraph
+from drslamd.slam.graph.measurements import ClosureMeasurement, Keyframe, RangeMeasurement
+from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.odometry.track import STEPS, DeadReckoning, OdometryNoise
-from drslamd.slam.peer_in_range import Neighbour
+from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.relative_pose import solver
-from drslamd.slam.relative_pose.pair_window import Request, Side, request
+from drslamd.slam.relative_pose.pair_window import PairEnd, Request, request
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
-from drslamd.slam.relative_pose.solver import Estimate
+from drslamd.slam.relative_pose.solver import RelativePoseEstimate
 from drslamd.slam.relative_pose.window_noise import RangeNoise
 
 KEYFRAME_M, KEYFRAME_RAD = 0.05, 0.05
@@ -34,7 +34,7 @@ RANGES_FRESH_US = 3 * SECOND_US
 class FrontEnd:
     """What this robot measures, prepared for the graph."""
 
-    def __init__(self, config: Config, own: Chain, known: Constants = UNLEARNED) -> None:
+    def __init__(self, config: Config, own: Chain, known: SensorCalibration = UNLEARNED) -> None:
         """
         Args:
             known: of our sensors, from before this start; it is taken out of what they say.
@@ -45,7 +45,7 @@ class FrontEnd:
         self.noise = self._known.narrowed(OdometryNoise.from_config(config.odometry))
         self.reckoning = DeadReckoning()
         self.ranges: dict[int, RangeBuffer] = {}
-        self.pairs: dict[int, Pair] = {}
+        self.pairs: dict[int, PairTracker] = {}
         self._segment = 0
         self._segment_start: int | None = None
         self._last: Keyframe | None = None
@@ -101,23 +101,23 @@ class FrontEnd:
 
     # ---- pairs ----
 
-    def _owns(self, peer: Neighbour) -> bool:
+    def _owns(self, peer: PeerInRange) -> bool:
         """Are we the one of the two that makes closures?"""
         return self._own.robot < peer.chain.robot or not peer.ranges_to_us
 
-    def needed(self, neighbours: list[Neighbour], utime: int) -> set[int]:
+    def needed(self, neighbours: list[PeerInRange], utime: int) -> set[int]:
         """Robots whose odometry our windows need."""
         mine = self.ranged(utime)
         return {p.chain.robot for p in neighbours if self._owns(p) and p.uwb_id in mine}
 
     def _sides(
-        self, neighbours: list[Neighbour], graph: TeamGraph, utime: int
-    ) -> list[tuple[Pair, Side, Side]]:
+        self, neighbours: list[PeerInRange], graph: PoseGraph, utime: int
+    ) -> list[tuple[PairTracker, PairEnd, PairEnd]]:
         """Owned pairs for which everything is at hand: ranges, both odometries, one clock."""
         own = graph.chains.get(self._own.robot)
         if own is None:
             return []
-        a = Side(self.reckoning.track, own)
+        a = PairEnd(self.reckoning.track, own)
         out = []
         for peer in neighbours:
             robot, ranges = peer.chain.robot, self.ranges.get(peer.uwb_id)
@@ -128,22 +128,22 @@ class FrontEnd:
                 continue
             pair = self.pairs.get(robot)
             if pair is None or pair.peer != peer.chain:
-                pair = self.pairs[robot] = Pair(self._config, peer.chain, ranges)
+                pair = self.pairs[robot] = PairTracker(self._config, peer.chain, ranges)
             pair.ranges = ranges
             ranges.bias_m = self._known.bias_to(robot).value
             if peer.ahead_us is None:
                 pair.count("clock of the peer not known well enough")
             else:
-                out.append((pair, a, Side(peer.track, items, peer.ahead_us)))
+                out.append((pair, a, PairEnd(peer.track, items, peer.ahead_us)))
         return out
 
     def module1(
         self,
-        neighbours: list[Neighbour],
-        graph: TeamGraph,
+        neighbours: list[PeerInRange],
+        graph: PoseGraph,
         estimate: TeamEstimate | None,
         utime: int,
-    ) -> list[tuple[Pair, Request, Callable[[], Estimate]]]:
+    ) -> list[tuple[PairTracker, Request, Callable[[], RelativePoseEstimate]]]:
         """The relative poses to be computed now: pair, window, computation.
 
         Args:
@@ -159,18 +159,20 @@ class FrontEnd:
         return out
 
     def _computation(
-        self, pair: Pair, what: Request, b: Side, estimate: TeamEstimate | None
-    ) -> Callable[[], Estimate]:
+        self, pair: PairTracker, what: Request, b: PairEnd, estimate: TeamEstimate | None
+    ) -> Callable[[], RelativePoseEstimate]:
         section, peer = self._config.relative_pose, pair.peer.robot
         if section.algorithm == "paper":
             return partial(solver.solve_paper, what.window, section.range_sigma_m, section.delta)
         bias_sigma = self._known.bias_sigma(peer, section.range_bias_sigma_m)
         ranges = RangeNoise(section.range_sigma_m, bias_sigma)
-        noise = solver.Noise(ranges, self.noise, b.items.noise)
-        sensors = Sensors.of(estimate if section.self_calibration else None, self._own.robot, peer)
-        return partial(solver.solve, *calibrated(what.window, noise, sensors), section.delta)
+        noise = solver.PairNoise(ranges, self.noise, b.items.noise)
+        sensors = PairCalibration.of(
+            estimate if section.self_calibration else None, self._own.robot, peer
+        )
+        return partial(solver.solve, *calibrated_window(what.window, noise, sensors), section.delta)
 
-    def module2(self, graph: TeamGraph) -> list[tuple[Pair, Callable[[], Checked]]]:
+    def module2(self, graph: PoseGraph) -> list[tuple[PairTracker, Callable[[], Checked]]]:
         """The consistency checks to be computed now: pair, computation."""
         out = []
         own = graph.chains.get(self._own.robot)
@@ -184,14 +186,14 @@ class FrontEnd:
         return out
 
     def range_items(
-        self, neighbours: list[Neighbour], graph: TeamGraph, utime: int
-    ) -> list[RangeItem]:
+        self, neighbours: list[PeerInRange], graph: PoseGraph, utime: int
+    ) -> list[RangeMeasurement]:
         """New distances for the graph."""
         sides = self._sides(neighbours, graph, utime)
         items = [pair.range_items.next(pair.ranges, a, b, pair.peer) for pair, a, b in sides]
         return [item for item in items if item is not None]
 
-    def closure_items(self) -> list[ClosureItem]:
+    def closure_items(self) -> list[ClosureMeasurement]:
         """Closures to tell the team, and to withdraw."""
         every = self._config.optimizer.algorithm != "banded"
         return [item for pair in self.pairs.values() for item in pair.news(every)]

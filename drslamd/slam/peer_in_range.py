@@ -9,7 +9,7 @@ from drslamd.slam.odometry.track import Track
 
 
 @dataclass(frozen=True)
-class Neighbour:
+class PeerInRange:
     """One start of one robot within UWB range.
 
     Attributes:

@@ -12,7 +12,12 @@ from drslamd.events import ChannelMessage, Send
 from drslamd.gossip import lc02, messages
 from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose
 from drslamd.gossip.team import ITEMS_PER_ENTRY, Team
-from drslamd.slam.graph.measurements import ClosureItem, Keyframe, PublicPoses, RangeItem
+from drslamd.slam.graph.measurements import (
+    ClosureMeasurement,
+    Keyframe,
+    PublicPoses,
+    RangeMeasurement,
+)
 
 TRAITS = (0.5, 0.25, 0.125, 0.0625, 0.5, -0.5, 0.25)
 
@@ -52,9 +57,11 @@ def test_an_entry_with_one_keyframe_has_72_bytes() -> None:
 
 
 KEYFRAMES = tuple(Keyframe(n, 0, n, n, n) for n in range(50))
-RANGES = tuple(RangeItem(n, Chain(n, 1), n, (0.0, 0.0), (0.0, 0.0), 3.0, 0.1) for n in range(50))
+RANGES = tuple(
+    RangeMeasurement(n, Chain(n, 1), n, (0.0, 0.0), (0.0, 0.0), 3.0, 0.1) for n in range(50)
+)
 CLOSURES = tuple(
-    ClosureItem(n, True, n, Chain(n, 1), n, (0.0, 0.0, 0.0), COVARIANCE) for n in range(50)
+    ClosureMeasurement(n, True, n, Chain(n, 1), n, (0.0, 0.0, 0.0), COVARIANCE) for n in range(50)
 )
 
 
@@ -64,8 +71,8 @@ CLOSURES = tuple(
 )
 def test_items_of_every_kind_are_said_completely_in_entries_that_fit(
     keyframes: tuple[Keyframe, ...],
-    ranges: tuple[RangeItem, ...],
-    closures: tuple[ClosureItem, ...],
+    ranges: tuple[RangeMeasurement, ...],
+    closures: tuple[ClosureMeasurement, ...],
 ) -> None:
     team = Team(a_seal(3))
     entries = [team.append(e, 0) for e in team.entries(TRAITS, keyframes, ranges, closures)]

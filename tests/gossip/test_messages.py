@@ -17,11 +17,11 @@ from drslamd.gossip import messages
 from drslamd.gossip.codecs import CODECS
 from drslamd.gossip.message_types import Heard, LogState, Message, OdometryBatch, Pose, Status
 from drslamd.slam.graph.measurements import (
-    ClosureItem,
+    ClosureMeasurement,
     GraphEntry,
     Keyframe,
     PublicPoses,
-    RangeItem,
+    RangeMeasurement,
 )
 
 i16 = st.integers(-(2**15), 2**15 - 1)
@@ -68,11 +68,11 @@ batches = st.builds(
 antennas = st.tuples(i16.map(millimetres), i16.map(millimetres))
 keyframes = st.builds(Keyframe, n32, st.integers(0, 2**15 - 1), i32, i32, i32)
 ranges = st.builds(
-    RangeItem, n32, chains, n32, antennas, antennas, i32.map(tenths),
+    RangeMeasurement, n32, chains, n32, antennas, antennas, i32.map(tenths),
     st.integers(1, 2**15 - 1).map(millimetres),
 )  # fmt: skip
 closures = st.builds(
-    ClosureItem, n32, st.booleans(), n32, chains, n32,
+    ClosureMeasurement, n32, st.booleans(), n32, chains, n32,
     st.tuples(*[i32.map(tenths)] * 3), diagonals,
 )  # fmt: skip
 sigmas = st.floats(2**-20, 8, width=32)
@@ -141,14 +141,16 @@ def test_the_header_stands_where_every_lcm_program_finds_it() -> None:
 
 
 def test_positions_travel_in_tenths_of_millimetres_and_angles_in_tenths_of_milliradians() -> None:
-    closure = ClosureItem(0, True, 1, Chain(4, 5), 2, (1.23456, -0.00004, 0.00016), COVARIANCE)
+    closure = ClosureMeasurement(
+        0, True, 1, Chain(4, 5), 2, (1.23456, -0.00004, 0.00016), COVARIANCE
+    )
     back = through(GraphEntry(0, closures=(closure,)))
     assert isinstance(back, GraphEntry)
     assert back.closures[0].a_T_b == pytest.approx((1.2346, 0.0, 0.0002), abs=1e-12)
 
 
 def test_a_range_finer_than_a_millimetre_of_sigma_is_still_a_range() -> None:
-    item = RangeItem(1, Chain(4, 5), 2, (0.0, 0.0), (0.0, 0.0), 3.0, 0.0004)
+    item = RangeMeasurement(1, Chain(4, 5), 2, (0.0, 0.0), (0.0, 0.0), 3.0, 0.0004)
     back = through(GraphEntry(0, ranges=(item,)))
     assert isinstance(back, GraphEntry)
     assert back.ranges[0].sigma_m == pytest.approx(0.001)

@@ -12,11 +12,11 @@ from drslamd.gossip import messages
 from drslamd.gossip.message_types import Heard, LogState, Message, OdometryBatch, Pose, Status
 from drslamd.gossip.seal import Header, Seal, team_key
 from drslamd.slam.graph.measurements import (
-    ClosureItem,
+    ClosureMeasurement,
     GraphEntry,
     Keyframe,
     PublicPoses,
-    RangeItem,
+    RangeMeasurement,
 )
 
 MS = 1_000
@@ -63,8 +63,8 @@ def one_of_each_kind() -> list[Message]:
             2,
             (0.5, 0.25, 0.125, 0.0625, 0.5, -0.5, 0.25),
             (Keyframe(40, 1, -100, 200, -30),),
-            (RangeItem(40, peer, 41, (0.25, 0.0), (-0.125, 0.5), 3.5, 0.125),),
-            (ClosureItem(8, True, 40, peer, 41, (1.5, -2.5, 0.25), COVARIANCE),),
+            (RangeMeasurement(40, peer, 41, (0.25, 0.0), (-0.125, 0.5), 3.5, 0.125),),
+            (ClosureMeasurement(8, True, 40, peer, 41, (1.5, -2.5, 0.25), COVARIANCE),),
         ),
         Pose(1, 3, 11, 4_000_000, (1.25, -2.5, 3.0), COVARIANCE),
         PublicPoses(3, 11, 2, (40, 50), lifted),

@@ -14,7 +14,7 @@ from drslamd.slam.optimizer.banded.normal_equations import (
     System,
 )
 from drslamd.slam.optimizer.problem import (
-    FADING_M,
+    NEAR_RANGE_M,
     Calibration,
     Links,
     PoseEdges,
@@ -59,7 +59,7 @@ def team_problem(
     biases: tuple[float, ...] = (0.0, 0.0, 0.0),
     scale: tuple[float, ...] = (0.0, 0.0, 0.0),
     yaw: tuple[float, ...] = (0.0, 0.0, 0.0),
-    strong: float = 0.0,
+    near_bias: float = 0.0,
     range_error: float = 0.05,
     link_error: float = 1.0,
     closures: int = 3,
@@ -68,7 +68,7 @@ def team_problem(
     """Robots whose poses alternate in time, with every kind of edge; and the truth.
 
     Pose robots * k + r is keyframe k of robot r. Each pair has its ranges, between antennas off
-    the middle, wrong by `strong` where they are near; neighbouring poses of a robot have their
+    the middle, wrong by `near_bias` where they are near; neighbouring poses of a robot have their
     odometry, wrong by `scale` and `yaw`.
     """
     rng = np.random.default_rng(seed)
@@ -97,7 +97,9 @@ def team_problem(
             measured_m = distance + biases[number]
             # the term is of what is measured, itself included
             for _ in range(30):
-                measured_m = distance + biases[number] + strong * math.exp(-measured_m / FADING_M)
+                measured_m = (
+                    distance + biases[number] + near_bias * math.exp(-measured_m / NEAR_RANGE_M)
+                )
             rows.append((i, j, *q[a], *q[b], measured_m, number))
     table = np.reshape(rows, (-1, 8))
     ranges = Ranges(
@@ -122,15 +124,15 @@ def team_problem(
 
 
 def unpacked(problem: Problem, x: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Poses, biases, scales, yaw rates and bias of strong signals of one vector of all unknowns."""
+    """Poses, biases, scales, yaw rates and bias of near_bias signals of one vector of all unknowns."""
     count, priors = len(problem.initial), problem.priors
     ends = np.cumsum([3 * count, len(priors.bias), len(priors.scale), len(priors.yaw)])
-    poses, bias, scale, yaw, strong = np.split(x, ends)
-    return poses.reshape(-1, 3), bias, scale, yaw, strong
+    poses, bias, scale, yaw, near_bias = np.split(x, ends)
+    return poses.reshape(-1, 3), bias, scale, yaw, near_bias
 
 
 def packed(poses: Array, c: Calibration) -> Array:
-    return np.concatenate([poses.ravel(), c.bias, c.scale, c.yaw, c.strong])
+    return np.concatenate([poses.ravel(), c.bias, c.scale, c.yaw, c.near_bias])
 
 
 def residual_vector(problem: Problem, x: Array, robust: bool = True) -> Array:
@@ -140,7 +142,7 @@ def residual_vector(problem: Problem, x: Array, robust: bool = True) -> Array:
         robust: ranges, biases and scales by the root of Cauchy's cost; otherwise by the error
             itself, which Gauss and Newton weigh by `range_weights`.
     """
-    poses, bias, scale, yaw, strong = unpacked(problem, x)
+    poses, bias, scale, yaw, near_bias = unpacked(problem, x)
     out: list[float] = []
     links = problem.links
     for m in range(len(links)):
@@ -155,12 +157,12 @@ def residual_vector(problem: Problem, x: Array, robust: bool = True) -> Array:
     r = problem.ranges
     for m in range(len(r)):
         i, j = (product(poses[k], (*q, 0)) for k, q in ((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m])))
-        wrong = bias[r.pair[m]] + strong[0] * math.exp(-r.measured[m] / FADING_M)
+        wrong = bias[r.pair[m]] + near_bias[0] * math.exp(-r.measured[m] / NEAR_RANGE_M)
         e = (math.hypot(*(j - i)[:2]) + wrong - r.measured[m]) / r.sigma[m]
         out.append(cauchy_root(e, ROBUST_SIGMAS) if robust else e)
     for e in np.concatenate([bias / problem.priors.bias, scale / problem.priors.scale]):
         out.append(cauchy_root(e, 1.0) if robust else e)
-    out += (yaw / problem.priors.yaw).tolist() + (strong / problem.priors.strong).tolist()
+    out += (yaw / problem.priors.yaw).tolist() + (near_bias / problem.priors.near_bias).tolist()
     out += ((poses[problem.gauge] - problem.initial[problem.gauge]) / GAUGE_SIGMA).tolist()
     return np.array(out)
 
@@ -211,6 +213,6 @@ def dense(system: System, layout: Layout) -> Array:
         full[below + d, below] = full[below, below + d] = system.band[d, : n - d]
     full[:n, n:], full[n:, :n], full[n:, n:] = system.border, system.border.T, system.corner
     order = np.concatenate(
-        [layout.poses.ravel(), layout.bias, layout.scale, layout.yaw, layout.strong]
+        [layout.poses.ravel(), layout.bias, layout.scale, layout.yaw, layout.near_bias]
     )
     return np.asarray(full[np.ix_(order, order)])

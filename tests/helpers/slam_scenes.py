@@ -17,8 +17,13 @@ from numpy.typing import NDArray
 
 from drslamd.config import Config, parse
 from drslamd.conventions import GRID_US, Chain, Segment
-from drslamd.slam.graph.measurements import ClosureItem, GraphEntry, Keyframe, RangeItem
-from drslamd.slam.graph.pose_graph import TeamGraph
+from drslamd.slam.graph.measurements import (
+    ClosureMeasurement,
+    GraphEntry,
+    Keyframe,
+    RangeMeasurement,
+)
+from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.odometry.track import OdometryNoise
 from drslamd.slam.relative_pose.window import Window
@@ -141,11 +146,11 @@ def closure(
     a_T_b: Sequence[float] | Array,
     sigma: float = 0.1,
     kept: bool = True,
-) -> ClosureItem:
+) -> ClosureMeasurement:
     x, y, theta = (float(v) for v in a_T_b)
     v = sigma**2
     covariance = (v, 0.0, 0.0, v, 0.0, v / 4)
-    return ClosureItem(number, kept, a_n, peer, b_n, (x, y, theta), covariance)
+    return ClosureMeasurement(number, kept, a_n, peer, b_n, (x, y, theta), covariance)
 
 
 def range_item(
@@ -156,8 +161,8 @@ def range_item(
     q_a: tuple[float, float] = (0.0, 0.0),
     q_b: tuple[float, float] = (0.0, 0.0),
     sigma: float = 0.1,
-) -> RangeItem:
-    return RangeItem(a_n, peer, b_n, q_a, q_b, range_m, sigma)
+) -> RangeMeasurement:
+    return RangeMeasurement(a_n, peer, b_n, q_a, q_b, range_m, sigma)
 
 
 def traits_of(
@@ -180,7 +185,7 @@ class SmallTeam:
         n: (k,) their numbers on the clock of each robot.
     """
 
-    graph: TeamGraph
+    graph: PoseGraph
     truth: dict[int, Array]
     n: dict[int, Array]
     chains: dict[int, Chain]
@@ -206,15 +211,15 @@ def small_team(
     chains = {r: Chain(r, 10 + r) for r in range(robots)}
     truth = {r: wander(rng, count, 0.4) for r in range(robots)}
     n = {r: clock * r + every * np.arange(count) for r in range(robots)}
-    graph = TeamGraph()
+    graph = PoseGraph()
     entries = []
     for r, chain in chains.items():
         odometry = driven(rng, truth[r], noise)
         entry = GraphEntry(0, traits_of(NOISE), keyframes(n[r], odometry))
         entries.append((chain, entry))
     for a in range(robots):
-        ranges: list[RangeItem] = []
-        closures: list[ClosureItem] = []
+        ranges: list[RangeMeasurement] = []
+        closures: list[ClosureMeasurement] = []
         for b in range(a + 1, robots):
             bias = (biases or {}).get((a, b), 0.0)
             for k in range(count):
@@ -259,7 +264,7 @@ CLOCKS = {0: 0, 1: 1000 * GRID_US, 2: 2000 * GRID_US}
 """Of `small_team` minus those of its robot 0, us."""
 
 
-def group_of(graph: TeamGraph, shift_us: dict[int, int] | None = None) -> Group:
+def group_of(graph: PoseGraph, shift_us: dict[int, int] | None = None) -> Group:
     """All first segments of a graph, in the frame of the lowest."""
     members = {Segment(*items.chain, 0) for items in graph.chains.values()}
     return Group(members, min(members), shift_us or {})

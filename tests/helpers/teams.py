@@ -12,7 +12,7 @@ from lab.recordings import world
 from lab.recordings.recording import Recording
 from lab.score.outcome import Outcome, score
 
-from drslamd.slam.calibration.calibration_store import UNLEARNED, Constants
+from drslamd.slam.calibration.calibration_store import UNLEARNED, SensorCalibration
 
 EASY = world.Scene(
     robots=3,
@@ -55,7 +55,7 @@ class VirtualTeam:
         robot: int,
         epoch: int = 1,
         epochs: dict[int, int] | None = None,
-        kept: Constants = UNLEARNED,
+        kept: SensorCalibration = UNLEARNED,
     ) -> Member:
         """Switch a robot on, now; its devices print from now on."""
         device = self.hardware[robot]

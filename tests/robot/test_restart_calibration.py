@@ -11,7 +11,7 @@ from lab.play.playback import equip
 from lab.score.metrics import at_times
 from teams import EASY, VirtualTeam
 
-from drslamd.slam.calibration.calibration_store import UNLEARNED, Constants, is_sound
+from drslamd.slam.calibration.calibration_store import UNLEARNED, SensorCalibration, is_sound
 from drslamd.slam.graph.estimate import Learned
 from drslamd.slam.se2 import Array
 
@@ -21,7 +21,7 @@ WRONG = replace(
 SCALE, BIAS_M = 0.08, -0.4
 
 
-def wronged_team(kept: Constants = UNLEARNED) -> VirtualTeam:
+def wronged_team(kept: SensorCalibration = UNLEARNED) -> VirtualTeam:
     """Robot 0's wheels count 8 % too much, all ranges are 0.4 m short."""
     team = VirtualTeam(WRONG, on=())
     recording = team.recording
@@ -50,7 +50,7 @@ def first() -> VirtualTeam:
 def test_what_was_learned_is_in_the_state_that_an_orderly_stop_keeps(first: VirtualTeam) -> None:
     state = json.loads(json.dumps(first.member(0).robot.state()["calibration"]))
     assert is_sound(state)
-    kept = Constants.of_state(state)
+    kept = SensorCalibration.of_state(state)
     assert kept.scale.value == pytest.approx(SCALE, abs=0.03)
     assert kept.bias[1].value == pytest.approx(BIAS_M, abs=0.15)
     assert first.member(0).traces.saved
@@ -70,12 +70,12 @@ def test_a_restarted_robot_begins_with_what_it_knew(first: VirtualTeam) -> None:
     assert robot.front.noise.scale < 0.05
     assert robot.front.ranges[1].bias_m == kept.bias[1].value
     # so early nothing better is known, and nothing is forgotten
-    assert Constants.of_state(robot.state()["calibration"]).scale == kept.scale
+    assert SensorCalibration.of_state(robot.state()["calibration"]).scale == kept.scale
 
 
 @pytest.mark.slow
 def test_with_what_it_knew_it_is_better_from_the_first_half_minute(first: VirtualTeam) -> None:
-    def after_half_a_minute(kept: Constants) -> float:
+    def after_half_a_minute(kept: SensorCalibration) -> float:
         team = wronged_team(kept)
         team.run(30.0)
         return team.errors()["ate_rmse_m"]

@@ -31,7 +31,7 @@ def long_solve() -> int:
     window = Window(np.linspace(-30, 0, 60), rng.uniform(2, 8, 60), poses, poses[::-1],
                     np.zeros(2), np.zeros(2))  # fmt: skip
     odometry = OdometryNoise(0.03, 0.0026, 0.01, 0.0087)
-    noise = solver.Noise(RangeNoise(0.1, 0.3), odometry, odometry)
+    noise = solver.PairNoise(RangeNoise(0.1, 0.3), odometry, odometry)
     count, end = 0, time.monotonic() + 3.0
     while time.monotonic() < end:
         solver.solve(window, noise, 0.1)

@@ -42,7 +42,7 @@ NOTHING = Learned()
 
 
 @dataclass(frozen=True)
-class Constants:
+class SensorCalibration:
     """Scale, yaw rate (rad/m) and biases (m) by peer."""
 
     scale: Learned = NOTHING
@@ -61,9 +61,9 @@ class Constants:
         }
 
     @staticmethod
-    def of_state(state: Mapping[str, Any]) -> Constants:
+    def of_state(state: Mapping[str, Any]) -> SensorCalibration:
         """What `state` gave, after `is_sound`."""
-        return Constants(
+        return SensorCalibration(
             Learned(*state.get("scale", ())),
             Learned(*state.get("yaw_rad_per_m", ())),
             {int(peer): Learned(*value) for peer, value in state.get("bias_m", {}).items()},
@@ -91,11 +91,11 @@ class Constants:
         return remaining(self.bias_to(peer), before, CHANGED_BIAS_M)
 
 
-UNLEARNED = Constants()
+UNLEARNED = SensorCalibration()
 
 
 def is_sound(state: object) -> bool:
-    """Could `Constants.state` have written this? Anything may be given."""
+    """Could `SensorCalibration.state` have written this? Anything may be given."""
     if not isinstance(state, dict):
         return False
     biases = state.get("bias_m", {})
@@ -118,10 +118,10 @@ def _is_value(pair: object, most: float) -> bool:
     return bool(abs(value) <= most and 0 < sigma <= most)
 
 
-class Memory:
+class CalibrationStore:
     """The constants of one start."""
 
-    def __init__(self, kept: Constants, section: RelativePoseSection) -> None:
+    def __init__(self, kept: SensorCalibration, section: RelativePoseSection) -> None:
         """
         Args:
             kept: of the start before this one.
@@ -153,7 +153,7 @@ class Memory:
         keep = (1 - used.scale.value) * (1 - rest.value)
         scale = Learned(1 - keep, rest.sigma)
         yaw = Learned(used.yaw.value + turned.value, turned.sigma)
-        self.latest = Constants(
+        self.latest = SensorCalibration(
             scale if _is_better(scale, kept.scale, CHANGED_SCALE, MOST_SCALE) else latest.scale,
             yaw if _is_better(yaw, kept.yaw, CHANGED_YAW, MOST_YAW) else latest.yaw,
             biases,

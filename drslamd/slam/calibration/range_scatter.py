@@ -28,7 +28,9 @@ PLAIN = 1.05
 being short or blocked, and tells nothing of the others."""
 
 
-def scatter(errors: Array, sigmas: Array, pair: Index, pairs: int, configured: float) -> Array:
+def scatter_ratios(
+    errors: Array, sigmas: Array, pair: Index, pairs: int, configured: float
+) -> Array:
     """(pairs,) true sigma of ranges over the configured one.
 
     Args:

@@ -2,10 +2,10 @@
 
 A window alone hardly tells a range bias from distance, or a wheel's scale from speed; hours of
 driving do. Module 3 carries the bias of each pair, what that of all pairs does at short range
-(`problem.fading`) and the scale of each robot's odometry as unknowns. Here a window is rid of what
+(`problem.near_range_shape`) and the scale of each robot's odometry as unknowns. Here a window is rid of what
 is known of them, and its noise says what is still unknown:
 
-    r' = r - bias - strong exp(-r / L)     p' = (1 - scale) p
+    r' = r - bias - near_bias exp(-r / L)     p' = (1 - scale) p
     sigma'^-2 = sigma^-2 + (k s sigma_measured)^-2
 
 k accounts for ranges that share their errors, s is how much those of the pair scatter
@@ -21,8 +21,8 @@ import numpy as np
 
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
 from drslamd.slam.odometry.track import OdometryNoise
-from drslamd.slam.optimizer.problem import fading
-from drslamd.slam.relative_pose.solver import Noise
+from drslamd.slam.optimizer.problem import near_range_shape
+from drslamd.slam.relative_pose.solver import PairNoise
 from drslamd.slam.relative_pose.window import Window
 from drslamd.slam.relative_pose.window_noise import RangeNoise
 from drslamd.slam.se2 import Array
@@ -36,34 +36,34 @@ LEAST_SCALE = 0.01
 """Floors and loads change wheels by so much."""
 
 
-class Sensors(NamedTuple):
+class PairCalibration(NamedTuple):
     """What is known of one pair's sensors.
 
     Attributes:
         bias: of the pair, m.
         scale_a, scale_b: of both odometries, fractions.
         scatter: of the pair's ranges over the configured sigma, see `range_scatter`.
-        strong: of the team, m at range 0, see `problem.fading`.
+        near_bias: of the team, m at range 0, see `problem.near_range_shape`.
     """
 
     bias: Learned = Learned()
     scale_a: Learned = Learned()
     scale_b: Learned = Learned()
     scatter: float = 1.0
-    strong: Learned = Learned()
+    near_bias: Learned = Learned()
 
     @staticmethod
-    def of(estimate: TeamEstimate | None, a: int, b: int) -> Sensors:
+    def of(estimate: TeamEstimate | None, a: int, b: int) -> PairCalibration:
         """Of robots a and b, as the team's last solution has them, if it is one."""
         if estimate is None or not estimate.converged:
-            return Sensors()
+            return PairCalibration()
         pair = (min(a, b), max(a, b))
-        return Sensors(
+        return PairCalibration(
             estimate.bias_m.get(pair, Learned()),
             estimate.scale.get(a, Learned()),
             estimate.scale.get(b, Learned()),
             estimate.scatter.get(pair, 1.0),
-            estimate.strong_m,
+            estimate.near_bias_m,
         )
 
 
@@ -79,9 +79,11 @@ def remaining(learned: Learned, before: float, least: float, scatter: float = 1.
     return float((before**-2.0 + spread**-2.0) ** -0.5)
 
 
-def calibrated(window: Window, noise: Noise, sensors: Sensors) -> tuple[Window, Noise]:
+def calibrated_window(
+    window: Window, noise: PairNoise, sensors: PairCalibration
+) -> tuple[Window, PairNoise]:
     """The window without its known errors, and the noise that is left."""
-    near = sensors.strong.value * fading(window.ranges)
+    near = sensors.near_bias.value * near_range_shape(window.ranges)
     better = replace(
         window,
         ranges=window.ranges - sensors.bias.value - near,
@@ -90,7 +92,7 @@ def calibrated(window: Window, noise: Noise, sensors: Sensors) -> tuple[Window, 
     )
     scatter = sensors.scatter
     bias = remaining(sensors.bias, noise.ranges.bias_sigma, LEAST_BIAS_M, scatter)
-    return better, Noise(
+    return better, PairNoise(
         RangeNoise(noise.ranges.sigma, bias, scatter),
         _narrowed(noise.a, sensors.scale_a, scatter),
         _narrowed(noise.b, sensors.scale_b, scatter),

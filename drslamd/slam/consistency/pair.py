@@ -17,12 +17,12 @@ from drslamd.config import Config
 from drslamd.conventions import Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.consistency.pcm import Candidate, PairConsistency
-from drslamd.slam.graph.measurements import ClosureItem
-from drslamd.slam.graph.pose_graph import ChainItems
+from drslamd.slam.graph.measurements import ClosureMeasurement
+from drslamd.slam.graph.pose_graph import ChainData
 from drslamd.slam.odometry.track import OdometryNoise
-from drslamd.slam.relative_pose.pair_window import RangeItems, Request, at_keyframes
+from drslamd.slam.relative_pose.pair_window import RangeSampler, Request, at_keyframes
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
-from drslamd.slam.relative_pose.solver import Estimate
+from drslamd.slam.relative_pose.solver import RelativePoseEstimate
 from drslamd.slam.se2 import Array
 
 AGREEING = 5
@@ -40,12 +40,12 @@ SHRINK = 1e-4
 
 
 @dataclass(frozen=True)
-class Answer:
+class WindowAnswer:
     """What module 1 said of one window, for whoever wants to know why."""
 
     number: int
     utime: int
-    estimate: Estimate
+    estimate: RelativePoseEstimate
 
 
 @dataclass
@@ -54,9 +54,9 @@ class Checked:
 
     segments: tuple[Segment, Segment]
     consistency: PairConsistency
-    items: list[ClosureItem]
+    items: list[ClosureMeasurement]
 
-    def renew_sums(self, own: ChainItems, peer: ChainItems) -> None:
+    def renew_sums(self, own: ChainData, peer: ChainData) -> None:
         """Keyframes that came late may lie between those of the candidates."""
         a, a_there = own.find(np.array([item.a_n for item in self.items]))
         b, b_there = peer.find(np.array([item.b_n for item in self.items]))
@@ -64,24 +64,24 @@ class Checked:
         self.consistency.renew_sums(np.flatnonzero(both), own.sums[a[both]], peer.sums[b[both]])
 
 
-class Pair:
+class PairTracker:
     """The state of one owned pair."""
 
     def __init__(self, config: Config, peer: Chain, ranges: RangeBuffer) -> None:
         self._config = config
         self.peer = peer
         self.ranges = ranges
-        self.range_items = RangeItems(config.relative_pose.range_sigma_m)
+        self.range_items = RangeSampler(config.relative_pose.range_sigma_m)
         self.verdicts: Counter[str] = Counter()
         self.last_verdict = ""
-        self.history: deque[Answer] = deque(maxlen=HISTORY)
+        self.history: deque[WindowAnswer] = deque(maxlen=HISTORY)
         self.closures_seen = 0
         self.established = False
         self.checked: Checked | None = None
         self._busy = False
         self._segments: tuple[Segment, Segment] | None = None
-        self._pending: deque[tuple[int, Request, Estimate]] = deque(maxlen=PENDING)
-        self._said: dict[int, ClosureItem] = {}
+        self._pending: deque[tuple[int, Request, RelativePoseEstimate]] = deque(maxlen=PENDING)
+        self._said: dict[int, ClosureMeasurement] = {}
         self._kept_before: set[int] = set()
         self._number = 0
 
@@ -90,22 +90,22 @@ class Pair:
         self.verdicts[verdict] += 1
         self.last_verdict = verdict
 
-    def estimated(self, request: Request, estimate: Estimate) -> None:
+    def estimated(self, request: Request, estimate: RelativePoseEstimate) -> None:
         """Module 1 has answered."""
         self.count(estimate.verdict.value)
-        self.history.append(Answer(self._number, request.utime, estimate))
+        self.history.append(WindowAnswer(self._number, request.utime, estimate))
         if estimate.hypotheses:
             self.closures_seen += 1
             self._pending.append((self._number, request, estimate))
             self._number += 1
 
     def check(
-        self, own: ChainItems, peer: ChainItems, noise: OdometryNoise
+        self, own: ChainData, peer: ChainData, noise: OdometryNoise
     ) -> Callable[[], Checked] | None:
         """Module 2 on what came in since; the pair's set belongs to the job until `settle`."""
         if self._busy:
             return None
-        work: list[tuple[Candidate, ClosureItem]] = []
+        work: list[tuple[Candidate, ClosureMeasurement]] = []
         while self._pending:
             number, request, estimate = self._pending.popleft()
             segments = (
@@ -129,8 +129,13 @@ class Pair:
         return partial(extended, checked, work)
 
     def _candidates(
-        self, number: int, request: Request, estimate: Estimate, own: ChainItems, peer: ChainItems
-    ) -> list[tuple[Candidate, ClosureItem]]:
+        self,
+        number: int,
+        request: Request,
+        estimate: RelativePoseEstimate,
+        own: ChainData,
+        peer: ChainData,
+    ) -> list[tuple[Candidate, ClosureMeasurement]]:
         """Every hypothesis of one window, at its two keyframes."""
         a, a_there = own.find(np.array([float(request.a.n)]))
         b, b_there = peer.find(np.array([float(request.b.n)]))
@@ -143,7 +148,7 @@ class Pair:
                 hypothesis.a_T_b, hypothesis.covariance, request.a, request.b
             )
             x, y, theta = pose.tolist()
-            item = ClosureItem(
+            item = ClosureMeasurement(
                 number, True, request.a.n, self.peer, request.b.n,
                 (x, y, theta), se2.packed(sendable(covariance)),
             )  # fmt: skip
@@ -167,13 +172,13 @@ class Pair:
         now = {item.number for item in self.kept()}
         return {number for number in self._kept_before | now if number >= oldest}
 
-    def kept(self) -> list[ClosureItem]:
+    def kept(self) -> list[ClosureMeasurement]:
         """Closures of the consistent set."""
         if self.checked is None:
             return []
         return [self.checked.items[v] for v in self.checked.consistency.kept_vertices()]
 
-    def news(self, every: bool) -> list[ClosureItem]:
+    def news(self, every: bool) -> list[ClosureMeasurement]:
         """What the team must hear: closures that are now kept, and those that no longer are.
 
         Args:
@@ -196,7 +201,7 @@ class Pair:
             for number, item in self._said.items()
             if number not in withdrawn and (number >= remembered or item.a_n == recent)
         }
-        new: list[ClosureItem] = []
+        new: list[ClosureMeasurement] = []
         recent = max((said.a_n for said in self._said.values()), default=-TELL_EVERY)
         for number, item in kept.items():
             if number not in self._said and (every or item.a_n - recent >= TELL_EVERY):
@@ -214,7 +219,7 @@ def sendable(covariance: Array) -> Array:
     return np.asarray(covariance * (1 - SHRINK) + np.diag(np.diag(covariance)) * SHRINK)
 
 
-def extended(checked: Checked, work: list[tuple[Candidate, ClosureItem]]) -> Checked:
+def extended(checked: Checked, work: list[tuple[Candidate, ClosureMeasurement]]) -> Checked:
     """Equation 2 for each new hypothesis."""
     for candidate, item in work:
         forgotten = checked.consistency.forgotten

@@ -59,5 +59,5 @@ class TeamEstimate:
     iterations: int = 0
     converged: bool = True
     lifted: Lifted | None = None
-    strong_m: Learned = field(default_factory=Learned)
-    """Of the team, at range 0 (`problem.fading`)."""
+    near_bias_m: Learned = field(default_factory=Learned)
+    """Of the team, at range 0 (`problem.near_range_shape`)."""

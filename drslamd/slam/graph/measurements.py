@@ -25,7 +25,7 @@ class Keyframe:
 
 
 @dataclass(frozen=True)
-class RangeItem:
+class RangeMeasurement:
     """One distance between two keyframes; q is the antenna in their body frames, metres."""
 
     a_n: int
@@ -38,7 +38,7 @@ class RangeItem:
 
 
 @dataclass(frozen=True)
-class ClosureItem:
+class ClosureMeasurement:
     """One relative pose a_T_b between two keyframes, kept or withdrawn."""
 
     number: int
@@ -79,8 +79,8 @@ class GraphEntry:
     traits: tuple[float, ...] = ()
     """Now and then: the four sigmas of `OdometryNoise`, antenna x, y, z in the body frame."""
     keyframes: tuple[Keyframe, ...] = ()
-    ranges: tuple[RangeItem, ...] = ()
-    closures: tuple[ClosureItem, ...] = ()
+    ranges: tuple[RangeMeasurement, ...] = ()
+    closures: tuple[ClosureMeasurement, ...] = ()
     relative: tuple[RelativePoses, ...] = ()
 
 

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from drslamd.conventions import ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain, Segment
 from drslamd.slam.graph.measurements import (
-    ClosureItem,
+    ClosureMeasurement,
     GraphEntry,
     Keyframe,
-    RangeItem,
+    RangeMeasurement,
     RelativePoses,
 )
 from drslamd.slam.odometry.track import OdometryNoise, growth
@@ -87,7 +87,7 @@ class Rows:
         self._sorted = rows[-self._most :]
 
 
-class ChainItems:
+class ChainData:
     """Keyframes of one chain, and what its robot says of its own sensors.
 
     Attributes:
@@ -201,22 +201,22 @@ def _sensible(batch: RelativePoses) -> bool:
 
 
 @dataclass
-class PairItems:
+class PairData:
     """What the owner of a pair measured: a is the owner's chain, b the peer's."""
 
     a: Chain
     b: Chain
-    closures: dict[int, tuple[int, ClosureItem]] = field(default_factory=dict)
+    closures: dict[int, tuple[int, ClosureMeasurement]] = field(default_factory=dict)
     """By number: (seq of the log entry that said so, closure)."""
     _ranges: Rows = field(default_factory=lambda: Rows(9, MAX_RANGES))
 
-    def add_range(self, seq: int, place: int, r: RangeItem) -> None:
+    def add_range(self, seq: int, place: int, r: RangeMeasurement) -> None:
         """A range at some place in the log of its owner."""
         if abs(r.range_m) < FARTHEST_M and r.sigma_m > 0:
             key = seq * PER_ENTRY + place
             self._ranges.add([key, r.a_n, r.b_n, *r.q_a, *r.q_b, r.range_m, r.sigma_m])
 
-    def add_closure(self, seq: int, c: ClosureItem) -> None:
+    def add_closure(self, seq: int, c: ClosureMeasurement) -> None:
         """A closure, or its withdrawal; of one number the latest word counts."""
         if self.closures.get(c.number, (-1, c))[0] <= seq and _believable(c):
             self.closures[c.number] = (seq, c)
@@ -237,11 +237,11 @@ class PairItems:
         """Let these be all."""
         self._ranges.replace(keyed)
 
-    def kept(self) -> list[ClosureItem]:
+    def kept(self) -> list[ClosureMeasurement]:
         return [c for _, (_, c) in sorted(self.closures.items()) if c.kept]
 
 
-def _believable(c: ClosureItem) -> bool:
+def _believable(c: ClosureMeasurement) -> bool:
     best, worst = CLOSURE_SIGMAS
     variances = (c.covariance[k] for k in (0, 3, 5))
     return all(best**2 < v < worst**2 for v in variances) and all(
@@ -249,12 +249,12 @@ def _believable(c: ClosureItem) -> bool:
     )
 
 
-class TeamGraph:
+class PoseGraph:
     """All chains and pairs that this robot holds."""
 
     def __init__(self) -> None:
-        self.chains: dict[int, ChainItems] = {}
-        self.pairs: dict[tuple[int, int], PairItems] = {}
+        self.chains: dict[int, ChainData] = {}
+        self.pairs: dict[tuple[int, int], PairData] = {}
 
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
         """Take one entry of a robot's log."""
@@ -263,7 +263,7 @@ class TeamGraph:
             return
         if items is None or origin.epoch > items.chain.epoch:
             self.forget(origin.robot)
-            items = self.chains[origin.robot] = ChainItems(origin)
+            items = self.chains[origin.robot] = ChainData(origin)
         if entry.traits:
             items.take_traits(entry.seq, entry.traits)
         for k in entry.keyframes:
@@ -279,14 +279,14 @@ class TeamGraph:
             if pair:
                 pair.add_closure(entry.seq, c)
 
-    def _pair(self, a: Chain, b: Chain) -> PairItems | None:
+    def _pair(self, a: Chain, b: Chain) -> PairData | None:
         """The pair's items; None for a start of b that is already past, and for a pair of one."""
         pair = self.pairs.get((a.robot, b.robot))
         if pair and pair.a == a and pair.b == b:
             return pair
         if a.robot == b.robot or (pair and pair.b.epoch > b.epoch):
             return None
-        self.pairs[a.robot, b.robot] = PairItems(a, b)
+        self.pairs[a.robot, b.robot] = PairData(a, b)
         return self.pairs[a.robot, b.robot]
 
     def forget(self, robot: int) -> None:
@@ -295,7 +295,7 @@ class TeamGraph:
         for key in [k for k, p in self.pairs.items() if p.a.robot == robot]:
             del self.pairs[key]
 
-    def usable(self) -> list[PairItems]:
+    def usable(self) -> list[PairData]:
         """Pairs whose both chains are the current ones."""
         return [
             pair

@@ -15,8 +15,8 @@ import numpy as np
 from drslamd.conventions import Segment
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
-from drslamd.slam.graph.measurements import ClosureItem
-from drslamd.slam.graph.pose_graph import PairItems, TeamGraph
+from drslamd.slam.graph.measurements import ClosureMeasurement
+from drslamd.slam.graph.pose_graph import PairData, PoseGraph
 from drslamd.slam.se2 import Array
 
 
@@ -34,7 +34,7 @@ class Group:
     shift_us: dict[int, int]
 
 
-def groups(graph: TeamGraph) -> list[set[Segment]]:
+def groups(graph: PoseGraph) -> list[set[Segment]]:
     """Sets of segments that closures join; a segment without closure is in none."""
     group_of: dict[Segment, set[Segment]] = {}
     for a, b in dict.fromkeys((a, b) for _, a, b in joints(graph)):
@@ -48,7 +48,7 @@ def groups(graph: TeamGraph) -> list[set[Segment]]:
     return distinct
 
 
-def joints(graph: TeamGraph) -> list[tuple[ClosureItem, Segment, Segment]]:
+def joints(graph: PoseGraph) -> list[tuple[ClosureMeasurement, Segment, Segment]]:
     """Kept closures whose both keyframes are held, with the segments that they join."""
     out = []
     for pair in graph.usable():
@@ -61,7 +61,7 @@ def joints(graph: TeamGraph) -> list[tuple[ClosureItem, Segment, Segment]]:
     return out
 
 
-def _segments(graph: TeamGraph, pair: PairItems, end: int, n: list[int]) -> list[Segment | None]:
+def _segments(graph: PoseGraph, pair: PairData, end: int, n: list[int]) -> list[Segment | None]:
     chain = (pair.a, pair.b)[end]
     items = graph.chains[chain.robot]
     at, there = items.find(np.array(n, dtype=float))
@@ -80,7 +80,7 @@ def gauge_segment(group: set[Segment], living: set[int]) -> Segment | None:
 # ---- where the optimiser starts ----------------------------------------------------------------
 
 
-def placed(graph: TeamGraph, group: Group, previous: TeamEstimate | None) -> dict[Segment, Array]:
+def placed(graph: PoseGraph, group: Group, previous: TeamEstimate | None) -> dict[Segment, Array]:
     """w_T_k (k, 3) of all keyframes of each member."""
     out: dict[Segment, Array] = {}
     known = _in_frame(graph, group.frame, previous)
@@ -101,7 +101,7 @@ def placed(graph: TeamGraph, group: Group, previous: TeamEstimate | None) -> dic
 
 
 def _in_frame(
-    graph: TeamGraph, frame: Segment, previous: TeamEstimate | None
+    graph: PoseGraph, frame: Segment, previous: TeamEstimate | None
 ) -> dict[int, Trajectory]:
     """The previous trajectories, carried into `frame`; nothing when they do not know it."""
     if previous is None:
@@ -139,7 +139,7 @@ def carried(rows: Array, anchors: Array, w_T_anchor: Array) -> Array:
 
 
 def _next_to_place(
-    graph: TeamGraph, members: set[Segment], done: dict[Segment, Array]
+    graph: PoseGraph, members: set[Segment], done: dict[Segment, Array]
 ) -> tuple[Segment, Array, Array]:
     """The segment that most closures join to what is placed: its anchor rows and their poses."""
 

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from drslamd.conventions import GRID_HZ, Chain
 from drslamd.slam import se2
-from drslamd.slam.graph.measurements import ClosureItem
-from drslamd.slam.graph.pose_graph import ChainItems, PairItems, TeamGraph
+from drslamd.slam.graph.measurements import ClosureMeasurement
+from drslamd.slam.graph.pose_graph import ChainData, PairData, PoseGraph
 from drslamd.slam.odometry.track import covariance_between
 from drslamd.slam.optimizer.problem import Index
 from drslamd.slam.se2 import Array
@@ -36,7 +36,7 @@ EVERY_S = 64
 class Thinning:
     """Keeps one graph bounded; ask after each insertion."""
 
-    def __init__(self, graph: TeamGraph) -> None:
+    def __init__(self, graph: PoseGraph) -> None:
         self._graph = graph
         self._done: dict[Chain, int] = {}
         """By chain: the stretch of time at which it was last thinned."""
@@ -55,7 +55,7 @@ class Thinning:
         if not stays.all():
             self._drop(items, stays)
 
-    def _drop(self, items: ChainItems, stays: NDArray[np.bool_]) -> None:
+    def _drop(self, items: ChainData, stays: NDArray[np.bool_]) -> None:
         for pair in self._graph.pairs.values():
             if pair.a == items.chain:
                 _carry(pair, items, stays, own=True)
@@ -72,7 +72,7 @@ def recent_s(robots: int) -> int:
     return TEAM_S // shares
 
 
-def survivors(items: ChainItems, now: int, recent: int) -> NDArray[np.bool_]:
+def survivors(items: ChainData, now: int, recent: int) -> NDArray[np.bool_]:
     """Which keyframes of a chain stay at sample `now`.
 
     Args:
@@ -90,7 +90,7 @@ def survivors(items: ChainItems, now: int, recent: int) -> NDArray[np.bool_]:
     return first
 
 
-def _carry(pair: PairItems, items: ChainItems, stays: NDArray[np.bool_], own: bool) -> None:
+def _carry(pair: PairData, items: ChainData, stays: NDArray[np.bool_], own: bool) -> None:
     """Take what a pair measured from the keyframes that go to those that stay."""
     anchors = np.maximum.accumulate(np.where(stays, np.arange(len(stays)), 0))
     _carry_ranges(pair, items, anchors, own)
@@ -106,7 +106,7 @@ def _carry(pair: PairItems, items: ChainItems, stays: NDArray[np.bool_], own: bo
         seen.add((closure.a_n, closure.b_n))
 
 
-def _carry_ranges(pair: PairItems, items: ChainItems, anchors: Index, own: bool) -> None:
+def _carry_ranges(pair: PairData, items: ChainData, anchors: Index, own: bool) -> None:
     table = pair.keyed_ranges.copy()
     if not len(table):
         return
@@ -126,7 +126,7 @@ def _carry_ranges(pair: PairItems, items: ChainItems, anchors: Index, own: bool)
     pair.replace_ranges(table[keep])
 
 
-def _spread(items: ChainItems, anchor: Index, body: Index, point: Array) -> Array:
+def _spread(items: ChainData, anchor: Index, body: Index, point: Array) -> Array:
     """Sigma, m, that odometry between two keyframes (m,) adds to a point (m, 2) of the body."""
     twist = covariance_between(items.noise, items.poses, items.sums, anchor, body)
     moves = np.zeros((len(point), 2, 3))
@@ -137,8 +137,8 @@ def _spread(items: ChainItems, anchor: Index, body: Index, point: Array) -> Arra
 
 
 def _carried(
-    closure: ClosureItem, items: ChainItems, anchors: Index, at: int, own: bool
-) -> ClosureItem:
+    closure: ClosureMeasurement, items: ChainData, anchors: Index, at: int, own: bool
+) -> ClosureMeasurement:
     """A closure whose keyframe goes, at the keyframe before it."""
     anchor = int(anchors[at])
     k_T_body = se2.between(items.poses[anchor], items.poses[at])

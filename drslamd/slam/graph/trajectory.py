@@ -1,4 +1,4 @@
-"""A whole trajectory out of the solved keyframes: the 10 Hz track bent to go through them."""
+"""A whole trajectory out of the solved keyframes: the 10 Hz track deform_track to go through them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drslamd.slam.odometry.track import Track
 from drslamd.slam.se2 import Array
 
 
-def bent(track: Track, solved: Trajectory) -> tuple[Array, Array]:
+def deform_track(track: Track, solved: Trajectory) -> tuple[Array, Array]:
     """The samples of our own track in the frame of the team.
 
     Between two keyframes a sample follows by odometry from both; the two answers are blended by

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import PublicPoses
-from drslamd.slam.graph.pose_graph import TeamGraph
+from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
 
 Job = Callable[[], TeamEstimate]
@@ -18,7 +18,7 @@ class Optimizer(Protocol):
 
     def job(
         self,
-        graph: TeamGraph,
+        graph: PoseGraph,
         group: Group,
         previous: TeamEstimate | None,
         public: Mapping[int, PublicPoses],

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from drslamd.conventions import GRID_US, Segment
 from drslamd.slam import se2
-from drslamd.slam.graph.pose_graph import ChainItems, PairItems, TeamGraph
+from drslamd.slam.graph.pose_graph import ChainData, PairData, PoseGraph
 from drslamd.slam.odometry.track import OdometryNoise, link_covariance
-from drslamd.slam.optimizer.banded.normal_equations import busiest
+from drslamd.slam.optimizer.banded.normal_equations import vertex_cover
 from drslamd.slam.optimizer.problem import Index, Links, PoseEdges, Ranges
 from drslamd.slam.se2 import Array
 
@@ -39,7 +39,7 @@ class Numbering:
     n: Index
     place: dict[int, Index]
 
-    def of(self, items: ChainItems, n: Array) -> Index:
+    def of(self, items: ChainData, n: Array) -> Index:
         """Places of keyframes n (m,) of one chain, -1 where one is not there."""
         place = self.place.get(items.chain.robot)
         if place is None or not len(place):
@@ -48,7 +48,7 @@ class Numbering:
         return np.where(there, place[at], -1)
 
 
-def numbering(graph: TeamGraph, members: set[Segment], shift_us: dict[int, int]) -> Numbering:
+def numbering(graph: PoseGraph, members: set[Segment], shift_us: dict[int, int]) -> Numbering:
     """Number all keyframes of `members`.
 
     Args:
@@ -73,7 +73,7 @@ def numbering(graph: TeamGraph, members: set[Segment], shift_us: dict[int, int])
     return Numbering(robot_of, n_of, place)
 
 
-def clock_shifts(graph: TeamGraph, robots: set[int], shift_us: dict[int, int]) -> dict[int, float]:
+def clock_shifts(graph: PoseGraph, robots: set[int], shift_us: dict[int, int]) -> dict[int, float]:
     """Clocks of robots minus ours in grid samples.
 
     We know the clocks of those whom we hear. The graph may hold others, and some that left long
@@ -106,7 +106,7 @@ def _mode(values: Array) -> float:
     return float(np.median(values[inside]))
 
 
-def links(graph: TeamGraph, numbers: Numbering, robots: list[int]) -> Links:
+def links(graph: PoseGraph, numbers: Numbering, robots: list[int]) -> Links:
     """Odometry between neighbouring keyframes of each segment, its scale and yaw rate left in."""
     parts: list[tuple[Array, ...]] = []
     for index, robot in enumerate(robots):
@@ -120,7 +120,7 @@ def links(graph: TeamGraph, numbers: Numbering, robots: list[int]) -> Links:
     return Links(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def chain_links(items: ChainItems, calibrated: bool) -> PoseEdges:
+def chain_links(items: ChainData, calibrated: bool) -> PoseEdges:
     """Odometry between neighbouring rows of one chain, across no break.
 
     Args:
@@ -140,7 +140,7 @@ def chain_links(items: ChainItems, calibrated: bool) -> PoseEdges:
     return PoseEdges(i, i + 1, measured, lever @ twist @ np.swapaxes(lever, 1, 2) + floor)
 
 
-def closures(graph: TeamGraph, numbers: Numbering) -> PoseEdges:
+def closures(graph: PoseGraph, numbers: Numbering) -> PoseEdges:
     """All kept closures between numbered poses."""
     ends, upper = [np.zeros((2, 0), dtype=np.int64)], [np.zeros((0, 9))]
     for pair in graph.usable():
@@ -166,7 +166,7 @@ def pose_edges(rows: Sequence[tuple[int, int, Sequence[float], Array]]) -> PoseE
     )
 
 
-def ranges(graph: TeamGraph, numbers: Numbering) -> tuple[Ranges, list[tuple[int, int]]]:
+def ranges(graph: PoseGraph, numbers: Numbering) -> tuple[Ranges, list[tuple[int, int]]]:
     """All ranges between numbered poses, and the pairs of robots that `pair` numbers."""
     found: list[tuple[tuple[int, int], Array, Array]] = []
     for pair in graph.usable():
@@ -186,16 +186,16 @@ def ranges(graph: TeamGraph, numbers: Numbering) -> tuple[Ranges, list[tuple[int
 def sensible(i: Index, j: Index) -> NDArray[np.bool_]:
     """Which of the edges (m,) that ought to join poses of the same time do so, more or less."""
     far = np.abs(i - j) > FAR
-    standing = busiest(i[far], j[far], STANDING)
+    standing = vertex_cover(i[far], j[far], STANDING)
     return np.asarray(~far | np.isin(i, standing) | np.isin(j, standing))
 
 
-def _name(pair: PairItems) -> tuple[int, int]:
+def _name(pair: PairData) -> tuple[int, int]:
     low, high = sorted((pair.a.robot, pair.b.robot))
     return low, high
 
 
-def _ends(graph: TeamGraph, numbers: Numbering, pair: PairItems, n: Array) -> tuple[Index, Index]:
+def _ends(graph: PoseGraph, numbers: Numbering, pair: PairData, n: Array) -> tuple[Index, Index]:
     """Places of the keyframes n (m, 2) of a pair."""
     a, b = graph.chains[pair.a.robot], graph.chains[pair.b.robot]
     return numbers.of(a, n[:, 0]), numbers.of(b, n[:, 1])

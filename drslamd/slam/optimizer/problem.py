@@ -5,7 +5,7 @@ that number. Errors are defined here once, so that every optimiser minimises the
 
     odometry   e = [R_i' (p_j - p_i), theta_j - theta_i] - measured, corrected by scale and yaw rate
     closure    the same, without correction
-    range      e = |p_j + R_j q_j - p_i - R_i q_i| + bias + strong exp(-r / L) - r
+    range      e = |p_j + R_j q_j - p_i - R_i q_i| + bias + near_bias exp(-r / L) - r
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from drslamd.slam.se2 import Array
 
 Index = NDArray[np.int64]
 
-FADING_M = 3.0
+NEAR_RANGE_M = 3.0
 """L: at this range a third is left of what receivers misjudge of strong signals. The LinkTrack
 modules of the MURP recordings have -0.25 m below 1 m, -0.14 m at 2 to 4 m and -0.06 m beyond 6 m;
 Decawave's note APS011 prints such a curve over received power."""
@@ -94,7 +94,7 @@ class Priors:
     """(robots,) fraction, likewise."""
     yaw: Array
     """(robots,) rad/m."""
-    strong: Array
+    near_bias: Array
     """(1,) metres, for the whole team: its modules are of one kind, and the bias follows the power
     that is received."""
 
@@ -126,17 +126,17 @@ class Calibration:
     bias: Array
     scale: Array
     yaw: Array
-    strong: Array
+    near_bias: Array
 
     @staticmethod
     def zero(priors: Priors) -> Calibration:
-        sigmas = (priors.bias, priors.scale, priors.yaw, priors.strong)
+        sigmas = (priors.bias, priors.scale, priors.yaw, priors.near_bias)
         return Calibration(*(np.zeros(len(sigma)) for sigma in sigmas))
 
     def plus(self, step: Calibration) -> Calibration:
         return Calibration(
             self.bias + step.bias, self.scale + step.scale, self.yaw + step.yaw,
-            self.strong + step.strong,
+            self.near_bias + step.near_bias,
         )  # fmt: skip
 
 
@@ -170,9 +170,9 @@ def corrected(links: Links, calibration: Calibration) -> Array:
     return np.stack([keep * x + bend / 2 * y, keep * y - bend / 2 * x, theta - bend], axis=-1)
 
 
-def fading(ranges: Array) -> Array:
+def near_range_shape(ranges: Array) -> Array:
     """How much of the bias of strong signals is in ranges (n,) m: all of it in those of none."""
-    return np.asarray(np.exp(-np.maximum(ranges, 0.0) / FADING_M))
+    return np.asarray(np.exp(-np.maximum(ranges, 0.0) / NEAR_RANGE_M))
 
 
 def range_errors(
@@ -184,5 +184,5 @@ def range_errors(
     sight = poses[ranges.j, :2] + arm_j - poses[ranges.i, :2] - arm_i
     distance = np.maximum(np.hypot(sight[:, 0], sight[:, 1]), 1e-6)
     error = distance + calibration.bias[ranges.pair] - ranges.measured
-    error += calibration.strong * fading(ranges.measured)
+    error += calibration.near_bias * near_range_shape(ranges.measured)
     return error, sight / distance[:, None], arm_i, arm_j

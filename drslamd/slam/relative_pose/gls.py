@@ -23,7 +23,7 @@ LONGEST = 0.5
 _factorise, _solve = get_lapack_funcs(("potrf", "potrs"), dtype=np.float64)
 
 
-class Judged(NamedTuple):
+class Refined(NamedTuple):
     """Minima under the noise of the whole window, best first.
 
     Attributes:
@@ -36,7 +36,7 @@ class Judged(NamedTuple):
     e: Array
 
 
-def judge(fit: RangeFit, noise: WindowNoise, centred: Array) -> Judged | None:
+def refine(fit: RangeFit, noise: WindowNoise, centred: Array) -> Refined | None:
     """Where the noise of the window puts some minima (k, 2); None where it leaves it vague."""
     x = centred
     made_at: tuple[Array, Array] | None = None
@@ -60,7 +60,7 @@ def judge(fit: RangeFit, noise: WindowNoise, centred: Array) -> Judged | None:
             break
     minima = _as_they_scatter(minima._replace(centred=x), weighted, noise)
     order = np.argsort(minima.chi2, kind="stable")
-    return Judged(Minima(*(values[order] for values in minima)), e[order])
+    return Refined(Minima(*(values[order] for values in minima)), e[order])
 
 
 def _as_they_scatter(minima: Minima, weighted: Array, noise: WindowNoise) -> Minima:

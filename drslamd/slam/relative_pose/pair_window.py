@@ -13,8 +13,8 @@ import numpy as np
 from drslamd.config import RelativePoseSection
 from drslamd.conventions import GRID_US, SECOND_US, Chain
 from drslamd.slam import se2
-from drslamd.slam.graph.measurements import RangeItem
-from drslamd.slam.graph.pose_graph import ChainItems
+from drslamd.slam.graph.measurements import RangeMeasurement
+from drslamd.slam.graph.pose_graph import ChainData
 from drslamd.slam.odometry.track import Track
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer, in_sight
 from drslamd.slam.relative_pose.window import Window, binned
@@ -38,11 +38,11 @@ only ranges that come after tell."""
 
 
 @dataclass(frozen=True)
-class Side:
+class PairEnd:
     """One robot of a pair: its 10 Hz track, its keyframes, its clock minus ours in us."""
 
     track: Track
-    items: ChainItems
+    items: ChainData
     ahead_us: int = 0
 
     def grid(self, utime: Array | float) -> Array:
@@ -82,7 +82,7 @@ class Request:
     b: Anchored
 
 
-def level(ranges: Array, a: Side, b: Side) -> Array:
+def level(ranges: Array, a: PairEnd, b: PairEnd) -> Array:
     """Ranges (n,) between antennas of different heights, as seen from above.
 
     What is shorter than the difference in height is the fault of a bias and stays as it is.
@@ -93,7 +93,7 @@ def level(ranges: Array, a: Side, b: Side) -> Array:
     return np.asarray(np.where(np.abs(ranges) > abs(rise), seen, ranges))
 
 
-def newest(ranges: RangeBuffer, a: Side, b: Side) -> int | None:
+def newest(ranges: RangeBuffer, a: PairEnd, b: PairEnd) -> int | None:
     """The latest time of our clock that both tracks and the ranges cover."""
     if len(a.track) < 2 or len(b.track) < 2 or ranges.newest is None:
         return None
@@ -101,7 +101,9 @@ def newest(ranges: RangeBuffer, a: Side, b: Side) -> int | None:
     return last if last > max(a.first_us, b.first_us) + GRID_US else None
 
 
-def request(ranges: RangeBuffer, a: Side, b: Side, section: RelativePoseSection) -> Request | str:
+def request(
+    ranges: RangeBuffer, a: PairEnd, b: PairEnd, section: RelativePoseSection
+) -> Request | str:
     """The window that ends now, or why there is none."""
     last = newest(ranges, a, b)
     if last is None:
@@ -130,7 +132,7 @@ def request(ranges: RangeBuffer, a: Side, b: Side, section: RelativePoseSection)
     return Request(window, at, held[0], held[1])
 
 
-def anchored(side: Side, utime: int) -> Anchored | None:
+def anchored(side: PairEnd, utime: int) -> Anchored | None:
     """Hold the body at `utime` of our clock to its nearest keyframe; None when it is too far."""
     rows = side.items.rows
     if not len(rows):
@@ -157,7 +159,7 @@ def at_keyframes(a_T_b: Array, covariance: Array, a: Anchored, b: Anchored) -> t
     return np.append(moved[:2], se2.wrap(moved[2])), np.asarray(spread)
 
 
-class RangeItems:
+class RangeSampler:
     """Distances for the graph: the median of each second, if somebody moved since the last."""
 
     def __init__(self, sigma_m: float) -> None:
@@ -165,7 +167,9 @@ class RangeItems:
         self._utime = 0
         self._place: Array | None = None
 
-    def next(self, ranges: RangeBuffer, a: Side, b: Side, peer: Chain) -> RangeItem | None:
+    def next(
+        self, ranges: RangeBuffer, a: PairEnd, b: PairEnd, peer: Chain
+    ) -> RangeMeasurement | None:
         """One item, or None when there is nothing new to say."""
         last = newest(ranges, a, b)
         if last is None or last - self._utime < SECOND_US * 9 // 10:
@@ -186,7 +190,7 @@ class RangeItems:
         table[:, 1] = level(table[:, 1], a, b)
         metres, doubt = (float(x) for x in np.median(table[:, 1:], axis=0))
         sigma = float(np.hypot(np.hypot(self._sigma_m, near_bias(metres)), doubt))
-        return RangeItem(
+        return RangeMeasurement(
             held_a.n, peer, held_b.n, (q_a[0], q_a[1]), (q_b[0], q_b[1]),
             metres, sigma,
         )  # fmt: skip

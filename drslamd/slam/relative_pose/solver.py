@@ -2,7 +2,7 @@
 
     x_ab = argmin sum_i (r_i - | p_a,i - x_ab p_b,i |)^2                             (equation 1)
 
-`solve` is the default: all minima of the coarse search, refined together, judged under the full
+`solve` is the default: all minima of the coarse search, refined together, refined_minima under the full
 noise of the window; every pose that the data cannot exclude is kept as a hypothesis. `solve_paper`
 is algorithm 1 and its refinement as printed: one seed, white noise, no verdict.
 """
@@ -17,7 +17,7 @@ import numpy as np
 from drslamd.slam import se2
 from drslamd.slam.odometry.track import OdometryNoise
 from drslamd.slam.relative_pose import coarse_search
-from drslamd.slam.relative_pose.gls import judge, middle
+from drslamd.slam.relative_pose.gls import middle, refine
 from drslamd.slam.relative_pose.range_fit import (
     FIRST_STEPS,
     LEAST_DAMPING,
@@ -70,7 +70,7 @@ class Hypothesis:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class RelativePoseEstimate:
     """Result of module 1; `hypotheses` is empty unless the verdict is UNIQUE or AMBIGUOUS."""
 
     verdict: Verdict
@@ -78,7 +78,7 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Noise:
+class PairNoise:
     """All that `solve` must know about the sensors of both robots."""
 
     ranges: RangeNoise
@@ -86,7 +86,7 @@ class Noise:
     b: OdometryNoise
 
 
-def solve(window: Window, noise: Noise, delta: float) -> Estimate:
+def solve(window: Window, noise: PairNoise, delta: float) -> RelativePoseEstimate:
     """Relative pose with its uncertainty.
 
     Args:
@@ -95,7 +95,7 @@ def solve(window: Window, noise: Noise, delta: float) -> Estimate:
         delta: step of the coarse search, radians.
     """
     if len(window) < 6:
-        return Estimate(Verdict.TOO_FEW)
+        return RelativePoseEstimate(Verdict.TOO_FEW)
     a, b = window.a_points, window.b_points
     fit = RangeFit(a, b, window.ranges)
     nearest = np.argsort(np.abs(window.t), kind="stable")[:3]
@@ -104,7 +104,7 @@ def solve(window: Window, noise: Noise, delta: float) -> Estimate:
     descent = Descent(fit, fit.centred(seeds), noise.ranges)
     descent.run(FIRST_STEPS)
     if fit.is_vague(descent.minima()):
-        return Estimate(Verdict.UNOBSERVABLE)
+        return RelativePoseEstimate(Verdict.UNOBSERVABLE)
     descent.run(STEPS - FIRST_STEPS)
     refined = descent.minima().centred
     candidates = refined[_distinct(fit.poses(refined))]
@@ -112,22 +112,22 @@ def solve(window: Window, noise: Noise, delta: float) -> Estimate:
         candidates = np.concatenate([candidates, fit.other_side(candidates)])
         candidates = candidates[_distinct(fit.poses(candidates))]
     window_noise = WindowNoise(window, a, b, noise.ranges, noise.a, noise.b)
-    judged = judge(fit, window_noise, candidates)
-    if judged is None:
-        return Estimate(Verdict.UNOBSERVABLE)
-    minima, chi2 = judged.minima, judged.minima.chi2
-    if chi2[0] > POOR_FIT * (len(window) - 3) or _end_is_off(judged.e[0], noise):
-        return Estimate(Verdict.POOR_FIT)
+    refined_minima = refine(fit, window_noise, candidates)
+    if refined_minima is None:
+        return RelativePoseEstimate(Verdict.UNOBSERVABLE)
+    minima, chi2 = refined_minima.minima, refined_minima.minima.chi2
+    if chi2[0] > POOR_FIT * (len(window) - 3) or _end_is_off(refined_minima.e[0], noise):
+        return RelativePoseEstimate(Verdict.POOR_FIT)
     poses, covariances = fit.poses(minima.centred), fit.covariances(minima)
     # under the full noise two candidates may have come to the same minimum
     kept = [k for k in _distinct(poses) if chi2[k] < chi2[0] + EXCLUDED_CHI2][:HYPOTHESES]
     if not all(_observable(covariances[k]) for k in kept):
-        return Estimate(Verdict.UNOBSERVABLE)
+        return RelativePoseEstimate(Verdict.UNOBSERVABLE)
     hypotheses = tuple(Hypothesis(poses[k], covariances[k], float(chi2[k])) for k in kept)
-    return Estimate(Verdict.UNIQUE if len(kept) == 1 else Verdict.AMBIGUOUS, hypotheses)
+    return RelativePoseEstimate(Verdict.UNIQUE if len(kept) == 1 else Verdict.AMBIGUOUS, hypotheses)
 
 
-def _end_is_off(e: Array, noise: Noise) -> bool:
+def _end_is_off(e: Array, noise: PairNoise) -> bool:
     newest = np.abs(e[-NEWEST:] - middle(e))
     return bool(middle(newest) > NEWEST_SIGMAS * noise.ranges.sigma)
 
@@ -167,7 +167,7 @@ def _distinct(poses: Array) -> list[int]:
     return kept
 
 
-def solve_paper(window: Window, range_sigma: float, delta: float) -> Estimate:
+def solve_paper(window: Window, range_sigma: float, delta: float) -> RelativePoseEstimate:
     """Algorithm 1 and equation 1 as printed; covariance sigma_r^2 (J' J)^-1.
 
     Args:
@@ -176,7 +176,7 @@ def solve_paper(window: Window, range_sigma: float, delta: float) -> Estimate:
         delta: step of the inclusive grid -w .. w, w = ceil(pi / delta).
     """
     if len(window) < 4:
-        return Estimate(Verdict.TOO_FEW)
+        return RelativePoseEstimate(Verdict.TOO_FEW)
     a, b, ranges = window.a_points, window.b_points, window.ranges
     coarse = coarse_paper(a, b, ranges, delta)
     pose = _least_squares(a, b, ranges, coarse)
@@ -184,7 +184,9 @@ def solve_paper(window: Window, range_sigma: float, delta: float) -> Estimate:
     information = j.T @ j / range_sigma**2 + PAPER_PRIOR * np.eye(3)
     chi2 = float(e @ e) / range_sigma**2
     pose = np.append(pose[:2], se2.wrap(pose[2]))
-    return Estimate(Verdict.UNIQUE, (Hypothesis(pose, np.linalg.inv(information), chi2),))
+    return RelativePoseEstimate(
+        Verdict.UNIQUE, (Hypothesis(pose, np.linalg.inv(information), chi2),)
+    )
 
 
 def coarse_paper(a: Array, b: Array, ranges: Array, delta: float) -> Array:

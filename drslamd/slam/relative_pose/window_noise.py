@@ -29,7 +29,7 @@ SLOW_SHARE = 0.8
 
 NEAR_BIAS_M, NEAR_REACH_M = 0.20, 1.5
 """Modules misjudge strong signals, each in its own way: what of that one curve for the whole team
-(`problem.fading`) does not describe. In the MURP recordings a range of below 1 m is 0.11 m shorter
+(`problem.near_range_shape`) does not describe. In the MURP recordings a range of below 1 m is 0.11 m shorter
 than one of 2 to 4 m, one of 1 to 2 m 0.05 m."""
 
 _TERMS = np.array([[3, 4, 1], [4, 5, 2], [1, 2, 0], [1, 2, 0]])
@@ -151,7 +151,7 @@ class WindowNoise:
         a: OdometryNoise,
         b: OdometryNoise,
     ) -> None:
-        """Noise of a window with antennas at a_points, b_points (n, 2), of its sensors."""
+        """PairNoise of a window with antennas at a_points, b_points (n, 2), of its sensors."""
         self.sigma = ranges.sigma
         self._before = window.before
         self._ranges = range_covariance(window.t, window.ranges, ranges)

@@ -50,7 +50,7 @@ def test_what_is_exchanged_is_what_is_read() -> None:
 def test_gauss_holds_the_far_away_as_tightly_as_the_near() -> None:
     def pull(error: float) -> float:
         system = System(np.zeros((1, 0)), np.zeros((0, 1)), np.zeros((1, 1)), np.zeros(1), 0.0)
-        system.hold_loosely(np.array([0]), np.array([error]), np.array([0.1]))
+        system.add_cauchy_prior(np.array([0]), np.array([error]), np.array([0.1]))
         return float(system.gradient[0] / error)
 
     assert pull(1.0) < 0.02 * pull(0.01)

@@ -12,7 +12,7 @@ from lab.benchmark.graphs import Graph, Known
 from scipy.optimize import least_squares
 
 from drslamd.slam import se2
-from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraph
+from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
 
 Array = np.ndarray
 EACH, ROBOTS = 13, 3
@@ -97,11 +97,11 @@ def test_poses_of_one_time_are_neighbours(team: Graph) -> None:
 
 def test_gtsam_solves_the_same_graph(team: Graph) -> None:
     gtsam = pytest.importorskip("gtsam")
-    start = PoseGraph(team.edges, team.count).chordal_start()
+    start = PoseGraphSolver(team.edges, team.count).chordal_start()
     found = module3.gtsam_solver(team, start)[module3.GTSAM]()
     assert isinstance(found, gtsam.Values)
     poses = [found.atPose2(k) for k in range(team.count)]
-    cost = PoseGraph(team.edges, team.count).cost(
+    cost = PoseGraphSolver(team.edges, team.count).cost(
         np.array([(p.x(), p.y(), p.theta()) for p in poses])
     )
     # it weighs an angle once where the benchmark's cost counts it twice

@@ -12,8 +12,8 @@ from lab.benchmark.relative_graph import components, solve
 from drslamd.conventions import Chain
 from drslamd.slam import se2
 from drslamd.slam.graph.measurements import GraphEntry, RelativePoses
-from drslamd.slam.graph.pose_graph import TeamGraph
-from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraph
+from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
 from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
 
 A, B = Chain(2, 10), Chain(5, 20)
@@ -42,8 +42,8 @@ def entries(noise: float) -> list[tuple[Chain, GraphEntry]]:
     ]
 
 
-def filled(parts: list[tuple[Chain, GraphEntry]]) -> TeamGraph:
-    graph = TeamGraph()
+def filled(parts: list[tuple[Chain, GraphEntry]]) -> PoseGraph:
+    graph = PoseGraph()
     for origin, entry in parts:
         graph.insert(origin, entry)
     return graph
@@ -85,7 +85,7 @@ def test_two_measurements_of_one_relative_pose_both_count() -> None:
     i, j, shift, theta, tau, kappa = (np.array(column) for column in zip(*rows, strict=True))
     edges = ComplexEdges(i, j, np.exp(1j * theta), shift, kappa, tau)
     assert len(edges) == 2 * (LENGTH - 1) + 3 + 2
-    assert solved.cost == pytest.approx(PoseGraph(edges, len(at)).cost(solved.poses))
+    assert solved.cost == pytest.approx(PoseGraphSolver(edges, len(at)).cost(solved.poses))
 
 
 def test_what_is_not_connected_to_us_waits() -> None:
@@ -95,7 +95,7 @@ def test_what_is_not_connected_to_us_waits() -> None:
 
 
 def test_nothing_is_solved_from_nothing() -> None:
-    assert solve(TeamGraph(), A) is None
+    assert solve(PoseGraph(), A) is None
     assert solve(filled(entries(0.0)[:1]), B) is None
 
 

@@ -18,13 +18,13 @@ from drslamd.slam.calibration.calibration_store import (
     MOST_BIAS_M,
     MOST_SCALE,
     NOTHING,
-    Constants,
-    Memory,
+    CalibrationStore,
+    SensorCalibration,
     is_sound,
 )
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
 
-KEPT = Constants(Learned(0.15, 0.005), Learned(-0.002, 0.0004), {2: Learned(-0.4, 0.03)})
+KEPT = SensorCalibration(Learned(0.15, 0.005), Learned(-0.002, 0.0004), {2: Learned(-0.4, 0.03)})
 SECTION = config().relative_pose
 OFF = config(extra="[relative_pose]\nself_calibration = false\n").relative_pose
 PAPER = config(extra='[relative_pose]\nalgorithm = "paper"\n').relative_pose
@@ -37,23 +37,23 @@ def estimate(
     return TeamEstimate(frame, {}, bias_m={(2, 5): bias}, scale={5: scale}, yaw={5: yaw})
 
 
-def after(memory: Memory, **learned: Learned) -> Constants:
+def after(memory: CalibrationStore, **learned: Learned) -> SensorCalibration:
     memory.update(estimate(**learned), 5, [2])
     return memory.latest
 
 
 @pytest.mark.parametrize("converged", [True, False])
 def test_only_a_solution_that_came_to_an_end_is_kept(converged: bool) -> None:
-    memory = Memory(Constants(), SECTION)
+    memory = CalibrationStore(SensorCalibration(), SECTION)
     memory.update(replace(estimate(scale=Learned(0.15, 0.005)), converged=converged), 5, [2])
     assert (memory.latest.scale.value == pytest.approx(0.15)) is converged
 
 
 def test_what_is_written_is_read_back() -> None:
-    for constants in (KEPT, Constants()):
+    for constants in (KEPT, SensorCalibration()):
         state = json.loads(json.dumps(constants.state()))
         assert is_sound(state)
-        assert Constants.of_state(state) == constants
+        assert SensorCalibration.of_state(state) == constants
 
 
 @pytest.mark.parametrize(
@@ -102,12 +102,12 @@ def test_sigmas_come_back_wider_than_they_were_kept_and_narrower_than_configured
     assert CHANGED_SCALE < KEPT.narrowed(wide).scale < 1.1 * CHANGED_SCALE
     assert CHANGED_BIAS_M < KEPT.bias_sigma(2, 5.0) < 1.1 * CHANGED_BIAS_M
     assert KEPT.bias_sigma(3, 0.3) == pytest.approx(0.3)
-    assert Constants().narrowed(NOISE) == NOISE
+    assert SensorCalibration().narrowed(NOISE) == NOISE
 
 
 def test_what_is_left_adds_to_what_was_taken_out() -> None:
     latest = after(
-        Memory(KEPT, SECTION),
+        CalibrationStore(KEPT, SECTION),
         scale=Learned(0.02, 0.004),
         bias=Learned(0.1, 0.02),
         yaw=Learned(0.001, 0.0002),
@@ -119,28 +119,28 @@ def test_what_is_left_adds_to_what_was_taken_out() -> None:
 
 @pytest.mark.parametrize("section", [OFF, PAPER])
 def test_nothing_is_taken_out_where_it_is_not_wanted_but_it_is_still_learned(section: Any) -> None:
-    memory = Memory(KEPT, section)
-    assert memory.used == Constants()
+    memory = CalibrationStore(KEPT, section)
+    assert memory.used == SensorCalibration()
     assert after(memory, bias=Learned(0.1, 0.02)).bias == {2: Learned(0.1, 0.02)}
 
 
 def test_a_start_that_learns_less_keeps_what_there_was() -> None:
     widened = math.hypot(2 * 0.03, CHANGED_BIAS_M)
     less, more = (Learned(0.1, factor * widened / 2) for factor in (1.01, 0.99))
-    assert after(Memory(KEPT, SECTION), bias=less) == KEPT
-    assert after(Memory(KEPT, SECTION), bias=more).bias[2].value == pytest.approx(-0.3)
-    memory = Memory(KEPT, SECTION)
+    assert after(CalibrationStore(KEPT, SECTION), bias=less) == KEPT
+    assert after(CalibrationStore(KEPT, SECTION), bias=more).bias[2].value == pytest.approx(-0.3)
+    memory = CalibrationStore(KEPT, SECTION)
     memory.update(None, 5, [2])
     assert memory.latest == KEPT
 
 
 def test_a_value_that_could_not_be_read_back_is_not_kept() -> None:
-    absurd = after(Memory(Constants(), SECTION), scale=Learned(0.6, 0.001))
-    assert absurd == Constants(bias={})
+    absurd = after(CalibrationStore(SensorCalibration(), SECTION), scale=Learned(0.6, 0.001))
+    assert absurd == SensorCalibration(bias={})
 
 
 def test_only_pairs_that_we_own_are_kept() -> None:
-    memory = Memory(Constants(), SECTION)
+    memory = CalibrationStore(SensorCalibration(), SECTION)
     memory.update(estimate(bias=Learned(0.1, 0.02)), 5, [])
     assert not memory.latest.bias
 
@@ -159,7 +159,7 @@ def test_only_pairs_that_we_own_are_kept() -> None:
 def test_the_disk_is_written_when_something_changed(
     scale: Learned, bias: Learned, is_news: bool
 ) -> None:
-    memory = Memory(KEPT, SECTION)
+    memory = CalibrationStore(KEPT, SECTION)
     after(memory, scale=scale, bias=bias)
     assert memory.is_news() == is_news
     memory.saved()

@@ -14,17 +14,17 @@ from drslamd.slam.calibration.window_calibration import (
     LEAST_BIAS_M,
     LEAST_SCALE,
     SHARED,
-    Sensors,
-    calibrated,
+    PairCalibration,
+    calibrated_window,
     remaining,
 )
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
-from drslamd.slam.relative_pose.solver import Noise, solve
+from drslamd.slam.relative_pose.solver import PairNoise, solve
 from drslamd.slam.relative_pose.window import Window
 from drslamd.slam.relative_pose.window_noise import RangeNoise
 
-SENSORS = Noise(RangeNoise(0.10, 0.30), NOISE, NOISE)
-KNOWN = Sensors(Learned(-0.4, 0.01), Learned(0.15, 0.001), Learned(-0.05, 0.001))
+SENSORS = PairNoise(RangeNoise(0.10, 0.30), NOISE, NOISE)
+KNOWN = PairCalibration(Learned(-0.4, 0.01), Learned(0.15, 0.001), Learned(-0.05, 0.001))
 
 
 def uncalibrated(seed: int) -> tuple[Window, Array]:
@@ -43,7 +43,7 @@ def uncalibrated(seed: int) -> tuple[Window, Array]:
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_calibrated_window_gives_the_exact_pose(seed: int) -> None:
     window, true = uncalibrated(seed)
-    better = solve(*calibrated(window, SENSORS, KNOWN), 0.1)
+    better = solve(*calibrated_window(window, SENSORS, KNOWN), 0.1)
     assert same_pose(better.hypotheses[0].a_T_b, true, 1e-6)
     before = solve(window, SENSORS, 0.1).hypotheses
     assert not before or not same_pose(before[0].a_T_b, true, 0.1)
@@ -51,7 +51,7 @@ def test_a_calibrated_window_gives_the_exact_pose(seed: int) -> None:
 
 def test_what_was_never_measured_changes_nothing() -> None:
     window, _ = uncalibrated(3)
-    same, noise = calibrated(window, SENSORS, Sensors.of(None, 0, 1))
+    same, noise = calibrated_window(window, SENSORS, PairCalibration.of(None, 0, 1))
     assert np.array_equal(same.ranges, window.ranges)
     assert np.array_equal(same.a_poses, window.a_poses)
     assert noise.ranges.bias_sigma == pytest.approx(0.30)
@@ -59,7 +59,7 @@ def test_what_was_never_measured_changes_nothing() -> None:
 
 
 def test_what_is_left_is_never_below_what_no_constant_describes() -> None:
-    _, noise = calibrated(uncalibrated(4)[0], SENSORS, KNOWN)
+    _, noise = calibrated_window(uncalibrated(4)[0], SENSORS, KNOWN)
     assert noise.ranges.bias_sigma == pytest.approx(1 / math.hypot(1 / 0.3, 1 / 0.0539), rel=1e-3)
     assert noise.ranges.bias_sigma > 0.98 * LEAST_BIAS_M
     assert 0.9 * LEAST_SCALE < noise.b.scale < NOISE.scale
@@ -69,8 +69,8 @@ def test_what_is_left_is_never_below_what_no_constant_describes() -> None:
 @pytest.mark.parametrize("scatter", [0.5, 1.0, 1.3])
 def test_ranges_that_scatter_less_have_taught_more(scatter: float) -> None:
     window, _ = uncalibrated(5)
-    learned = Sensors(Learned(0.1, 0.08), Learned(0.05, 0.02), Learned(0.0, 0.01), scatter)
-    same, noise = calibrated(window, SENSORS, learned)
+    learned = PairCalibration(Learned(0.1, 0.08), Learned(0.05, 0.02), Learned(0.0, 0.01), scatter)
+    same, noise = calibrated_window(window, SENSORS, learned)
     assert np.allclose(same.ranges, window.ranges - 0.1)
     # weights are those that the configuration asks for, claims those of what was learned
     assert noise.ranges.sigma == SENSORS.ranges.sigma
@@ -92,7 +92,7 @@ def test_knowledge_adds_up_as_information(sigma: float) -> None:
 def test_what_strong_signals_do_is_taken_out_of_near_ranges_alone() -> None:
     window, _ = uncalibrated(5)
     window = replace(window, ranges=np.linspace(-0.2, 30.0, len(window.ranges)))
-    better, _ = calibrated(window, SENSORS, Sensors(strong=Learned(-0.2, 0.02)))
+    better, _ = calibrated_window(window, SENSORS, PairCalibration(near_bias=Learned(-0.2, 0.02)))
     added = better.ranges - window.ranges
     assert added[0] == pytest.approx(0.2)
     assert np.interp(3.0, window.ranges, added) == pytest.approx(0.2 / math.e, abs=0.003)
@@ -107,12 +107,12 @@ def test_a_pair_is_found_whoever_owns_it() -> None:
         scale={2: Learned(0.1, 0.01)},
         scatter={(1, 2): 0.7},
     )
-    sensors = Sensors.of(replace(estimate, strong_m=Learned(-0.1, 0.03)), 2, 1)
+    sensors = PairCalibration.of(replace(estimate, near_bias_m=Learned(-0.1, 0.03)), 2, 1)
     assert sensors.bias.value == 0.3
     assert sensors.scatter == 0.7
-    assert Sensors.of(estimate, 0, 1).scatter == 1.0
-    assert sensors.strong == (-0.1, 0.03)
+    assert PairCalibration.of(estimate, 0, 1).scatter == 1.0
+    assert sensors.near_bias == (-0.1, 0.03)
     assert sensors.scale_a.value == 0.1
     assert math.isinf(sensors.scale_b.sigma)
     # where module 3 has not come to an end, nothing has been learned
-    assert Sensors.of(replace(estimate, converged=False), 2, 1) == Sensors()
+    assert PairCalibration.of(replace(estimate, converged=False), 2, 1) == PairCalibration()

@@ -14,15 +14,15 @@ from slam_scenes import NOISE, closure, keyframes, range_item, small_team, trait
 from drslamd.conventions import Chain, Segment
 from drslamd.slam.graph import pose_graph
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
-from drslamd.slam.graph.pose_graph import ChainItems, Rows, TeamGraph
+from drslamd.slam.graph.pose_graph import ChainData, PoseGraph, Rows
 from drslamd.slam.odometry.track import growth
 
 A, B, C = Chain(0, 5), Chain(1, 6), Chain(2, 7)
 EVERYBODY = {0, 1, 2}
 
 
-def graph_of(*entries: tuple[Chain, GraphEntry]) -> TeamGraph:
-    graph = TeamGraph()
+def graph_of(*entries: tuple[Chain, GraphEntry]) -> PoseGraph:
+    graph = PoseGraph()
     for origin, entry in entries:
         graph.insert(origin, entry)
     return graph
@@ -66,7 +66,7 @@ def test_every_order_of_arrival_gives_the_same_graph() -> None:
     shuffle = random.Random(1)
     for _ in range(30):
         shuffle.shuffle(entries)
-        graph = TeamGraph()
+        graph = PoseGraph()
         for origin, entry in entries:
             graph.insert(origin, entry)
             if shuffle.random() < 0.3:
@@ -184,7 +184,7 @@ def test_rows_that_nobody_looks_at_are_bounded_too() -> None:
 
 def test_a_chain_keeps_the_last_keyframes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pose_graph, "MAX_KEYFRAMES", 50)
-    items = ChainItems(A)
+    items = ChainData(A)
     path = wander(np.random.default_rng(3), 80, 0.4)
     for k in keyframes(range(80), path):
         items.add(k)
@@ -195,7 +195,7 @@ def test_a_chain_keeps_the_last_keyframes(monkeypatch: pytest.MonkeyPatch) -> No
 def test_a_pair_keeps_the_last_ranges_and_closures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pose_graph, "MAX_RANGES", 10)
     monkeypatch.setattr(pose_graph, "MAX_CLOSURES", 10)
-    graph = TeamGraph()
+    graph = PoseGraph()
     for seq in reversed(range(12)):
         ranges = (range_item(seq, B, seq, 1.0),)
         graph.insert(A, GraphEntry(seq, (), (), ranges, (closure(seq, 0, B, 0, (0, 0, 0)),)))
@@ -207,7 +207,7 @@ def test_a_pair_keeps_the_last_ranges_and_closures(monkeypatch: pytest.MonkeyPat
 # ---- sums ----
 
 
-def sums_between(items: ChainItems, i: int, k: int) -> np.ndarray:
+def sums_between(items: ChainData, i: int, k: int) -> np.ndarray:
     at, there = items.find(np.array([i, k], dtype=float))
     assert there.all()
     return np.asarray(items.sums[at[1]] - items.sums[at[0]])
@@ -222,7 +222,7 @@ def test_sums_are_those_of_the_whole_chain_however_it_came(monkeypatch: pytest.M
     for _ in range(10):
         order = list(frames)
         shuffle.shuffle(order)
-        items = ChainItems(A)
+        items = ChainData(A)
         for k in order:
             items.add(k)
             if shuffle.random() < 0.5:
@@ -236,7 +236,7 @@ def test_what_came_late_or_was_dropped_does_not_move_the_sums(
     """Candidates of module 2 remember them."""
     monkeypatch.setattr(pose_graph, "MAX_KEYFRAMES", 40)
     frames = keyframes(range(60), wander(np.random.default_rng(6), 60, 0.4))
-    items = ChainItems(A)
+    items = ChainData(A)
     for k in frames[20:45]:
         items.add(k)
     remembered = items.sums[items.find(np.array([30.0]))[0][0]].copy()
@@ -259,7 +259,7 @@ def test_rows_of_a_segment_are_found_and_of_one_that_is_not_there_are_none() -> 
 
 
 def test_a_segment_never_comes_back_whatever_a_robot_says() -> None:
-    items = ChainItems(A)
+    items = ChainData(A)
     for n, segment in enumerate([0, 3, 1, 1, 5, 0]):
         items.add(Keyframe(n, segment, 0, 0, 0))
     assert items.rows[:, 1].tolist() == [0, 3, 3, 3, 5, 5]

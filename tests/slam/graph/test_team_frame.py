@@ -21,7 +21,7 @@ from drslamd.conventions import Chain, Segment
 from drslamd.slam.graph import team_frame
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import GraphEntry
-from drslamd.slam.graph.pose_graph import TeamGraph
+from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group, carried, gauge_segment, groups, placed
 
 CHAINS = [Chain(r, 10 + r) for r in range(5)]
@@ -32,9 +32,9 @@ def segment(chain: Chain, number: int = 0) -> Segment:
     return Segment(*chain, number)
 
 
-def team_of(*joined: tuple[Chain, Chain], breaks: tuple[Chain, ...] = ()) -> TeamGraph:
+def team_of(*joined: tuple[Chain, Chain], breaks: tuple[Chain, ...] = ()) -> PoseGraph:
     """Everybody has keyframes 0, 10, ... 90; closures at 10 join robots, `breaks` break at 50."""
-    graph = TeamGraph()
+    graph = PoseGraph()
     for chain in CHAINS:
         path = wander(np.random.default_rng(chain.robot), 10, 0.4)
         parts = [keyframes(range(0, 50, 10), path[:5])]
@@ -46,7 +46,7 @@ def team_of(*joined: tuple[Chain, Chain], breaks: tuple[Chain, ...] = ()) -> Tea
     return graph
 
 
-def in_frame(graph: TeamGraph, members: set[Segment], frame: Segment) -> Group:
+def in_frame(graph: PoseGraph, members: set[Segment], frame: Segment) -> Group:
     known = {Segment(*c.chain, int(s)) for c in graph.chains.values() for s in c.rows[:, 1]}
     assert members <= known
     return Group(members, frame, {})
@@ -110,7 +110,7 @@ def test_of_its_segments_the_first_in_the_group_counts() -> None:
 # ---- where everybody starts ----
 
 
-def exact(robots: int = 3) -> tuple[TeamGraph, Group, dict[int, Array]]:
+def exact(robots: int = 3) -> tuple[PoseGraph, Group, dict[int, Array]]:
     """A team without errors and the truth in the frame of robot 0's odometry."""
     team = small_team(3, robots=robots, noise=EXACT, closure_sigma=0.0)
     members = {Segment(*chain, 0) for chain in team.chains.values()}
@@ -119,7 +119,7 @@ def exact(robots: int = 3) -> tuple[TeamGraph, Group, dict[int, Array]]:
     return team.graph, Group(members, Segment(*team.chains[0], 0), {}), truth
 
 
-def as_estimate(group: Group, graph: TeamGraph, poses: dict[int, Array]) -> TeamEstimate:
+def as_estimate(group: Group, graph: PoseGraph, poses: dict[int, Array]) -> TeamEstimate:
     return TeamEstimate(
         group.frame,
         {r: Trajectory(graph.chains[r].chain, graph.chains[r].n[: len(p)], p)

@@ -22,17 +22,17 @@ from drslamd.conventions import Chain, Segment
 from drslamd.slam.graph.estimate import Trajectory
 from drslamd.slam.graph.history import History
 from drslamd.slam.graph.measurements import GraphEntry
-from drslamd.slam.graph.pose_graph import TeamGraph
+from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.thinning import RECENT_S, TEAM_S, Thinning, recent_s
 
 A, B = Chain(0, 1), Chain(1, 1)
 AHEAD = 20
 
 
-def driven(seconds: int, order: list[int] | None = None) -> TeamGraph:
+def driven(seconds: int, order: list[int] | None = None) -> PoseGraph:
     """One robot with a keyframe a second, thinned as they come."""
     frames = keyframes(range(0, 10 * seconds, 10), wander(np.random.default_rng(1), seconds))
-    graph = TeamGraph()
+    graph = PoseGraph()
     thinning = Thinning(graph)
     for k in order or range(seconds):
         graph.insert(A, GraphEntry(k, keyframes=(frames[k],)))
@@ -71,10 +71,10 @@ def test_a_large_team_shares(robots: int, seconds: int) -> None:
     assert robots * recent_s(robots) <= TEAM_S
 
 
-def two_robots(seconds: int) -> tuple[TeamGraph, np.ndarray, np.ndarray]:
+def two_robots(seconds: int) -> tuple[PoseGraph, np.ndarray, np.ndarray]:
     """Exact ranges and closures every second; b's clock is 2 s ahead, so are its cells of time."""
     one, other = straight((0, 0, 0.3), seconds, 0.02), straight((5, 1, -2.0), seconds, 0.02)
-    graph = TeamGraph()
+    graph = PoseGraph()
     thinning = Thinning(graph)
     for k, (a, b) in enumerate(zip(one, other, strict=True)):
         distance = math.hypot(a[0] - b[0], a[1] - b[1])
@@ -119,7 +119,7 @@ def test_what_was_carried_far_is_less_certain_and_what_is_recent_is_not() -> Non
 
 
 def test_sums_between_keyframes_that_stay_do_not_shrink_to_the_chords() -> None:
-    graph = TeamGraph()
+    graph = PoseGraph()
     thinning = Thinning(graph)
     circle = [[math.cos(k / 5), math.sin(k / 5), k / 5] for k in range(1_000)]
     for k, pose in enumerate(circle):
@@ -132,7 +132,7 @@ def test_sums_between_keyframes_that_stay_do_not_shrink_to_the_chords() -> None:
 
 
 def test_the_first_keyframe_of_every_piece_stays_because_frames_begin_there() -> None:
-    graph = TeamGraph()
+    graph = PoseGraph()
     thinning = Thinning(graph)
     for k in range(1_000):
         frame = keyframes([10 * k], [[0.1 * k, 0.0, 0.0]], segment=k // 100)

@@ -22,7 +22,7 @@ from slam_scenes import (
 from drslamd.conventions import GRID_US, Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
-from drslamd.slam.graph.pose_graph import ChainItems, TeamGraph
+from drslamd.slam.graph.pose_graph import ChainData, PoseGraph
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.factors import Numbering, chain_links, clock_shifts, numbering, sensible
 
@@ -33,8 +33,8 @@ def members(*chains: Chain, segment: int = 0) -> set[Segment]:
     return {Segment(*chain, segment) for chain in chains}
 
 
-def chain_of(path: Array, n: list[int], segments: list[int] | None = None) -> ChainItems:
-    items = ChainItems(A)
+def chain_of(path: Array, n: list[int], segments: list[int] | None = None) -> ChainData:
+    items = ChainData(A)
     for k, (frame,) in enumerate(zip(keyframes(n, path), strict=True)):
         items.add(frame if segments is None else Keyframe(
             frame.n, segments[k], frame.x, frame.y, frame.theta
@@ -42,9 +42,9 @@ def chain_of(path: Array, n: list[int], segments: list[int] | None = None) -> Ch
     return items
 
 
-def two_robots() -> TeamGraph:
+def two_robots() -> PoseGraph:
     """a at 0, 10, 20 ... on its clock, b in between, 1000 samples ahead."""
-    graph = TeamGraph()
+    graph = PoseGraph()
     path = wander(np.random.default_rng(0), 8, 0.4)
     graph.insert(A, GraphEntry(0, keyframes=keyframes(range(0, 80, 10), path)))
     graph.insert(B, GraphEntry(0, keyframes=keyframes(range(1005, 1085, 10), path)))
@@ -66,7 +66,7 @@ def test_poses_are_numbered_in_the_order_of_time() -> None:
 
 def test_keyframes_of_other_segments_have_no_place() -> None:
     path = wander(np.random.default_rng(1), 6, 0.4)
-    graph = TeamGraph()
+    graph = PoseGraph()
     for first, segment in ((0, 0), (30, 1)):
         part = keyframes(range(first, first + 30, 10), path[first // 10 :][:3], segment)
         graph.insert(A, GraphEntry(segment, keyframes=part))
@@ -75,7 +75,7 @@ def test_keyframes_of_other_segments_have_no_place() -> None:
     assert numbers.place[0].tolist() == [-1, -1, -1, 1, 2, 3]
     n = np.array([0.0, 30.0, 35.0, 50.0])
     assert numbers.of(graph.chains[0], n).tolist() == [-1, 1, -1, 3]
-    assert numbers.of(ChainItems(C), n).tolist() == [-1] * 4
+    assert numbers.of(ChainData(C), n).tolist() == [-1] * 4
 
 
 def test_a_robot_whose_clock_we_do_not_know_is_placed_by_its_ranges() -> None:
@@ -168,7 +168,7 @@ def test_links_of_a_team_carry_robot_and_path() -> None:
 # ---- ranges and closures ----
 
 
-def numbered(graph: TeamGraph) -> Numbering:
+def numbered(graph: PoseGraph) -> Numbering:
     return numbering(graph, members(A, B), {0: 0, 1: 1000 * GRID_US})
 
 

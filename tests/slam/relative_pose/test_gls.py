@@ -10,7 +10,7 @@ from scipy.linalg import eigvalsh
 from scipy.optimize import least_squares
 from slam_scenes import NOISE, Array, matrix, same_pose, wander, window_of
 
-from drslamd.slam.relative_pose.gls import judge, middle
+from drslamd.slam.relative_pose.gls import middle, refine
 from drslamd.slam.relative_pose.range_fit import RangeFit
 from drslamd.slam.relative_pose.window import Window
 from drslamd.slam.relative_pose.window_noise import RangeNoise, WindowNoise
@@ -41,7 +41,7 @@ def whitened(window: Window, noise: WindowNoise, at: Array) -> Array:
 def test_the_pose_and_its_covariance_are_those_of_generalised_least_squares(seed: int) -> None:
     window, true = noisy(seed)
     fit, noise = parts(window)
-    judged = judge(fit, noise, fit.centred(true[None]))
+    judged = refine(fit, noise, fit.centred(true[None]))
     assert judged is not None
     pose = fit.poses(judged.minima.centred)[0]
     root = whitened(window, noise, pose)
@@ -62,12 +62,12 @@ def test_the_pose_and_its_covariance_are_those_of_generalised_least_squares(seed
 
 @pytest.mark.parametrize("scatter", [0.5, 1.5])
 def test_claims_follow_what_ranges_scatter_and_weights_do_not(scatter: float) -> None:
-    """Noise drawn as it is claimed, through the weights that were kept: a sandwich."""
+    """PairNoise drawn as it is claimed, through the weights that were kept: a sandwich."""
     window, true = noisy(7)
     fit, noise = parts(window)
     start = fit.centred(true[None])
-    judged = judge(fit, noise, start)
-    as_known = judge(fit, parts(window, replace(RANGES, scatter=scatter))[1], start)
+    judged = refine(fit, noise, start)
+    as_known = refine(fit, parts(window, replace(RANGES, scatter=scatter))[1], start)
     assert judged is not None
     assert as_known is not None
     plain, claimed = judged.minima, as_known.minima
@@ -92,9 +92,9 @@ def test_a_pose_that_was_named_stays_where_it_is_when_it_is_judged_again(seed: i
     a, b = window.a_poses * [1.25, 1.25, 1], window.b_poses * [0.8, 0.8, 1]
     wrong = replace(window, a_poses=a, b_poses=b)
     fit, noise = parts(wrong)
-    once = judge(fit, noise, fit.centred((true + [1.5, -1.5, 0.3])[None]))
+    once = refine(fit, noise, fit.centred((true + [1.5, -1.5, 0.3])[None]))
     assert once is not None
-    again = judge(fit, noise, once.minima.centred)
+    again = refine(fit, noise, once.minima.centred)
     assert again is not None
     m = fit.by_step(again.minima.centred)[0]
     off = fit.poses(again.minima.centred)[0] - fit.poses(once.minima.centred)[0]
@@ -105,10 +105,10 @@ def test_candidates_do_not_disturb_each_other() -> None:
     window, true = noisy(0)
     fit, noise = parts(window)
     starts = fit.centred(np.array([true, true + [0.4, 0.3, 0.1], true * [1, -1, -1]]))
-    together = judge(fit, noise, starts)
+    together = refine(fit, noise, starts)
     assert together is not None
     for k in range(3):
-        alone = judge(fit, noise, starts[k : k + 1])
+        alone = refine(fit, noise, starts[k : k + 1])
         assert alone is not None
         pose = fit.poses(alone.minima.centred)[0]
         twins = [same_pose(pose, other, 0.02) for other in fit.poses(together.minima.centred)]
@@ -121,7 +121,7 @@ def test_candidates_do_not_disturb_each_other() -> None:
 def test_minima_come_best_first_with_their_own_residuals() -> None:
     window, true = noisy(0)
     fit, noise = parts(window)
-    judged = judge(fit, noise, fit.centred(np.array([true * [1, -1, -1], true])))
+    judged = refine(fit, noise, fit.centred(np.array([true * [1, -1, -1], true])))
     assert judged is not None
     assert judged.minima.chi2[0] < judged.minima.chi2[1]
     assert same_pose(fit.poses(judged.minima.centred)[0], true, 0.5)
@@ -132,10 +132,10 @@ def test_a_window_that_stays_vague_under_its_noise_is_not_judged() -> None:
     """Odometry that may turn by anything: what the ranges say then holds for no heading."""
     window, true = noisy(0)
     fit, noise = parts(window)
-    assert judge(fit, noise, fit.centred(true[None])) is not None
+    assert refine(fit, noise, fit.centred(true[None])) is not None
     lost = replace(NOISE, yaw_rad_per_sqrt_m=3.0)
     noise = WindowNoise(window, window.a_points, window.b_points, RANGES, lost, lost)
-    assert judge(fit, noise, fit.centred(true[None])) is None
+    assert refine(fit, noise, fit.centred(true[None])) is None
 
 
 def test_a_covariance_that_is_none_leaves_an_infinite_misfit(
@@ -151,7 +151,7 @@ def test_a_covariance_that_is_none_leaves_an_infinite_misfit(
         return covariance
 
     monkeypatch.setattr(WindowNoise, "covariance", spoiled)
-    judged = judge(fit, noise, fit.centred(np.array([true, true])))
+    judged = refine(fit, noise, fit.centred(np.array([true, true])))
     assert judged is not None
     assert np.isfinite(judged.minima.chi2[0])
     assert judged.minima.chi2[1] == np.inf

@@ -10,13 +10,13 @@ from slam_scenes import NOISE, config, traits_of
 
 from drslamd.conventions import GRID_US, Chain
 from drslamd.slam.graph.measurements import Keyframe
-from drslamd.slam.graph.pose_graph import ChainItems
+from drslamd.slam.graph.pose_graph import ChainData
 from drslamd.slam.odometry.track import Track
 from drslamd.slam.relative_pose.pair_window import (
     CONFIRM_US,
-    RangeItems,
+    PairEnd,
+    RangeSampler,
     Request,
-    Side,
     level,
     request,
 )
@@ -25,14 +25,14 @@ from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 LAST = 200
 
 
-def side(robot: int) -> Side:
+def side(robot: int) -> PairEnd:
     """A robot that drives along x at 0.1 m a sample, with a keyframe a second."""
-    track, items = Track(1000), ChainItems(Chain(robot, 1))
+    track, items = Track(1000), ChainData(Chain(robot, 1))
     for n in range(LAST + 1):
         track.append(n, np.array([1000.0 * n, 0.0, 0.0]))
         if n % 10 == 0:
             items.add(Keyframe(n, 0, 1000 * n, 0, 0))
-    return Side(track, items)
+    return PairEnd(track, items)
 
 
 def made(algorithm: str) -> Request:
@@ -91,7 +91,7 @@ def test_what_is_surely_blocked_is_not_in_a_window(gap_db: float, longest: float
 def test_a_range_for_the_graph_says_how_much_it_is_worth(
     gap_db: float, share: float, metres: float, sigma: float
 ) -> None:
-    item = RangeItems(0.1).next(measured(gap_db, share), side(0), side(1), Chain(1, 1))
+    item = RangeSampler(0.1).next(measured(gap_db, share), side(0), side(1), Chain(1, 1))
     assert item is not None
     assert item.range_m == metres
     assert item.sigma_m == pytest.approx(sigma, abs=0.006)
@@ -104,9 +104,9 @@ def test_a_range_for_the_graph_says_how_much_it_is_worth(
 def test_ranges_between_antennas_of_different_heights_are_seen_from_above(
     measured: float, from_above: float
 ) -> None:
-    low, high = ChainItems(Chain(0, 1)), ChainItems(Chain(1, 1))
+    low, high = ChainData(Chain(0, 1)), ChainData(Chain(1, 1))
     low.take_traits(0, traits_of(NOISE, height=0.5))
     high.take_traits(0, traits_of(NOISE, height=3.5))
-    a, b = Side(Track(10), low), Side(Track(10), high)
+    a, b = PairEnd(Track(10), low), PairEnd(Track(10), high)
     assert level(np.array([measured]), a, b)[0] == pytest.approx(from_above)
     assert level(np.array([measured]), a, a)[0] == pytest.approx(measured)

@@ -186,5 +186,5 @@ def test_ranges_that_are_known_to_scatter_less_leave_a_window_less_vague() -> No
     )
     assert np.allclose(quiet.covariance, plain.covariance / 4)
     assert np.array_equal(quiet.centred, plain.centred)
-    # the look must not be gloomier than the whole truth: that is for the judge to say
+    # the look must not be gloomier than the whole truth: that is for the refine to say
     assert np.array_equal(loud.covariance, plain.covariance)

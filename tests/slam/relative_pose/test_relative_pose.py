@@ -13,11 +13,17 @@ from slam_scenes import EXACT, NOISE, Array, matrix, same_pose, straight, wander
 from drslamd.slam import se2
 from drslamd.slam.relative_pose import coarse_search, range_fit, solver
 from drslamd.slam.relative_pose.range_fit import STEPS, Descent, RangeFit
-from drslamd.slam.relative_pose.solver import Estimate, Noise, Verdict, residuals, solve
+from drslamd.slam.relative_pose.solver import (
+    PairNoise,
+    RelativePoseEstimate,
+    Verdict,
+    residuals,
+    solve,
+)
 from drslamd.slam.relative_pose.window import Window
 from drslamd.slam.relative_pose.window_noise import RangeNoise
 
-SENSORS = Noise(RangeNoise(0.10, 0.30), NOISE, NOISE)
+SENSORS = PairNoise(RangeNoise(0.10, 0.30), NOISE, NOISE)
 DELTA = 0.1
 
 
@@ -31,11 +37,11 @@ def with_ranges(window: Window, ranges: Array) -> Window:
     return replace(window, ranges=ranges)
 
 
-def solved(window: Window) -> Estimate:
+def solved(window: Window) -> RelativePoseEstimate:
     return solve(window, SENSORS, DELTA)
 
 
-def nees(estimate: Estimate, true: Array) -> float:
+def nees(estimate: RelativePoseEstimate, true: Array) -> float:
     best = estimate.hypotheses[0]
     error = best.a_T_b - true
     error[2] = math.remainder(error[2], 2 * math.pi)
@@ -80,7 +86,7 @@ def test_a_bias_costs_nothing_where_the_other_robot_is_circled() -> None:
     b[:, :2] -= b[:, :2].mean(axis=0)
     for bias in (0.5, -0.5):
         window, true = window_of(a, b, bias)
-        best = solve(window, Noise(SENSORS.ranges, EXACT, EXACT), DELTA).hypotheses[0]
+        best = solve(window, PairNoise(SENSORS.ranges, EXACT, EXACT), DELTA).hypotheses[0]
         assert np.hypot(*(best.a_T_b - true)[:2]) < 0.03
 
 
@@ -138,7 +144,7 @@ def test_a_robot_may_have_passed_on_the_other_side(
 
     def least_nees() -> float:
         hypotheses = solved(window).hypotheses
-        return min(nees(Estimate(Verdict.UNIQUE, (one,)), true) for one in hypotheses)
+        return min(nees(RelativePoseEstimate(Verdict.UNIQUE, (one,)), true) for one in hypotheses)
 
     nearest = float(window.ranges.min())
     monkeypatch.setattr(solver, "CLOSE_PASS_M", nearest * 1.001)
@@ -173,7 +179,7 @@ CURVE = wander(np.random.default_rng(5), 60, 0.25)
 )
 def test_too_little_motion_is_said_to_be_too_little(a: Array, b: Array) -> None:
     estimate = solved(window_of(a, b)[0])
-    assert estimate == Estimate(Verdict.UNOBSERVABLE)
+    assert estimate == RelativePoseEstimate(Verdict.UNOBSERVABLE)
 
 
 @pytest.mark.parametrize(("count", "verdict"), [(0, True), (5, True), (6, False)])
@@ -191,7 +197,7 @@ def test_six_measurements_are_the_fewest(count: int, verdict: bool) -> None:
 def test_ranges_that_are_nonsense_fit_nothing(seed: int) -> None:
     window, _ = curved(seed)
     nonsense = np.random.default_rng(seed).uniform(0, 20, 60)
-    assert solved(with_ranges(window, nonsense)) == Estimate(Verdict.POOR_FIT)
+    assert solved(with_ranges(window, nonsense)) == RelativePoseEstimate(Verdict.POOR_FIT)
 
 
 # ---- on both sides of each threshold ----
@@ -332,7 +338,7 @@ def test_absurd_odometry_of_a_peer_raises_nothing() -> None:
         b_poses = window.b_poses * [far, -far, 50.0]
         for poses in (b_poses, np.full_like(b_poses, far), np.zeros_like(b_poses)):
             strange = replace(window, b_poses=poses)
-            noisy = Noise(SENSORS.ranges, NOISE, replace(NOISE, scale=0.5, yaw_rad_per_m=0.35))
+            noisy = PairNoise(SENSORS.ranges, NOISE, replace(NOISE, scale=0.5, yaw_rad_per_m=0.35))
             estimate = solve(strange, noisy, DELTA)
             assert estimate.verdict is not Verdict.UNIQUE
             solver.solve_paper(strange, 0.1, DELTA)

@@ -11,11 +11,11 @@ from lab.recordings import world
 from lab.score import metrics
 from slam_scenes import NOISE, Array, angle_between, seen_from_last
 
-from drslamd.slam.relative_pose.solver import Hypothesis, Noise, Verdict, solve
+from drslamd.slam.relative_pose.solver import Hypothesis, PairNoise, Verdict, solve
 from drslamd.slam.relative_pose.window import Window, binned
 from drslamd.slam.relative_pose.window_noise import RangeNoise
 
-SENSORS = Noise(RangeNoise(0.10, 0.30), NOISE, NOISE)
+SENSORS = PairNoise(RangeNoise(0.10, 0.30), NOISE, NOISE)
 """What a robot assumes by default; `world` draws a bias of 0.1 m, slow errors of 0.06 m, bursts."""
 BEYOND = 14.2
 """The 99.73 % quantile of chi-squared with 3 degrees: three sigmas."""

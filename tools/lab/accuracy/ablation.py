@@ -45,7 +45,7 @@ class Piece:
 
 def _hold_tightly(system: System, unknowns: Index, error: Array, sigma: Array) -> None:
     """Gauss's prior in the place of Cauchy's."""
-    system.hold(unknowns, error, sigma**-2.0)
+    system.add_gaussian_prior(unknowns, error, sigma**-2.0)
 
 
 def _measured(values: Array, sigmas: Array, prior: Array) -> Any:
@@ -64,7 +64,7 @@ PIECES = {
     ),
     "range-scatter": Piece(
         "closures claim what the configured sigma of ranges says",
-        exchanged=((banded_optimizer, "scatter", _as_configured),),
+        exchanged=((banded_optimizer, "scatter_ratios", _as_configured),),
     ),
     "nlos": Piece("the power of the first path is not looked at", "relative_pose", "nlos_db = 0.0"),
     "long-windows": Piece("windows of 30 s", "relative_pose", "window_max_s = 30.0"),
@@ -72,7 +72,7 @@ PIECES = {
     "cauchy-priors": Piece(
         "Gauss's priors with the configured sigmas on bias and scale",
         exchanged=(
-            (System, "hold_loosely", _hold_tightly),
+            (System, "add_cauchy_prior", _hold_tightly),
             (banded_optimizer, "CAUCHY_TAILS", 1.0),
             (banded_optimizer, "_loosely", _measured),
         ),
@@ -87,7 +87,7 @@ PIECES = {
     ),
     "strong-signals": Piece(
         "what biases do at short range is not an unknown",
-        exchanged=((banded_optimizer, "STRONG_SIGMA_M", 1e-6),),
+        exchanged=((banded_optimizer, "NEAR_BIAS_SIGMA_M", 1e-6),),
     ),
     "gnc": Piece(
         "`closures` believes whatever module 2 kept",

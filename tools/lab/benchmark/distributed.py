@@ -21,8 +21,8 @@ from drslamd.gossip import lc02
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
 from drslamd.slam.graph.measurements import GraphEntry, RelativePoses
-from drslamd.slam.graph.pose_graph import TeamGraph
-from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraph
+from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
 from lab.benchmark.graphs import Graph
 from lab.benchmark.relative_graph import SolvedPoses, solve
 
@@ -58,7 +58,7 @@ class GraphRobot:
     def __init__(self, number: int, graph: Graph) -> None:
         self.own = Chain(number, 1)
         self.team = Team(Seal(KEY, number, 1, {}))
-        self.graph = TeamGraph()
+        self.graph = PoseGraph()
         self.solved: SolvedPoses | None = None
         self.bytes_sent = 0
         self._held: dict[bytes, bool] = {}
@@ -111,7 +111,7 @@ def run(graph: Graph, loss: float, gap: float, most: int, seed: int = 0) -> Outc
         most: bound on rounds.
     """
     rng = np.random.default_rng(seed)
-    judge = PoseGraph(graph.edges, graph.count)
+    judge = PoseGraphSolver(graph.edges, graph.count)
     began = time.process_time()
     robots = [GraphRobot(k, graph) for k in range(int(graph.robot.max()) + 1)]
     cpu = time.process_time() - began
@@ -139,7 +139,7 @@ def run(graph: Graph, loss: float, gap: float, most: int, seed: int = 0) -> Outc
     return Outcome(number if worst <= gap else None, worst, sent, cpu)
 
 
-def _gap(robot: GraphRobot, graph: Graph, judge: PoseGraph) -> float:
+def _gap(robot: GraphRobot, graph: Graph, judge: PoseGraphSolver) -> float:
     """Of the whole team's poses as one robot has them; infinite while some are missing."""
     solved = robot.solved
     if solved is None or len(solved.poses) < graph.count:

@@ -11,7 +11,12 @@ from drslamd.config import Config, parse
 from drslamd.conventions import ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain
 from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
-from drslamd.slam.graph.measurements import ClosureItem, GraphEntry, Keyframe, RangeItem
+from drslamd.slam.graph.measurements import (
+    ClosureMeasurement,
+    GraphEntry,
+    Keyframe,
+    RangeMeasurement,
+)
 from lab.benchmark import timing
 from lab.benchmark.rows import Row
 from lab.play import virtual_team
@@ -100,11 +105,11 @@ def _entry(
     for peer in chains[robot + 1 :]:
         here, there = truth[robot][second], truth[peer.robot][second]
         distance = float(np.hypot(*(here - there)[:2])) + rng.normal(0, 0.07)
-        ranges.append(RangeItem(n, peer, n, (0.0, 0.0), (0.0, 0.0), distance, 0.1))
+        ranges.append(RangeMeasurement(n, peer, n, (0.0, 0.0), (0.0, 0.0), distance, 0.1))
         if second % 10 == 0:
             a_T_b = se2.between(here, there) + rng.normal(0, 0.1, 3)
             closures.append(
-                ClosureItem(len(chains) * second + peer.robot, True, n, peer, n,
+                ClosureMeasurement(len(chains) * second + peer.robot, True, n, peer, n,
                             (float(a_T_b[0]), float(a_T_b[1]), float(a_T_b[2])),
                             (0.01, 0.0, 0.0, 0.01, 0.0, 0.01))
             )  # fmt: skip

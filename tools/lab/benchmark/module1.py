@@ -60,7 +60,7 @@ def one_seed(window: Window) -> Array:
     return refined(window, 1)
 
 
-def full(window: Window) -> solver.Estimate:
+def full(window: Window) -> solver.RelativePoseEstimate:
     """What the daemon does with every window: into bins, solved with a verdict."""
     width = max(1.0 / windows.HZ, np.ptp(window.t) / POINTS)
     t, ranges, _ = binned(window.t, window.ranges, float(width))

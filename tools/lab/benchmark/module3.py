@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraph
+from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
 from drslamd.slam.optimizer.rbcd import block_descent
 from lab.benchmark import distributed, graphs, timing
 from lab.benchmark.graphs import Graph
@@ -47,11 +47,11 @@ def central(graph: Graph, quick: bool) -> Iterator[Row]:
     whole, more = TEAMS[graph.name]
     edges, count = graph.edges, graph.count
     without = edges.chosen(np.arange(len(edges)) != len(edges) - len(edges) // 10)
-    solved = PoseGraph(without, count).solve().poses
-    start = PoseGraph(edges, count).chordal_start()
+    solved = PoseGraphSolver(without, count).solve().poses
+    start = PoseGraphSolver(edges, count).chordal_start()
     programs: dict[str, Callable[[], object]] = {
-        "whole": lambda: PoseGraph(edges, count).solve(),
-        "more": lambda: PoseGraph(edges, count).solve(solved),
+        "whole": lambda: PoseGraphSolver(edges, count).solve(),
+        "more": lambda: PoseGraphSolver(edges, count).solve(solved),
         **gtsam_solver(graph, start),
     }
     times = timing.in_turns(programs, 15 if quick else 60, 4 if quick else 20)
@@ -64,7 +64,7 @@ def central(graph: Graph, quick: bool) -> Iterator[Row]:
         yield Row(3, f"{graph.name}, ours / GTSAM", found.median / peer.value, "ratio", 0.2)
     found = times["more"]
     yield Row(3, f"{graph.name}, one more closure", found.median, "ms", more, found.p99, peers)
-    gaps = [graph.gap(PoseGraph(edges, count).solve(s).cost) for s in (None, solved)]
+    gaps = [graph.gap(PoseGraphSolver(edges, count).solve(s).cost) for s in (None, solved)]
     yield Row(3, f"{graph.name}, gap to the certified optimum", max(map(abs, gaps)), "gap", GAP)
 
 
@@ -72,14 +72,14 @@ def in_space(graph: Graph) -> Iterator[Row]:
     """Loops between different times: the sparse solve."""
     edges, count = graph.edges, graph.count
     programs: dict[str, Callable[[], object]] = {
-        "whole": lambda: PoseGraph(edges, count).solve(),
-        **gtsam_solver(graph, PoseGraph(edges, count).chordal_start()),
+        "whole": lambda: PoseGraphSolver(edges, count).solve(),
+        **gtsam_solver(graph, PoseGraphSolver(edges, count).chordal_start()),
     }
     times = timing.in_turns(programs, 20, 10)
     peers = _gtsam(times)
     found = times["whole"]
     yield Row(3, f"{graph.name}, whole graph", found.median, "ms", None, found.p99, peers)
-    gap = abs(graph.gap(PoseGraph(edges, count).solve().cost))
+    gap = abs(graph.gap(PoseGraphSolver(edges, count).solve().cost))
     yield Row(3, f"{graph.name}, gap to the certified optimum", gap, "gap", GAP)
 
 
@@ -151,7 +151,7 @@ def shared(graph: Graph, quick: bool) -> Iterator[Row]:
 
 def plain_block_descent(graph: Graph, rounds: int) -> Iterator[Row]:
     """The paper's module 3 in rounds: every robot descends on its block, then all tell."""
-    judge = PoseGraph(graph.edges, graph.count)
+    judge = PoseGraphSolver(graph.edges, graph.count)
     rank = 5
     lifted = block_descent.lift(judge.chordal_start(), rank)
     robot = graph.robot[np.argsort(graph.place)]

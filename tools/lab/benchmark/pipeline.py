@@ -8,7 +8,7 @@ import numpy as np
 
 from drslamd.slam import se2
 from drslamd.slam.consistency.pcm import PairConsistency
-from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraph
+from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
 from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
 from drslamd.slam.relative_pose import solver
 from lab.benchmark import closures, module1, timing, windows
@@ -40,7 +40,7 @@ class Update:
         self._edges = _team_edges(rng)
         newest = np.minimum(self._edges.i, self._edges.j) >= ROBOTS * (SECONDS - 1)
         before = self._edges.chosen(~newest)
-        self._solved = PoseGraph(before, ROBOTS * SECONDS).solve().poses
+        self._solved = PoseGraphSolver(before, ROBOTS * SECONDS).solve().poses
         self._turn = 0
 
     def __call__(self) -> None:
@@ -51,7 +51,7 @@ class Update:
             solver.solve(window, windows.NOISE, module1.DELTA)
             pair.add(next(waiting))
         for _ in range(ROBOTS):
-            PoseGraph(self._edges, ROBOTS * SECONDS).solve(self._solved)
+            PoseGraphSolver(self._edges, ROBOTS * SECONDS).solve(self._solved)
 
 
 def _team_edges(rng: np.random.Generator) -> ComplexEdges:

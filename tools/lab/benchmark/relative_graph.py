@@ -13,8 +13,8 @@ import numpy as np
 
 from drslamd.conventions import MAX_ROBOT_ID, Chain
 from drslamd.slam.graph.measurements import RelativePoses
-from drslamd.slam.graph.pose_graph import TeamGraph
-from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraph
+from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
 from drslamd.slam.optimizer.problem import Index
 from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
 from drslamd.slam.se2 import Array
@@ -38,7 +38,7 @@ class SolvedPoses:
     converged: bool
 
 
-def solve(graph: TeamGraph, own: Chain) -> SolvedPoses | None:
+def solve(graph: PoseGraph, own: Chain) -> SolvedPoses | None:
     """The least cost of all relative poses of current chains; None while we have none.
 
     Keyframes of one number are taken for poses of one time. That is only an order of elimination:
@@ -65,7 +65,7 @@ def solve(graph: TeamGraph, own: Chain) -> SolvedPoses | None:
     numbered = replace(edges, i=place[i], j=place[j])
     # a pose relative to itself says nothing
     numbered = numbered.chosen(inside[i] & (i != j))
-    answer = PoseGraph(numbered, len(keys)).solve()
+    answer = PoseGraphSolver(numbered, len(keys)).solve()
     return SolvedPoses(keys % ROBOTS, keys // ROBOTS, answer.poses, answer.cost, answer.converged)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from drslamd.slam import se2
 from drslamd.slam.odometry.track import OdometryNoise
-from drslamd.slam.relative_pose.solver import Noise
+from drslamd.slam.relative_pose.solver import PairNoise
 from drslamd.slam.relative_pose.window import Window
 from drslamd.slam.relative_pose.window_noise import RangeNoise
 from lab.recordings.recording import Array
@@ -14,7 +14,7 @@ from lab.recordings.recording import Array
 SPEED_M_S, HZ, SIGMA_M = 0.5, 10, 0.1
 NEAREST_M, FARTHEST_M = 2.0, 15.0
 ODOMETRY = OdometryNoise(0.01, 0.003, 0.01, 0.01)
-NOISE = Noise(RangeNoise(SIGMA_M, 0.01), ODOMETRY, ODOMETRY)
+NOISE = PairNoise(RangeNoise(SIGMA_M, 0.01), ODOMETRY, ODOMETRY)
 
 
 def window(rng: np.random.Generator, tau: int, straight: bool = False) -> tuple[Window, Array]:

@@ -18,7 +18,7 @@ from drslamd.conventions import GRID_HZ, ROTATION_STEP_RAD, TRANSLATION_STEP_M, 
 from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.consistency.pcm import Candidate, PairConsistency
-from drslamd.slam.graph.measurements import ClosureItem, GraphEntry, Keyframe, PublicPoses
+from drslamd.slam.graph.measurements import ClosureMeasurement, GraphEntry, Keyframe, PublicPoses
 from drslamd.slam.odometry.track import OdometryNoise, growth
 from lab.recordings.recording import Array, EdgeRecording, Trail
 from lab.score import metrics
@@ -139,7 +139,7 @@ def _logs(
             t, _, b, x, y, yaw = recording.edges[row].tolist()
             n = round(t * GRID_HZ) + EARLIER
             peer = Chain(int(b), EPOCH)
-            closures.append(ClosureItem(row, True, n, peer, n, (x, y, yaw), covariance))
+            closures.append(ClosureMeasurement(row, True, n, peer, n, (x, y, yaw), covariance))
         logs[robot] = [GraphEntry(0, traits, tuple(keyframes), (), tuple(closures))]
     return logs
 

@@ -36,7 +36,7 @@ from drslamd.events import (
 from drslamd.gossip import lc02
 from drslamd.gossip.seal import team_key
 from drslamd.robot import Robot
-from drslamd.slam.calibration.calibration_store import UNLEARNED, Constants
+from drslamd.slam.calibration.calibration_store import UNLEARNED, SensorCalibration
 from lab.play.playback import Chunk, Hardware
 
 
@@ -126,7 +126,7 @@ class Simulator:
         secret: bytes | None = None,
         epoch: int = 1,
         epochs: dict[int, int] | None = None,
-        kept: Constants = UNLEARNED,
+        kept: SensorCalibration = UNLEARNED,
     ) -> Member:
         """Switch a robot on, now."""
 

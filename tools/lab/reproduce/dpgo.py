@@ -17,7 +17,7 @@ from scipy.sparse.linalg import spsolve
 
 from drslamd.conventions import ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain
 from drslamd.slam.graph.measurements import Keyframe
-from drslamd.slam.graph.pose_graph import ChainItems
+from drslamd.slam.graph.pose_graph import ChainData
 from drslamd.slam.optimizer.factors import chain_links
 from drslamd.slam.optimizer.problem import PoseEdges
 from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
@@ -38,9 +38,9 @@ class Graph:
     edges: ComplexEdges
 
 
-def chain(odometry: Array, robot: int) -> ChainItems:
+def chain(odometry: Array, robot: int) -> ChainData:
     """Dead-reckoned poses (n, 3) as keyframes."""
-    items = ChainItems(Chain(robot, 1))
+    items = ChainData(Chain(robot, 1))
     items.noise = NOISE
     steps = np.array([TRANSLATION_STEP_M, TRANSLATION_STEP_M, ROTATION_STEP_RAD])
     for n, (x, y, theta) in enumerate(np.round(odometry / steps).astype(int).tolist()):

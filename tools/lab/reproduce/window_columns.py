@@ -13,7 +13,7 @@ from drslamd.conventions import GRID_HZ
 from drslamd.slam.odometry.track import OdometryNoise
 from drslamd.slam.relative_pose import solver
 from drslamd.slam.relative_pose.pair_window import POINTS
-from drslamd.slam.relative_pose.solver import Estimate, Noise, Verdict
+from drslamd.slam.relative_pose.solver import PairNoise, RelativePoseEstimate, Verdict
 from drslamd.slam.relative_pose.window import Window
 from drslamd.slam.relative_pose.window_noise import RangeNoise
 from lab.recordings.recording import Array
@@ -36,12 +36,12 @@ ODOMETRY_NOISE = ((0.0, 0.0), (0.01, 0.5), (0.02, 1.0), (0.05, 2.0), (0.1, 4.0))
 """White noise added to positions (m) and headings (degrees) of the odometry."""
 
 
-def default_noise() -> Noise:
+def default_noise() -> PairNoise:
     """What the daemon tells `solve` by default."""
     section = RelativePoseSection()
     wheels = OdometryNoise.from_config(OdometrySection())
     ranges = RangeNoise(section.range_sigma_m, section.range_bias_sigma_m)
-    return Noise(ranges, wheels, wheels)
+    return PairNoise(ranges, wheels, wheels)
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,7 @@ def _both(tally: Tally, name: str, trial: Trial, every: int, farthest: float = n
             _answer(tally, f"{name}/drslamd", solver.solve(own, default_noise(), DELTA), case)
 
 
-def _answer(tally: Tally, name: str, estimate: Estimate, case: Case) -> None:
+def _answer(tally: Tally, name: str, estimate: RelativePoseEstimate, case: Case) -> None:
     single = estimate.verdict is Verdict.UNIQUE
     tally.add(f"{name}/answered", float(single))
     if single:

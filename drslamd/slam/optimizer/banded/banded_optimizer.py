@@ -15,11 +15,11 @@ import numpy as np
 
 from drslamd.config import Config
 from drslamd.conventions import Chain
-from drslamd.slam.calibration.range_scatter import scatter
+from drslamd.slam.calibration.range_scatter import scatter_ratios
 from drslamd.slam.graph import team_frame
 from drslamd.slam.graph.estimate import Learned, TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import PublicPoses
-from drslamd.slam.graph.pose_graph import TeamGraph
+from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.banded import banded_solver
@@ -29,7 +29,7 @@ from drslamd.slam.se2 import Array
 
 YAW_PRIOR_FLOOR = 1e-4
 """rad/m; a prior of zero width would make the system singular."""
-STRONG_SIGMA_M = 0.05
+NEAR_BIAS_SIGMA_M = 0.05
 """Makers correct most of what receivers misjudge of strong signals; what they leave is as large as
 other things that move a bias (`self_calibration.LEAST_BIAS_M`). Gauss's tails: with those that
 biases have, the two trade metres against each other where ranges vary little."""
@@ -40,7 +40,7 @@ HINT = 10.0**2
 they came from; but where those are missing nothing else holds the group together."""
 
 
-class Banded:
+class BandedOptimizer:
     """Ranges and condensed odometry of the whole group, one banded solve."""
 
     def __init__(self, config: Config, own: Chain) -> None:
@@ -49,18 +49,18 @@ class Banded:
 
     def job(
         self,
-        graph: TeamGraph,
+        graph: PoseGraph,
         group: Group,
         previous: TeamEstimate | None,
         public: Mapping[int, PublicPoses],
     ) -> Job:
         """See `Optimizer.job`; public poses are not needed."""
-        team = stated(graph, group, previous, self._bias_sigma)
+        team = build_problem(graph, group, previous, self._bias_sigma)
         return partial(_solve, team, group, self._range_sigma)
 
 
 @dataclass(frozen=True)
-class Stated:
+class TeamProblem:
     """A group as a problem, with the names behind its numbers.
 
     Attributes:
@@ -74,9 +74,9 @@ class Stated:
     pairs: list[tuple[int, int]]
 
 
-def stated(
-    graph: TeamGraph, group: Group, previous: TeamEstimate | None, bias_sigma: float
-) -> Stated:
+def build_problem(
+    graph: PoseGraph, group: Group, previous: TeamEstimate | None, bias_sigma: float
+) -> TeamProblem:
     """Number the group's poses by time and collect its edges.
 
     Args:
@@ -90,7 +90,7 @@ def stated(
         np.full(len(pairs), bias_sigma / CAUCHY_TAILS),
         np.array([items.noise.scale for items in chains]) / CAUCHY_TAILS,
         np.array([max(items.noise.yaw_rad_per_m, YAW_PRIOR_FLOOR) for items in chains]),
-        np.array([STRONG_SIGMA_M]),
+        np.array([NEAR_BIAS_SIGMA_M]),
     )
     start = Calibration.zero(priors)
     if previous:
@@ -98,7 +98,7 @@ def stated(
             np.array([previous.bias_m.get(pair, Learned()).value for pair in pairs]),
             np.array([previous.scale.get(robot, Learned()).value for robot in robots]),
             np.array([previous.yaw.get(robot, Learned()).value for robot in robots]),
-            np.array([previous.strong_m.value]),
+            np.array([previous.near_bias_m.value]),
         )
     initial = np.zeros((len(numbers.n), 3))
     for segment, poses in team_frame.placed(graph, group, previous).items():
@@ -113,10 +113,10 @@ def stated(
         hints.chosen(factors.sensible(hints.i, hints.j)),
         ranges.chosen(factors.sensible(ranges.i, ranges.j)), priors,
     )  # fmt: skip
-    return Stated(problem, start, [items.chain for items in chains], pairs)
+    return TeamProblem(problem, start, [items.chain for items in chains], pairs)
 
 
-def _solve(team: Stated, group: Group, range_sigma: float) -> TeamEstimate:
+def _solve(team: TeamProblem, group: Group, range_sigma: float) -> TeamEstimate:
     """Solve, with the uncertainty of everybody's latest pose, and sort the answer by robot."""
     problem = team.problem
     mine: dict[int, Array] = {}
@@ -130,7 +130,9 @@ def _solve(team: Stated, group: Group, range_sigma: float) -> TeamEstimate:
     assert spread is not None
     ranges = problem.ranges
     errors = range_errors(solution.poses, ranges, learned)[0]
-    scatters = scatter(errors, ranges.sigma, ranges.pair, len(team.pairs), range_sigma).tolist()
+    scatters = scatter_ratios(
+        errors, ranges.sigma, ranges.pair, len(team.pairs), range_sigma
+    ).tolist()
     return TeamEstimate(
         group.frame,
         {
@@ -147,7 +149,7 @@ def _solve(team: Stated, group: Group, range_sigma: float) -> TeamEstimate:
         solution.cost,
         solution.iterations,
         solution.converged,
-        strong_m=_measured(learned.strong, spread.strong, priors.strong**-2.0)[0],
+        near_bias_m=_measured(learned.near_bias, spread.near_bias, priors.near_bias**-2.0)[0],
     )
 
 

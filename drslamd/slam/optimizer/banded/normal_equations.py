@@ -19,7 +19,7 @@ from drslamd.slam.optimizer.problem import (
     PoseEdges,
     Problem,
     corrected,
-    fading,
+    near_range_shape,
     pose_errors,
     range_errors,
 )
@@ -37,7 +37,7 @@ class Layout:
 
     Attributes:
         poses: (k, 3) numbers of the unknowns of each pose.
-        bias, scale, yaw: numbers of the unknowns of each pair and robot; strong: of the team.
+        bias, scale, yaw: numbers of the unknowns of each pair and robot; near_bias: of the team.
         band, border: how many unknowns are in each.
         width: diagonals of the band, the main one included.
     """
@@ -46,7 +46,7 @@ class Layout:
     bias: Index
     scale: Index
     yaw: Index
-    strong: Index
+    near_bias: Index
     band: int
     border: int
     width: int
@@ -57,27 +57,29 @@ class Layout:
         edges = (problem.links, problem.closures, problem.ranges)
         i = np.concatenate([e.i for e in edges])
         j = np.concatenate([e.j for e in edges])
-        apart = far_poses(i, j, narrow=8 + 4 * len(priors.scale))
+        apart = border_poses(i, j, narrow=8 + 4 * len(priors.scale))
         inside = np.ones(count, dtype=bool)
         inside[apart] = False
         place = np.where(inside, np.cumsum(inside) - 1, 0)
         place[apart] = count - len(apart) + np.arange(len(apart))
         both = inside[i] & inside[j]
         reach = int(np.abs(place[i] - place[j])[both].max(initial=0))
-        sizes = [len(p) for p in (priors.bias, priors.scale, priors.yaw, priors.strong)]
+        sizes = [len(p) for p in (priors.bias, priors.scale, priors.yaw, priors.near_bias)]
         numbers = 3 * count + np.arange(sum(sizes))
-        bias, scale, yaw, strong = np.split(numbers, np.cumsum(sizes)[:-1])
+        bias, scale, yaw, near_bias = np.split(numbers, np.cumsum(sizes)[:-1])
         return Layout(
-            3 * place[:, None] + np.arange(3), bias, scale, yaw, strong,
+            3 * place[:, None] + np.arange(3), bias, scale, yaw, near_bias,
             3 * (count - len(apart)), 3 * len(apart) + sum(sizes), 3 * reach + 3,
         )  # fmt: skip
 
     def calibration(self, unknowns: Array) -> Calibration:
         """The part of a vector over all unknowns that belongs to the sensors."""
-        return Calibration(*(unknowns[k] for k in (self.bias, self.scale, self.yaw, self.strong)))
+        return Calibration(
+            *(unknowns[k] for k in (self.bias, self.scale, self.yaw, self.near_bias))
+        )
 
 
-def far_poses(i: Index, j: Index, narrow: int) -> Index:
+def border_poses(i: Index, j: Index, narrow: int) -> Index:
     """The poses that are taken out of the band.
 
     Every pose that is taken out costs three columns of the border, every pose that the longest
@@ -91,13 +93,13 @@ def far_poses(i: Index, j: Index, narrow: int) -> Index:
     reach = np.abs(i - j)
     while True:
         far = reach > narrow
-        apart = busiest(i[far], j[far], narrow + 1)
+        apart = vertex_cover(i[far], j[far], narrow + 1)
         if len(apart) <= narrow:
             return apart
         narrow *= 2
 
 
-def busiest(i: Index, j: Index, most: int) -> Index:
+def vertex_cover(i: Index, j: Index, most: int) -> Index:
     """Up to `most` poses that take part in all edges, or in as many as can be."""
     chosen: list[int] = []
     while len(i) and len(chosen) < most:
@@ -125,7 +127,7 @@ class System:
             np.zeros((layout.width, n)), np.zeros((n, b)), np.zeros((b, b)), np.zeros(n + b), 0.0
         )
 
-    def hold(self, unknowns: Index, error: Array, stiffness: Array | float) -> None:
+    def add_gaussian_prior(self, unknowns: Index, error: Array, stiffness: Array | float) -> None:
         """Add independent priors."""
         stiffness = np.broadcast_to(stiffness, error.shape)
         inside = unknowns < len(self.border)
@@ -135,17 +137,17 @@ class System:
         self.gradient[unknowns] += stiffness * error
         self.cost += float(np.sum(stiffness * error**2))
 
-    def hold_loosely(self, unknowns: Index, error: Array, sigma: Array) -> None:
+    def add_cauchy_prior(self, unknowns: Index, error: Array, sigma: Array) -> None:
         """Add independent priors with the tails of Cauchy's: log(1 + (e / sigma)^2) by its weight.
 
         Where little is measured the unknown stays near zero; where much is, the prior gives way.
         """
         scaled = (error / sigma) ** 2
-        self.hold(unknowns, error, 1 / (sigma**2 * (1 + scaled)))
+        self.add_gaussian_prior(unknowns, error, 1 / (sigma**2 * (1 + scaled)))
         self.cost += float(np.sum(np.log1p(scaled) - scaled / (1 + scaled)))
 
 
-class _Scatter:
+class _Assembly:
     """Where the blocks of one set of edges go in the system; the same in every iteration."""
 
     def __init__(self, layout: Layout, unknowns: Index) -> None:
@@ -193,10 +195,10 @@ class Equations:
             problem.links, problem.closures, problem.ranges, layout.poses,
         )  # fmt: skip
         sensors = np.stack([layout.scale[links.robot], layout.yaw[links.robot]], axis=-1)
-        self._links = _Scatter(layout, np.hstack([poses[links.i], poses[links.j], sensors]))
-        self._closures = _Scatter(layout, np.hstack([poses[closures.i], poses[closures.j]]))
-        shared = np.tile(layout.strong, (len(ranges), 1))
-        self._ranges = _Scatter(
+        self._links = _Assembly(layout, np.hstack([poses[links.i], poses[links.j], sensors]))
+        self._closures = _Assembly(layout, np.hstack([poses[closures.i], poses[closures.j]]))
+        shared = np.tile(layout.near_bias, (len(ranges), 1))
+        self._ranges = _Assembly(
             layout,
             np.column_stack([poses[ranges.i], poses[ranges.j], layout.bias[ranges.pair], shared]),
         )
@@ -208,13 +210,13 @@ class Equations:
         self._add_closures(system, poses)
         self._add_ranges(system, poses, calibration)
         layout, priors = self.layout, self._problem.priors
-        system.hold_loosely(layout.bias, calibration.bias, priors.bias)
-        system.hold_loosely(layout.scale, calibration.scale, priors.scale)
-        system.hold(layout.yaw, calibration.yaw, priors.yaw**-2.0)
-        system.hold(layout.strong, calibration.strong, priors.strong**-2.0)
+        system.add_cauchy_prior(layout.bias, calibration.bias, priors.bias)
+        system.add_cauchy_prior(layout.scale, calibration.scale, priors.scale)
+        system.add_gaussian_prior(layout.yaw, calibration.yaw, priors.yaw**-2.0)
+        system.add_gaussian_prior(layout.near_bias, calibration.near_bias, priors.near_bias**-2.0)
         gauge = self._problem.gauge
         moved = poses[gauge] - self._problem.initial[gauge]
-        system.hold(layout.poses[gauge], moved, GAUGE_SIGMA**-2)
+        system.add_gaussian_prior(layout.poses[gauge], moved, GAUGE_SIGMA**-2)
         return system
 
     def _add_links(self, system: System, poses: Array, calibration: Calibration) -> None:
@@ -242,7 +244,7 @@ class Equations:
         jacobian[:, 0, 2] = sight[:, 0] * arm_i[:, 1] - sight[:, 1] * arm_i[:, 0]
         jacobian[:, 0, 3:5] = sight
         jacobian[:, 0, 5] = sight[:, 1] * arm_j[:, 0] - sight[:, 0] * arm_j[:, 1]
-        jacobian[:, 0, 7] = fading(ranges.measured)
+        jacobian[:, 0, 7] = near_range_shape(ranges.measured)
         # Cauchy's cost c^2 log(1 + (e / c)^2) by its weight; e and c in sigmas
         scaled = (error / (ROBUST_SIGMAS * ranges.sigma)) ** 2
         weight = 1 / (1 + scaled)

@@ -1,7 +1,7 @@
 """`optimizer.algorithm = "closures"`: the paper's pose graph, solved exactly on every robot.
 
 Odometry and kept closures alone, with the weights and the cost of `rbcd`, and with every iterate of
-it left out: the graph is replicated anyway. Closures that the whole of it contradicts count for
+it left out: the graph is replicated anyway. ClosureOptimizer that the whole of it contradicts count for
 nothing (`graduated`). Robots that measured relative poses in full precision
 (`items.RelativePoses`) add those, which are believed.
 """
@@ -21,11 +21,11 @@ from drslamd.slam import se2
 from drslamd.slam.graph import team_frame
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import PublicPoses
-from drslamd.slam.graph.pose_graph import TeamGraph
+from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.closures import gnc
-from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraph
+from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.factors import Numbering, chain_links
 from drslamd.slam.optimizer.problem import PoseEdges
@@ -33,7 +33,7 @@ from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
 from drslamd.slam.se2 import Array
 
 
-class Closures:
+class ClosureOptimizer:
     """Odometry and closures of the whole group, one exact solve."""
 
     def __init__(self, config: Config, own: Chain) -> None:
@@ -41,7 +41,7 @@ class Closures:
 
     def job(
         self,
-        graph: TeamGraph,
+        graph: PoseGraph,
         group: Group,
         previous: TeamEstimate | None,
         public: Mapping[int, PublicPoses],
@@ -57,12 +57,12 @@ class Closures:
             for segment, poses in team_frame.placed(graph, group, previous).items():
                 rows = graph.chains[segment.robot].rows_of(segment.segment)
                 start[numbers.place[segment.robot][rows]] = poses
-        stated = _Stated(numbers, *_edges(graph, numbers), chains, gauge, first[2:], start)
+        stated = _ClosureProblem(numbers, *_edges(graph, numbers), chains, gauge, first[2:], start)
         return partial(_solve, stated, group)
 
 
 @dataclass(frozen=True)
-class _Stated:
+class _ClosureProblem:
     """A group as a pose graph.
 
     Attributes:
@@ -80,7 +80,7 @@ class _Stated:
     start: Array | None
 
 
-def _edges(graph: TeamGraph, numbers: Numbering) -> tuple[ComplexEdges, NDArray[np.bool_]]:
+def _edges(graph: PoseGraph, numbers: Numbering) -> tuple[ComplexEdges, NDArray[np.bool_]]:
     """All edges, and which of them are closures."""
     parts = [ComplexEdges.of(factors.closures(graph, numbers))]
     for robot, place in numbers.place.items():
@@ -100,7 +100,7 @@ def _edges(graph: TeamGraph, numbers: Numbering) -> tuple[ComplexEdges, NDArray[
     return edges.chosen(used), (np.arange(len(edges)) < len(parts[0]))[used]
 
 
-def _solve(stated: _Stated, group: Group) -> TeamEstimate:
+def _solve(stated: _ClosureProblem, group: Group) -> TeamEstimate:
     """Solve, carry the answer into the frame of the team, and sort it by robot."""
     numbers, count = stated.numbers, len(stated.numbers.n)
     answer, edges = gnc.solve(stated.edges, count, stated.is_closure, stated.start)
@@ -112,7 +112,9 @@ def _solve(stated: _Stated, group: Group) -> TeamEstimate:
     last = {robot: int(at[-1]) for robot, at in mine.items()}
     # the cost counts an angle twice (`ComplexEdges.of`), which for a covariance it must not
     weighed = replace(edges, kappa=edges.kappa / 2)
-    covariances = PoseGraph(weighed, count, stated.gauge).marginals(poses, list(last.values()))
+    covariances = PoseGraphSolver(weighed, count, stated.gauge).marginals(
+        poses, list(last.values())
+    )
     return TeamEstimate(
         group.frame,
         {c.robot: Trajectory(c, numbers.n[mine[c.robot]], poses[mine[c.robot]])

@@ -1,4 +1,4 @@
-"""Closures that contradict the rest of the graph, found by graduated non-convexity.
+"""ClosureOptimizer that contradict the rest of the graph, found by graduated non-convexity.
 
 Module 2 looks at one pair at a time: a set of closures that agrees with itself is kept, also when
 it is wrong as a whole and nobody of that pair speaks against it. Where other pairs close the loop,
@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.slam.chi_squared import quantile3
-from drslamd.slam.optimizer.closures.pose_graph_solver import Answer, PoseGraph
+from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolution, PoseGraphSolver
 from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
 from drslamd.slam.se2 import Array
 
@@ -43,7 +43,7 @@ LEAST_WEIGHT = 1e-6
 
 def solve(
     edges: ComplexEdges, count: int, doubted: NDArray[np.bool_], start: Array | None
-) -> tuple[Answer, ComplexEdges]:
+) -> tuple[PoseGraphSolution, ComplexEdges]:
     """The least truncated cost that a start leads to, and the edges as they were weighed for it.
 
     Args:
@@ -51,7 +51,7 @@ def solve(
         doubted: (m,) which of them may be wrong as a whole.
         start: (count, 3), or None for the chordal relaxation.
     """
-    answer = PoseGraph(edges, count).solve(start)
+    answer = PoseGraphSolver(edges, count).solve(start)
     squares = squared_errors(edges, answer.poses)[doubted]
     worst = float(squares.max(initial=0.0))
     if worst <= BELIEVABLE:
@@ -62,7 +62,7 @@ def solve(
         held = np.ones(len(edges))
         held[doubted] = np.maximum(weight, LEAST_WEIGHT)
         weighed = replace(edges, kappa=held * edges.kappa, tau=held * edges.tau)
-        answer = PoseGraph(weighed, count).solve(answer.poses)
+        answer = PoseGraphSolver(weighed, count).solve(answer.poses)
         steps += answer.steps
         squares = squared_errors(edges, answer.poses)[doubted]
     return replace(answer, steps=steps), weighed

@@ -34,7 +34,7 @@ LEAST_DAMPING, MOST_DAMPING = 1e-6, 1e6
 
 
 @dataclass(frozen=True)
-class Answer:
+class PoseGraphSolution:
     """Poses (n, 3), angles wrapped, and how they were reached."""
 
     poses: Array
@@ -60,7 +60,7 @@ class _Point:
     cost: float
 
 
-class PoseGraph:
+class PoseGraphSolver:
     """Edges between `count` poses that are all connected."""
 
     def __init__(self, edges: ComplexEdges, count: int, gauge: int = 0) -> None:
@@ -81,7 +81,9 @@ class PoseGraph:
         self._angle = np.angle(edges.turn)
         self._gauge = np.array([edges.tau.mean(), edges.tau.mean(), edges.kappa.mean()])
 
-    def solve(self, start: Array | None = None, most: int = 50, tolerance: float = 1e-6) -> Answer:
+    def solve(
+        self, start: Array | None = None, most: int = 50, tolerance: float = 1e-6
+    ) -> PoseGraphSolution:
         """Minimise from `start` (n, 3), or from the chordal relaxation.
 
         Args:
@@ -115,7 +117,7 @@ class PoseGraph:
             newton, before = gain <= NEWTON_BELOW, expected
             point, damping = trial, damping / 10 if damping > LEAST_DAMPING else 0.0
         poses = np.stack([point.place.real, point.place.imag, se2.wrap(point.theta)], axis=-1)
-        return Answer(poses[self._place], point.cost, steps, converged)
+        return PoseGraphSolution(poses[self._place], point.cost, steps, converged)
 
     def _stepped(self, point: _Point, factor: Factor) -> tuple[_Point, float]:
         """The point after a full step, and by how much the cost was expected to fall."""
@@ -144,7 +146,7 @@ class PoseGraph:
             raise AssertionError("positions of a connected graph are determined")
         pull = edges.tau * np.exp(1j * theta[i]) * edges.shift
         x, y = (
-            factor.solve(_scatter(j, part, count) - _scatter(i, part, count))
+            factor.solve(_accumulated(j, part, count) - _accumulated(i, part, count))
             for part in (pull.real, pull.imag)
         )
         return np.column_stack([x, y, theta])[self._place]
@@ -190,9 +192,15 @@ class PoseGraph:
         twist = edges.kappa * np.sin(point.turn)
         lever = pull.real * point.arm.imag - pull.imag * point.arm.real
         out = np.empty((count, 3))
-        out[:, 0] = _scatter(edges.j, pull.real, count) - _scatter(edges.i, pull.real, count)
-        out[:, 1] = _scatter(edges.j, pull.imag, count) - _scatter(edges.i, pull.imag, count)
-        out[:, 2] = _scatter(edges.j, twist, count) + _scatter(edges.i, lever - twist, count)
+        out[:, 0] = _accumulated(edges.j, pull.real, count) - _accumulated(
+            edges.i, pull.real, count
+        )
+        out[:, 1] = _accumulated(edges.j, pull.imag, count) - _accumulated(
+            edges.i, pull.imag, count
+        )
+        out[:, 2] = _accumulated(edges.j, twist, count) + _accumulated(
+            edges.i, lever - twist, count
+        )
         return out.ravel()
 
     def _factor(
@@ -202,16 +210,16 @@ class PoseGraph:
         tau, kappa = self._edges.tau, self._edges.kappa
         if newton:
             arm, stiff = point.arm, kappa * np.cos(point.turn)
-            bent = arm.real * point.error.real + arm.imag * point.error.imag
+            deform_track = arm.real * point.error.real + arm.imag * point.error.imag
         else:
             arm, stiff = point.arm + point.error, kappa * np.cos(point.turn / 2) ** 2
-            bent = 0.0
+            deform_track = 0.0
         across, along = tau * arm.imag, tau * arm.real
-        own = tau * (arm.real**2 + arm.imag**2 + bent) + stiff
+        own = tau * (arm.real**2 + arm.imag**2 + deform_track) + stiff
         values = [tau, tau, tau, tau, -tau, -tau, -across, along, across, -along,
                   own, stiff, -stiff, hold * self._gauge]  # fmt: skip
         return self._system.factor(np.concatenate(values), damping)
 
 
-def _scatter(at: Array, values: Array, count: int) -> Array:
+def _accumulated(at: Array, values: Array, count: int) -> Array:
     return np.bincount(at, values, count)

@@ -18,7 +18,7 @@ from drslamd.conventions import Chain
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import Lifted, TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import PublicPoses
-from drslamd.slam.graph.pose_graph import ChainItems, TeamGraph
+from drslamd.slam.graph.pose_graph import ChainData, PoseGraph
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.factors import chain_links, pose_edges
@@ -33,7 +33,7 @@ OFF_SPHERE = 1e-2
 
 
 @dataclass(frozen=True)
-class Neighbours:
+class LiftedNeighbours:
     """The lifted poses that this robot's closures lead to.
 
     Attributes:
@@ -59,7 +59,7 @@ class Start:
     own: PoseEdges
 
 
-class Rbcd:
+class RbcdOptimizer:
     """One round of block coordinate descent at a time."""
 
     def __init__(self, config: Config, own: Chain) -> None:
@@ -68,7 +68,7 @@ class Rbcd:
 
     def job(
         self,
-        graph: TeamGraph,
+        graph: PoseGraph,
         group: Group,
         previous: TeamEstimate | None,
         public: Mapping[int, PublicPoses],
@@ -87,11 +87,11 @@ class Rbcd:
 
     def _start(
         self,
-        items: ChainItems,
+        items: ChainData,
         used: Array,
         group: Group,
         previous: TeamEstimate | None,
-        around: Neighbours,
+        around: LiftedNeighbours,
     ) -> Array | None:
         """(k, 2 r) our keyframes: as they were, else by odometry from the nearest that is known."""
         n, poses = items.n[used], items.poses[used]
@@ -116,13 +116,13 @@ class Rbcd:
         return block_descent.moved(rows[nearest], se2.between(poses[at][nearest], poses))
 
 
-def _in_group(items: ChainItems, group: Group) -> Array:
+def _in_group(items: ChainData, group: Group) -> Array:
     """Which of our rows lie in segments of the group."""
     segments = [s.segment for s in group.members if s.chain == items.chain]
     return np.flatnonzero(np.isin(items.rows[:, 1], segments))
 
 
-def _links(items: ChainItems, used: Array) -> PoseEdges:
+def _links(items: ChainData, used: Array) -> PoseEdges:
     """Our odometry between the rows `used`, numbered as they are."""
     links = chain_links(items, calibrated=False)
     place = np.full(len(items.rows), -1)
@@ -146,12 +146,12 @@ def _on_sphere(rows: Array) -> Array:
 
 
 def neighbours(
-    graph: TeamGraph,
-    items: ChainItems,
+    graph: PoseGraph,
+    items: ChainData,
     used: Array,
     public: Mapping[int, PublicPoses],
     rank: int,
-) -> Neighbours:
+) -> LiftedNeighbours:
     """Sort the kept closures of our own pairs by whether the other end is known.
 
     Args:
@@ -187,14 +187,14 @@ def neighbours(
             chains.append(other)
             keyframes.append(far)
             rows.append(table[far])
-    return Neighbours(
+    return LiftedNeighbours(
         tuple(chains), np.array(keyframes), np.array(rows, dtype=complex).reshape(-1, 2 * rank),
         pose_edges(leaving), pose_edges(arriving), np.array(sorted(carriers)),
     )  # fmt: skip
 
 
 def _round(
-    start: Start, around: Neighbours, anchor: Array | None, group: Group, chain: Chain
+    start: Start, around: LiftedNeighbours, anchor: Array | None, group: Group, chain: Chain
 ) -> TeamEstimate:
     """One round on our block, and what it means in the frame of the team."""
     edges = [block_descent.ComplexEdges.of(e) for e in (start.own, around.leaving, around.arriving)]

@@ -1,4 +1,4 @@
-"""A group's graph stated as a problem, solved, and sorted by robot again."""
+"""A group's graph build_problem as a problem, solved, and sorted by robot again."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from slam_scenes import (
 from drslamd.conventions import GRID_US, Chain, Segment
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import GraphEntry
-from drslamd.slam.graph.pose_graph import TeamGraph
+from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer.banded import banded_optimizer
 from drslamd.slam.optimizer.banded.banded_optimizer import (
-    STRONG_SIGMA_M,
+    NEAR_BIAS_SIGMA_M,
     YAW_PRIOR_FLOOR,
-    Banded,
-    stated,
+    BandedOptimizer,
+    build_problem,
 )
-from drslamd.slam.optimizer.problem import FADING_M
+from drslamd.slam.optimizer.problem import NEAR_RANGE_M
 
 
-def solved(graph: TeamGraph, group: Group, previous: TeamEstimate | None = None) -> TeamEstimate:
-    return Banded(config(), group.frame.chain).job(graph, group, previous, {})()
+def solved(graph: PoseGraph, group: Group, previous: TeamEstimate | None = None) -> TeamEstimate:
+    return BandedOptimizer(config(), group.frame.chain).job(graph, group, previous, {})()
 
 
 def errors(estimate: TeamEstimate, truth: dict[int, Array]) -> float:
@@ -88,37 +88,37 @@ def test_what_strong_signals_do_is_one_constant_of_the_team(
     """Found where it may be large; its sigma is that of what was measured, without the prior."""
     team = small_team(2, count=150, range_sigma=0.01)
     for items in team.graph.pairs.values():
-        items.ranges[:, 6] -= 0.6 * np.exp(-items.ranges[:, 6] / FADING_M)
+        items.ranges[:, 6] -= 0.6 * np.exp(-items.ranges[:, 6] / NEAR_RANGE_M)
     group = group_of(team.graph, CLOCKS)
-    held = solved(team.graph, group).strong_m
-    monkeypatch.setattr(banded_optimizer, "STRONG_SIGMA_M", 1.0)
-    free = solved(team.graph, group).strong_m
+    held = solved(team.graph, group).near_bias_m
+    monkeypatch.setattr(banded_optimizer, "NEAR_BIAS_SIGMA_M", 1.0)
+    free = solved(team.graph, group).near_bias_m
     assert abs(free.value + 0.6) < 3 * free.sigma
     assert free.value < held.value < 0
     assert held.sigma == pytest.approx(free.sigma, rel=0.3)
-    assert abs(held.value) < 2 * STRONG_SIGMA_M
+    assert abs(held.value) < 2 * NEAR_BIAS_SIGMA_M
 
 
 def test_priors_are_those_of_the_robots_and_of_the_configuration() -> None:
     team = small_team(3)
     still = replace(NOISE, yaw_rad_per_m=1e-6, scale=0.07)
     team.graph.chains[1].noise = still
-    problem = stated(team.graph, group_of(team.graph), None, 0.25).problem
+    problem = build_problem(team.graph, group_of(team.graph), None, 0.25).problem
     assert problem.priors.bias == pytest.approx(0.25 / 3)
     assert problem.priors.scale == pytest.approx([0.01, 0.07 / 3, 0.01])
     assert problem.priors.yaw == pytest.approx(
         [NOISE.yaw_rad_per_m, YAW_PRIOR_FLOOR, NOISE.yaw_rad_per_m]
     )
-    assert problem.priors.strong == pytest.approx([STRONG_SIGMA_M])
+    assert problem.priors.near_bias == pytest.approx([NEAR_BIAS_SIGMA_M])
 
 
 def test_the_next_solution_goes_on_from_the_last_one() -> None:
     team = small_team(4, count=60)
     group = group_of(team.graph, CLOCKS)
     first = solved(team.graph, group)
-    problem_and_start = stated(team.graph, group, first, 0.3)
+    problem_and_start = build_problem(team.graph, group, first, 0.3)
     assert problem_and_start.start.scale.tolist() == [first.scale[r].value for r in range(3)]
-    assert problem_and_start.start.strong.tolist() == [first.strong_m.value] != [0.0]
+    assert problem_and_start.start.near_bias.tolist() == [first.near_bias_m.value] != [0.0]
     again = solved(team.graph, group, first)
     assert again.iterations <= 2
     for robot, trajectory in again.trajectories.items():
@@ -139,7 +139,7 @@ def test_two_robots_with_the_same_items_agree_whatever_their_clocks_and_history(
 def test_without_knowing_any_clock_the_result_is_the_same() -> None:
     team = small_team(6, count=60)
     known = solved(team.graph, group_of(team.graph, CLOCKS))
-    problem = stated(team.graph, group_of(team.graph), None, 0.3).problem
+    problem = build_problem(team.graph, group_of(team.graph), None, 0.3).problem
     reach = max(int(np.abs(e.i - e.j).max()) for e in (problem.links, problem.ranges))
     assert reach < 30
     unknown = solved(team.graph, group_of(team.graph))
@@ -150,7 +150,7 @@ def test_without_knowing_any_clock_the_result_is_the_same() -> None:
 def test_closures_hold_together_what_has_no_ranges() -> None:
     team = small_team(7, count=30, closure_sigma=0.0)
     entries = [(chain, replace(entry, ranges=())) for chain, entry in team.entries]
-    graph = TeamGraph()
+    graph = PoseGraph()
     for chain, entry in entries:
         graph.insert(chain, entry)
     estimate = solved(graph, group_of(graph, CLOCKS))

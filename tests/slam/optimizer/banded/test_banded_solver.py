@@ -49,14 +49,14 @@ def loose(problem: Problem) -> Problem:
 def test_the_solution_is_that_of_a_dense_solver(seed: int, robots: int) -> None:
     problem, _ = team_problem(seed, robots=robots, count=7, biases=(0.2, -0.1, 0.1))
     solution = solve(problem, tolerance=1e-10)
-    poses, bias, scale, yaw, strong = unpacked(problem, dense_solution(problem))
+    poses, bias, scale, yaw, near_bias = unpacked(problem, dense_solution(problem))
     assert solution.converged
     for ours, theirs in zip(solution.poses, poses, strict=True):
         assert same_pose(ours, theirs, 1e-5)
     assert np.allclose(solution.calibration.bias, bias, atol=1e-5)
     assert np.allclose(solution.calibration.scale, scale, atol=1e-5)
     assert np.allclose(solution.calibration.yaw, yaw, atol=1e-5)
-    assert np.allclose(solution.calibration.strong, strong, atol=1e-5)
+    assert np.allclose(solution.calibration.near_bias, near_bias, atol=1e-5)
 
 
 def test_the_default_tolerance_is_far_below_every_noise() -> None:
@@ -134,12 +134,12 @@ def test_what_is_said_of_the_calibration_is_the_end_of_the_dense_inverse() -> No
     x = packed(solution.poses, solution.calibration)
     j = jacobian(problem, x, robust=False)
     inverse = np.linalg.inv(j.T @ (range_weights(problem, x)[:, None] * j))
-    _, bias, scale, yaw, strong = unpacked(problem, np.sqrt(np.diag(inverse)))
+    _, bias, scale, yaw, near_bias = unpacked(problem, np.sqrt(np.diag(inverse)))
     assert solution.spread is not None
     assert np.allclose(solution.spread.bias, bias, rtol=1e-3)
     assert np.allclose(solution.spread.scale, scale, rtol=1e-3)
     assert np.allclose(solution.spread.yaw, yaw, rtol=1e-3)
-    assert np.allclose(solution.spread.strong, strong, rtol=1e-3)
+    assert np.allclose(solution.spread.near_bias, near_bias, rtol=1e-3)
 
 
 def test_marginals_of_poses_at_the_border_are_the_same() -> None:
@@ -200,18 +200,18 @@ def test_bias_scale_and_yaw_rate_are_found() -> None:
 def test_a_bias_that_only_near_ranges_have_is_found_and_told_from_that_of_the_pairs() -> None:
     """-0.25 m at no distance, as uncorrected modules have it, beside another bias of each pair."""
     problem, truth = team_problem(
-        8, robots=3, count=150, biases=(0.25, -0.2, 0.4), strong=-0.25, range_error=0.02,
+        8, robots=3, count=150, biases=(0.25, -0.2, 0.4), near_bias=-0.25, range_error=0.02,
         link_sigma=(0.004, 0.004, 0.002),
     )  # fmt: skip
     start = problem.initial.copy()
     start[0] = truth[0]
     solution = solve(replace(problem, initial=start))
-    assert solution.calibration.strong == pytest.approx([-0.25], abs=0.05)
+    assert solution.calibration.near_bias == pytest.approx([-0.25], abs=0.05)
     assert solution.calibration.bias == pytest.approx([0.25, -0.2, 0.4], abs=0.03)
     # what is held to zero goes elsewhere
-    held = replace(problem.priors, strong=np.full(1, 1e-9))
+    held = replace(problem.priors, near_bias=np.full(1, 1e-9))
     without = solve(replace(problem, initial=start, priors=held))
-    assert without.calibration.strong == pytest.approx([0.0], abs=1e-6)
+    assert without.calibration.near_bias == pytest.approx([0.0], abs=1e-6)
     assert without.cost > solution.cost + 20
 
 

@@ -18,7 +18,12 @@ from slam_problems import (
 )
 from slam_scenes import Array
 
-from drslamd.slam.optimizer.banded.normal_equations import Equations, Layout, busiest, far_poses
+from drslamd.slam.optimizer.banded.normal_equations import (
+    Equations,
+    Layout,
+    border_poses,
+    vertex_cover,
+)
 from drslamd.slam.optimizer.problem import Calibration, Problem
 
 
@@ -26,7 +31,7 @@ def somewhere(problem: Problem, seed: int) -> tuple[Array, Calibration]:
     """A point where nothing is zero."""
     rng = np.random.default_rng(seed)
     p = problem.priors
-    calibration = Calibration(*(rng.normal(0, s) for s in (p.bias, p.scale, p.yaw, p.strong)))
+    calibration = Calibration(*(rng.normal(0, s) for s in (p.bias, p.scale, p.yaw, p.near_bias)))
     return problem.initial + rng.normal(0, 0.05, problem.initial.shape), calibration
 
 
@@ -43,7 +48,7 @@ def test_gradient_hessian_and_cost_are_those_of_the_dense_residuals(robots: int)
     gradient = jacobian(problem, x, robust=True).T @ robust
     layout = equations.layout
     order = np.concatenate(
-        [layout.poses.ravel(), layout.bias, layout.scale, layout.yaw, layout.strong]
+        [layout.poses.ravel(), layout.bias, layout.scale, layout.yaw, layout.near_bias]
     )
     assert np.allclose(system.gradient[order], gradient, rtol=1e-5, atol=1e-4)
     # ... the Hessian that of Gauss and Newton, ranges by their weights
@@ -76,7 +81,7 @@ def test_it_is_the_same_with_poses_at_the_border() -> None:
 def test_every_unknown_stands_somewhere_and_only_once() -> None:
     problem, _ = team_problem(6, robots=3, count=30)
     layout = Layout.of(problem)
-    parts = [layout.poses.ravel(), layout.bias, layout.scale, layout.yaw, layout.strong]
+    parts = [layout.poses.ravel(), layout.bias, layout.scale, layout.yaw, layout.near_bias]
     numbers = np.sort(np.concatenate(parts))
     assert np.array_equal(numbers, np.arange(layout.band + layout.border))
     # links of three robots reach three poses: 3 * 3 + 2 below the diagonal
@@ -97,12 +102,12 @@ def test_poses_are_taken_out_only_beyond_the_reach_that_needs_no_attention(
     reach: int, apart: int
 ) -> None:
     i = np.array([0, 1, 2, 50])
-    assert len(far_poses(i, i + [1, 1, 1, reach], narrow=20)) == apart
+    assert len(border_poses(i, i + [1, 1, 1, reach], narrow=20)) == apart
 
 
 def test_the_pose_of_one_who_stands_is_enough_for_all_its_edges() -> None:
     i, j = np.full(500, 7), np.arange(500)
-    assert far_poses(i, j, narrow=20).tolist() == [7]
+    assert border_poses(i, j, narrow=20).tolist() == [7]
 
 
 def test_what_is_left_in_the_band_is_narrow_and_few_are_at_the_border() -> None:
@@ -112,7 +117,7 @@ def test_what_is_left_in_the_band_is_narrow_and_few_are_at_the_border() -> None:
     hubs = rng.choice(1000, 12, replace=False)
     i = np.concatenate([i, np.repeat(hubs, 40)])
     j = np.concatenate([j, rng.integers(0, 1000, 480)])
-    apart = far_poses(i, j, narrow=20)
+    apart = border_poses(i, j, narrow=20)
     assert set(apart.tolist()) <= set(hubs.tolist())
     left = ~np.isin(i, apart) & ~np.isin(j, apart)
     assert np.abs(i - j)[left].max() <= 20
@@ -121,7 +126,7 @@ def test_what_is_left_in_the_band_is_narrow_and_few_are_at_the_border() -> None:
 def test_edges_all_over_the_place_widen_the_band_instead() -> None:
     rng = np.random.default_rng(9)
     i, j = rng.integers(0, 300, (2, 2000))
-    apart = far_poses(i, j, narrow=20)
+    apart = border_poses(i, j, narrow=20)
     left = ~np.isin(i, apart) & ~np.isin(j, apart)
     reach = int(np.abs(i - j)[left].max(initial=0))
     assert len(apart) <= 160
@@ -130,7 +135,7 @@ def test_edges_all_over_the_place_widen_the_band_instead() -> None:
 
 def test_the_busiest_come_first_and_no_more_than_asked_for() -> None:
     i, j = np.array([1, 1, 1, 2, 2, 3]), np.array([4, 5, 6, 4, 5, 9])
-    assert busiest(i, j, 1).tolist() == [1]
-    assert busiest(i, j, 2).tolist() == [1, 2]
-    assert len(busiest(i, j, 10)) == 3
-    assert busiest(i[:0], j[:0], 5).tolist() == []
+    assert vertex_cover(i, j, 1).tolist() == [1]
+    assert vertex_cover(i, j, 2).tolist() == [1, 2]
+    assert len(vertex_cover(i, j, 10)) == 3
+    assert vertex_cover(i[:0], j[:0], 5).tolist() == []

@@ -24,9 +24,9 @@ from drslamd.conventions import GRID_US, Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import GraphEntry, RelativePoses
-from drslamd.slam.graph.pose_graph import TeamGraph
+from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
-from drslamd.slam.optimizer.closures.closure_optimizer import Closures
+from drslamd.slam.optimizer.closures.closure_optimizer import ClosureOptimizer
 from drslamd.slam.optimizer.factors import chain_links
 
 CLOCKS = {0: 0, 1: 1000 * GRID_US, 2: 2000 * GRID_US}
@@ -52,10 +52,10 @@ class Team:
         self.team.graph.insert(chains[0], GraphEntry(1000 + number, closures=(item,)))
 
     def solved(self, previous: TeamEstimate | None = None) -> TeamEstimate:
-        graph: TeamGraph = self.team.graph
+        graph: PoseGraph = self.team.graph
         members = {Segment(*items.chain, 0) for items in graph.chains.values()}
         group = Group(members, min(members), CLOCKS)
-        job = Closures(config(), group.frame.chain).job(graph, group, previous, {})
+        job = ClosureOptimizer(config(), group.frame.chain).job(graph, group, previous, {})
         assert job is not None
         return job()
 
@@ -106,7 +106,7 @@ def test_an_estimate_that_went_astray_as_a_whole_comes_back_into_its_frame() -> 
 
 def test_beside_a_single_closure_a_heading_is_as_uncertain_as_its_odometry() -> None:
     rng = np.random.default_rng(7)
-    graph, n = TeamGraph(), 10 * np.arange(COUNT)
+    graph, n = PoseGraph(), 10 * np.arange(COUNT)
     one, other = Chain(0, 1), Chain(1, 1)
     for chain in (one, other):
         odometry = driven(rng, wander(rng, COUNT, 0.4), NOISE)
@@ -114,7 +114,7 @@ def test_beside_a_single_closure_a_heading_is_as_uncertain_as_its_odometry() -> 
     only = closure(0, 100, other, 100, np.array([1.0, 2.0, 0.5]))
     graph.insert(one, GraphEntry(1, closures=(only,)))
     members = {Segment(*one, 0), Segment(*other, 0)}
-    job = Closures(config(), one).job(graph, Group(members, min(members), {}), None, {})
+    job = ClosureOptimizer(config(), one).job(graph, Group(members, min(members), {}), None, {})
     assert job is not None
     links = chain_links(graph.chains[0], calibrated=False).covariance[:, 2, 2].sum()
     assert job().covariances[0][2, 2] == pytest.approx(links, rel=1e-4)

@@ -1,4 +1,4 @@
-"""Closures that contradict everybody else: their weights, and what is left without them."""
+"""ClosureOptimizer that contradict everybody else: their weights, and what is left without them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from slam_problems import pose_edges
 from slam_scenes import Array, product, same_pose, wander
 
 from drslamd.slam.optimizer.closures import gnc
-from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraph
+from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
 from drslamd.slam.optimizer.problem import PoseEdges
 from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
 
@@ -69,7 +69,7 @@ def test_what_is_left_is_the_answer_without_the_false_ones(seed: int, false: int
     assert (weighed.tau[ring.wrong] < 1e-5 * ring.edges.tau[ring.wrong]).all()
     true = ring.doubted & ~ring.wrong
     assert (weighed.tau[true] == ring.edges.tau[true]).mean() > 0.9
-    plain = PoseGraph(ring.edges, count).solve()
+    plain = PoseGraphSolver(ring.edges, count).solve()
     assert ring.off(answer.poses) < 0.3
     assert false == 1 or ring.off(plain.poses) > 0.5
     assert answer.steps > plain.steps
@@ -84,11 +84,11 @@ def test_those_that_are_more_than_the_rest_of_their_loop_win() -> None:
 
 def test_where_all_agree_the_plain_solution_stays() -> None:
     ring = Ring(4, 0)
-    kept = gnc.squared_errors(ring.good, PoseGraph(ring.good, 90).solve().poses)
+    kept = gnc.squared_errors(ring.good, PoseGraphSolver(ring.good, 90).solve().poses)
     good = ring.good.chosen(~ring.doubted | (kept < 0.5 * gnc.BELIEVABLE))
     answer, weighed = gnc.solve(good, 90, np.arange(len(good)) >= 87, None)
     assert weighed is good
-    for ours, theirs in zip(answer.poses, PoseGraph(good, 90).solve().poses, strict=True):
+    for ours, theirs in zip(answer.poses, PoseGraphSolver(good, 90).solve().poses, strict=True):
         assert same_pose(ours, theirs, 1e-9)
 
 

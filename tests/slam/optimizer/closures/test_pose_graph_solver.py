@@ -9,7 +9,7 @@ from places import SHARED
 from scipy.optimize import least_squares
 
 from drslamd.slam import se2
-from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraph
+from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
 from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
 
 Array = np.ndarray
@@ -55,22 +55,22 @@ def by_scipy(edges: ComplexEdges, start: Array) -> float:
 @pytest.mark.parametrize("seed", range(3))
 def test_the_minimum_is_that_of_scipy(seed: int) -> None:
     edges = graph(40, 30, 0.05, seed)
-    answer = PoseGraph(edges, 40).solve()
+    answer = PoseGraphSolver(edges, 40).solve()
     assert answer.converged
     assert answer.cost == pytest.approx(by_scipy(edges, answer.poses), rel=1e-9)
-    assert by_scipy(edges, PoseGraph(edges, 40).chordal_start()) >= answer.cost * (1 - 1e-9)
+    assert by_scipy(edges, PoseGraphSolver(edges, 40).chordal_start()) >= answer.cost * (1 - 1e-9)
 
 
 def test_without_noise_the_chordal_start_is_the_answer() -> None:
     edges = graph(200, 100, 0.0, 7)
-    solver = PoseGraph(edges, 200)
+    solver = PoseGraphSolver(edges, 200)
     assert solver.cost(solver.chordal_start()) < 1e-12
     assert solver.solve().steps <= 2
 
 
 def test_a_start_that_is_far_off_ends_in_a_minimum_as_well() -> None:
     edges = graph(60, 60, 0.05, 3)
-    solver = PoseGraph(edges, 60)
+    solver = PoseGraphSolver(edges, 60)
     start = solver.solve().poses + np.random.default_rng(0).normal(0, 0.5, (60, 3))
     answer = solver.solve(start)
     assert answer.converged
@@ -81,7 +81,7 @@ def test_a_start_that_is_far_off_ends_in_a_minimum_as_well() -> None:
 @pytest.mark.parametrize("reach", [6, 38])
 def test_no_start_is_so_wild_that_the_cost_ever_rises(seed: int, reach: int) -> None:
     edges = graph(50, 30, 0.05, seed, reach)
-    solver = PoseGraph(edges, 50)
+    solver = PoseGraphSolver(edges, 50)
     start = np.random.default_rng(seed).normal(0, 4, (50, 3))
     costs = [solver.cost(start)] + [solver.solve(start, most=k).cost for k in range(1, 40)]
     assert np.diff(costs).max() <= 1e-9 * costs[0]
@@ -95,7 +95,7 @@ def test_no_start_is_so_wild_that_the_cost_ever_rises(seed: int, reach: int) -> 
 def test_near_the_minimum_a_few_steps_are_enough_however_large_the_noise() -> None:
     """Newton's Hessian takes five from here, that of Gauss and Newton many more."""
     edges = graph(100, 100, 0.3, 4)
-    solver = PoseGraph(edges, 100)
+    solver = PoseGraphSolver(edges, 100)
     there = solver.solve(tolerance=1e-12)
     start = there.poses + np.random.default_rng(1).normal(0, 0.02, (100, 3))
     answer = solver.solve(start)
@@ -105,7 +105,7 @@ def test_near_the_minimum_a_few_steps_are_enough_however_large_the_noise() -> No
 
 def test_a_cost_that_is_stated_falls_with_every_pose_that_moves() -> None:
     edges = graph(30, 20, 0.05, 5)
-    solver = PoseGraph(edges, 30)
+    solver = PoseGraphSolver(edges, 30)
     answer = solver.solve()
     assert solver.cost(answer.poses) == pytest.approx(answer.cost, rel=1e-12)
     rng = np.random.default_rng(0)
@@ -118,7 +118,7 @@ def test_two_closures_between_the_same_two_poses_both_count() -> None:
         np.array([0, 0]), np.array([1, 1]), np.array([[1.0, 0, 0], [2.0, 0, 0]]),
         np.ones(2), np.array([1.0, 3.0]),
     )  # fmt: skip
-    answer = PoseGraph(once, 2).solve()
+    answer = PoseGraphSolver(once, 2).solve()
     # the weighted mean of both, and its scatter: 1 * 0.75^2 + 3 * 0.25^2
     assert answer.poses[1, 0] - answer.poses[0, 0] == pytest.approx(1.75)
     assert answer.cost == pytest.approx(0.75)
@@ -126,12 +126,12 @@ def test_two_closures_between_the_same_two_poses_both_count() -> None:
 
 def test_the_order_of_the_poses_does_not_change_the_cost() -> None:
     edges = graph(200, 150, 0.05, 2)
-    narrow = PoseGraph(edges, 200).solve()
+    narrow = PoseGraphSolver(edges, 200).solve()
     order = np.random.default_rng(0).permutation(200)
     mixed = ComplexEdges(
         order[edges.i], order[edges.j], edges.turn, edges.shift, edges.kappa, edges.tau
     )
-    wide = PoseGraph(mixed, 200).solve()
+    wide = PoseGraphSolver(mixed, 200).solve()
     assert wide.cost == pytest.approx(narrow.cost, rel=1e-10)
 
 
@@ -140,7 +140,7 @@ def test_the_order_of_the_poses_does_not_change_the_cost() -> None:
 def test_marginals_are_blocks_of_the_dense_inverse(gauge: int, reach: int) -> None:
     """Information summed edge by edge, the gauge's rows and columns left out."""
     edges = graph(40, 30, 0.0, 11, reach)
-    solver = PoseGraph(edges, 40, gauge)
+    solver = PoseGraphSolver(edges, 40, gauge)
     poses = solver.solve().poses
     information = np.zeros((120, 120))
     for i, j, shift, kappa, tau in zip(
@@ -176,5 +176,5 @@ def test_public_graphs_are_solved_to_their_certified_optimum(name: str) -> None:
     read = g2o.read(Path(path))
     spread = np.trace(np.linalg.inv(read.information[:, :2, :2]), axis1=1, axis2=2)
     edges = edges_of(read.i, read.j, read.measured, 2 * read.information[:, 2, 2], 2 / spread)
-    answer = PoseGraph(edges, len(read.ids)).solve()
+    answer = PoseGraphSolver(edges, len(read.ids)).solve()
     assert abs(answer.cost / CERTIFIED[name] - 1) < 1e-8
