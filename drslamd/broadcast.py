@@ -27,6 +27,7 @@ from drslamd.gossip.team import Team
 from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.front_end import FrontEnd
+from drslamd.slam.graph.estimate import PoseNow
 from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.se2 import Array
 
@@ -90,7 +91,7 @@ class Broadcast:
     ) -> Status:
         """What we are, whom we hear, what we hold; made to be sent, because names take turns."""
         estimate = self._back.estimate
-        heard = self._team.heard(utime, self._front.needed(neighbours, utime))
+        heard = self._team.heard_peers(utime, self._front.needed(neighbours, utime))
         return Status(
             state=int(estimate is not None),
             frame=estimate.frame.robot if estimate else self._team.own.robot,
@@ -127,12 +128,8 @@ class Broadcast:
 
     # ---- pose ----
 
-    def pose(self, found: tuple[int, Array, Array] | None, utime: int) -> list[Effect]:
-        """Where we are, when that is news.
-
-        Args:
-            found: time of the pose in us, w_T_a (3,), covariance (3, 3).
-        """
+    def pose(self, found: PoseNow | None, utime: int) -> list[Effect]:
+        """Where we are, when that is news."""
         estimate = self._back.estimate
         if estimate is None or found is None:
             return []

@@ -46,7 +46,7 @@ from drslamd.io.systemd import Notifier
 from drslamd.io.transport import Transport
 from drslamd.io.worker import Finished, Worker
 from drslamd.robot import Robot
-from drslamd.slam.calibration.calibration_store import SensorCalibration
+from drslamd.slam.calibration.sensor_calibration import SensorCalibration
 
 JOB_STUCK_US = 20 * SECOND_US
 """A computation that takes longer is no progress, and the watchdog is not fed."""
@@ -194,7 +194,7 @@ class Daemon:
     def _restart(self, effect: Restart) -> None:
         """A new robot in the place of the old one; ports and network stay as they are."""
         old = self.robot
-        self.robot = self._new_robot(effect.epoch, old.team.seal.epochs, old.memory.latest)
+        self.robot = self._new_robot(effect.epoch, old.team.seal.epochs, old.calibration.latest)
         for state in (*old.ports.values(), old.network):
             if state is not None:
                 self.handle(state)

@@ -10,6 +10,7 @@ from drslamd.conventions import SECOND_US
 from drslamd.events import NetworkState, PortCondition, PortState
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.team import Team
+from drslamd.jobs import OPTIMIZER, RELATIVE_POSE, DutyCycle, Jobs
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.wheels.wheel_input import WheelInput
 from drslamd.slam.back_end import BackEnd
@@ -38,7 +39,7 @@ class Stages(Protocol):
     outbox: Outbox
     ports: dict[str, PortState]
     network: NetworkState | None
-    cycles: dict[str, tuple[int, int]]
+    jobs: Jobs
 
     def neighbours(self, utime: int) -> list[PeerInRange]: ...
 
@@ -70,10 +71,10 @@ def _sensor(
 def _load(robot: Stages, utime: int) -> str | None:
     """Modules that cannot run as often as they should."""
     config = robot.config
-    rates = {"relative_pose": config.relative_pose.rate_hz, "optimizer": config.optimizer.rate_hz}
+    rates = {RELATIVE_POSE: config.relative_pose.rate_hz, OPTIMIZER: config.optimizer.rate_hz}
     late = []
     for module, rate in rates.items():
-        since, until = robot.cycles.get(module, (0, 0))
+        since, until = robot.jobs.cycles.get(module, DutyCycle())
         cycle = (until - since) / SECOND_US
         if until + LATE * SECOND_US > utime and cycle > LATE / rate:
             late.append(f"{module} runs every {cycle:.1f} s instead of every {1 / rate:.1f} s")

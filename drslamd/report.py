@@ -132,18 +132,18 @@ def _peer(robot: Robot, peer: Peer, utime: int) -> dict[str, Any]:
 
 def _pair(pair: PairTracker) -> dict[str, Any]:
     return {
-        "connected": pair.established,
+        "connected": pair.connected,
         "windows": dict(pair.verdicts),
         "closures_seen": pair.closures_seen,
-        "closures_kept": len(pair.kept()),
+        "closures_kept": len(pair.kept),
     }
 
 
 def _graph(robot: Robot) -> dict[str, Any]:
-    estimate, learned, own = robot.back.estimate, robot.memory.latest, robot.own.robot
+    estimate, learned, own = robot.back.estimate, robot.calibration.latest, robot.own.robot
     out: dict[str, Any] = {
         "group": sorted({segment.robot for segment in robot.back.group}),
-        "keyframes": {str(k): len(c.rows) for k, c in sorted(robot.back.graph.chains.items())},
+        "keyframes": {str(k): len(c.keyframes) for k, c in sorted(robot.back.graph.chains.items())},
     }
     if estimate is not None:
         out |= {

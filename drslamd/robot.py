@@ -1,18 +1,18 @@
 """The robot: every event goes in here, every effect comes out, and nothing else is touched.
 
-`Robot.handle` reads no clock, draws no random number and does no I/O. Sensors become ranges and
-motions, messages become graph, and a handful of timers drive the three modules of the paper:
+`Robot.handle` reads no clock, draws no random number and does no I/O. The story is the paper's:
 
-    keyframes, ranges, closures  ->  our log  ->  the team        every second
-    module 1  relative pose      ->  `relative_pose.rate_hz`
-    module 2  consistency        ->  `consistency.rate_hz`
-    module 3  pose graph         ->  `optimizer.rate_hz`          ->  our pose in the team's frame
+    ranges and motions in           `_on_serial`, `_on_can`
+    module 1  relative poses        `_relative_poses`
+    module 2  consistency           `_consistency`
+    our log: keyframes, ranges and closures that are kept, to the team     `_extend_log`
+    module 3  pose graph            `_optimize`
+    our pose out                    `pose`
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -37,7 +37,6 @@ from drslamd.events import (
     Save,
     Send,
     SerialData,
-    Solve,
     Stop,
     Tick,
     Write,
@@ -46,49 +45,45 @@ from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
 from drslamd.health import Health
+from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, Job, Jobs
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
+from drslamd.sensors.samples import Motion
 from drslamd.sensors.wheels.wheel_input import WheelInput
 from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
-from drslamd.slam.calibration.calibration_store import (
-    UNLEARNED,
-    CalibrationStore,
-    SensorCalibration,
-)
-from drslamd.slam.consistency.pair import PairTracker
+from drslamd.slam.calibration.calibration_store import CalibrationStore
+from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
 from drslamd.slam.front_end import FrontEnd
+from drslamd.slam.graph.estimate import PoseNow
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.peer_in_range import PeerInRange
-from drslamd.slam.relative_pose.pair_window import Request
-from drslamd.slam.se2 import Array
+from drslamd.slam.settings import closure_method
+from drslamd.slam.tuning import DEFAULTS, Tuning
+from drslamd.timers import Action, Timers
 
 POLL_US = 10 * MILLISECOND_US
 """How finely the wheels that must be asked are asked; their driver knows its own rate."""
 REPEAT_US = 100 * MILLISECOND_US
+"""Between two looks for log entries that somebody lacks."""
 SAVE_US = 60 * SECOND_US
-REST = 4
-"""A module rests so many times as long as it computed: no team is so large that one of the three
-takes more than a fifth of a core."""
+"""Between two looks whether there is anything new to keep over a restart."""
 GOODBYES = 3
 """Last messages of an orderly stop; at 30 % loss one gets through in 97 % of cases."""
-
-
-@dataclass(frozen=True)
-class _Job:
-    """A computation under way: its module, the pair it is about, and its question."""
-
-    module: str
-    pair: PairTracker | None = None
-    request: Request | None = None
 
 
 class Robot:
     """One robot of a team."""
 
     def __init__(
-        self, config: Config, key: bytes, epoch: int, epochs: dict[int, int],
-        kept: SensorCalibration = UNLEARNED, dbc_text: str = "",
-    ) -> None:  # fmt: skip
+        self,
+        config: Config,
+        key: bytes,
+        epoch: int,
+        epochs: dict[int, int],
+        kept: SensorCalibration = UNLEARNED,
+        dbc_text: str = "",
+        tuning: Tuning = DEFAULTS,
+    ) -> None:
         """
         Args:
             key: of `seal.team_key`.
@@ -96,42 +91,26 @@ class Robot:
             epochs: last known epoch of each peer, from before this start.
             kept: what the last start learned of our sensors.
             dbc_text: content of `wheels.dbc_file`, where there is one.
+            tuning: of the estimator.
         """
         self.config = config
         self.own = Chain(config.robot.id, epoch)
         self.uwb = LinkTrackInput(config.uwb_id, config.uwb.max_range_m)
         self.wheels = WheelInput(config.wheels, dbc_text)
         self.team = Team(Seal(key, config.robot.id, epoch, epochs))
-        self.memory = CalibrationStore(kept, config.relative_pose)
-        self.front = FrontEnd(config, self.own, self.memory.used)
-        self.back = BackEnd(config, self.own)
+        self.calibration = CalibrationStore(
+            kept, closure_method(config.relative_pose).uses_calibration
+        )
+        self.front = FrontEnd(config, self.own, self.calibration.used, tuning)
+        self.back = BackEnd(config, self.own, tuning)
         self.broadcast = Broadcast(config, self.team, self.front, self.back)
         self.outbox = Outbox(config.robot.id, config.gossip.max_bytes_per_s)
         self.health = Health()
         self.ports: dict[str, PortState] = {}
         self.network: NetworkState | None = None
-        self.next_tick = 0
-        self._jobs: dict[int, _Job] = {}
-        self._jobs_begun = 0
-        self.cycles: dict[str, tuple[int, int]] = {}
-        """By module: when it last began to compute, and until when it rests."""
+        self.jobs = Jobs()
+        self.timers = Timers(self._periods())
         self._saved_epochs = dict(epochs)
-        rate = (config.relative_pose, config.consistency, config.optimizer)
-        module_us = [round(SECOND_US / section.rate_hz) for section in rate]
-        self._timers: dict[Callable[[int], list[Effect]], int] = {
-            self._repeat: REPEAT_US,
-            self._send_status: SECOND_US,
-            self._send_odometry: SECOND_US,
-            self._extend_log: SECOND_US,
-            self._module1: module_us[0],
-            self._module2: module_us[1],
-            self._module3: module_us[2],
-            self._check_health: SECOND_US,
-            self._save: SAVE_US,
-        }
-        if self.wheels.must_be_asked:
-            self._timers[self._poll_wheels] = POLL_US
-        self._due: dict[Callable[[int], list[Effect]], int] = {}
         self._handlers: dict[type[Any], Callable[[Any], list[Effect]]] = {
             SerialData: self._on_serial,
             CanFrame: self._on_can,
@@ -143,6 +122,27 @@ class Robot:
             JobDone: self._on_job,
             Stop: self._on_stop,
         }
+
+    def _periods(self) -> dict[Action, int]:
+        """What comes round, and how often, us."""
+        config = self.config
+        periods: dict[Action, int] = {
+            self._repeat: REPEAT_US,
+            self._send_status: SECOND_US,
+            self._send_odometry: SECOND_US,
+            self._extend_log: SECOND_US,
+            self._relative_poses: round(SECOND_US / config.relative_pose.rate_hz),
+            self._consistency: round(SECOND_US / config.consistency.rate_hz),
+            self._optimize: round(SECOND_US / config.optimizer.rate_hz),
+            self._check_health: SECOND_US,
+            self._save: SAVE_US,
+        }
+        return {**periods, self._poll_wheels: POLL_US} if self.wheels.must_be_asked else periods
+
+    @property
+    def next_tick(self) -> int:
+        """When the robot wants to be woken, us."""
+        return self.timers.next
 
     def handle(self, event: Event) -> list[Effect]:
         """Take one event; what follows from it."""
@@ -161,7 +161,7 @@ class Robot:
     def _on_can(self, event: CanFrame) -> list[Effect]:
         return self._on_motions(self.wheels.on_frame(event))
 
-    def _on_motions(self, motions: list[Any]) -> list[Effect]:
+    def _on_motions(self, motions: list[Motion]) -> list[Effect]:
         for motion in motions:
             self.front.on_motion(motion)
         return []
@@ -206,18 +206,19 @@ class Robot:
         peers = (peer.neighbour(self.own, utime) for peer in self.team.living(utime).values())
         return [peer for peer in peers if peer.ranges_to_us or peer.uwb_id in mine]
 
+    # ---- our log ----
+
     def _extend_log(self, utime: int) -> list[Effect]:
         """One entry of our log: where our wheels went, what we ranged, what module 2 kept."""
         neighbours = self.neighbours(utime)
-        keyframe = self.front.keyframe()
-        ranges = self.front.range_items(neighbours, self.back.graph, utime)
-        closures = self.front.closure_items()
+        keyframe = self.front.make_keyframe()
+        ranges = self.front.sample_ranges(neighbours, self.back.graph, utime)
+        closures = self.front.tell_closures()
         if not (keyframe or ranges or closures):
             return []
         sends: list[Effect] = []
-        for entry in self.team.entries(
-            self.front.traits, (keyframe,) if keyframe else (), ranges, closures
-        ):
+        keyframes = (keyframe,) if keyframe else ()
+        for entry in self.team.entries(self.front.model, keyframes, ranges, closures):
             decoded, sealed = self.team.append(entry, utime)
             self.back.insert(self.own, decoded)
             if neighbours:
@@ -226,70 +227,52 @@ class Robot:
 
     # ---- the three modules ----
 
-    def _module1(self, utime: int) -> list[Effect]:
-        if self._rests("relative_pose", utime):
+    def _relative_poses(self, utime: int) -> list[Effect]:
+        """Module 1: a window of ranges and both odometries, for each pair that we own."""
+        if self.jobs.is_resting(RELATIVE_POSE, utime):
             return []
-        neighbours = self.neighbours(utime)
-        busy = [job.pair for job in self._jobs.values() if job.module == "relative_pose"]
+        windows = self.front.module1(
+            self.neighbours(utime), self.back.graph, self.back.estimate, utime
+        )
         return [
-            self._solve(_Job("relative_pose", pair, request), run)
-            for pair, request, run in self.front.module1(
-                neighbours, self.back.graph, self.back.estimate, utime
-            )
-            if pair not in busy
+            self.jobs.begin(Job(RELATIVE_POSE, window.pair, window.request), window.run)
+            for window in windows
+            if not self.jobs.is_busy(RELATIVE_POSE, window.pair)
         ]
 
-    def _module2(self, utime: int) -> list[Effect]:
+    def _consistency(self, utime: int) -> list[Effect]:
+        """Module 2: which of a pair's closures belong together."""
         return [
-            self._solve(_Job("consistency", pair), run)
+            self.jobs.begin(Job(CONSISTENCY, pair), run)
             for pair, run in self.front.module2(self.back.graph)
         ]
 
-    def _module3(self, utime: int) -> list[Effect]:
-        busy = any(job.module == "optimizer" for job in self._jobs.values())
-        if busy or self._rests("optimizer", utime):
+    def _optimize(self, utime: int) -> list[Effect]:
+        """Module 3: the team's pose graph."""
+        if self.jobs.is_busy(OPTIMIZER) or self.jobs.is_resting(OPTIMIZER, utime):
             return []
         public = {k: peer.public for k, peer in self.team.peers.items() if peer.public}
-        run = self.back.job(self.team.present(utime), self.team.shifts(utime), public)
-        return [self._solve(_Job("optimizer"), run)] if run else []
-
-    def _solve(self, job: _Job, run: Callable[[], object]) -> Solve:
-        self._jobs_begun += 1
-        self._jobs[self._jobs_begun] = job
-        return Solve(self._jobs_begun, job.module, run)
+        run = self.back.begin(self.team.present(utime), self.team.shifts(utime), public)
+        return [self.jobs.begin(Job(OPTIMIZER), run)] if run else []
 
     def _on_job(self, event: JobDone) -> list[Effect]:
-        job = self._jobs.pop(event.job_id)
-        self._tire(job.module, event)
+        job = self.jobs.finish(event)
         if job.pair is not None and job.request is not None:
-            job.pair.estimated(job.request, event.result)
+            job.pair.on_estimate(job.request, event.result)
             return []
         if job.pair is not None:
-            job.pair.settle(event.result)
+            job.pair.on_check(event.result)
             return []
-        self.back.solved(event.result)
-        self.memory.update(self.back.estimate, self.own.robot, self.front.pairs)
+        self.back.on_solution(event.result)
+        self.calibration.update(self.back.estimate, self.own.robot, self.front.pairs)
         public = self.back.public_poses()
         sends = self.team.send_public(public, event.utime) if public else []
         return [*self.broadcast.pose(self.pose(), event.utime), *sends]
 
-    def _rests(self, module: str, utime: int) -> bool:
-        return module in self.cycles and utime < self.cycles[module][1]
-
-    def _tire(self, module: str, event: JobDone) -> None:
-        began = event.utime - event.elapsed_us
-        since, until = self.cycles.get(module, (began, began))
-        if until <= began:
-            since, until = began, event.utime
-        self.cycles[module] = since, max(until, event.utime) + REST * event.elapsed_us
-
     # ---- what we know of ourselves ----
 
-    def pose(self) -> tuple[int, Array, Array] | None:
-        """Our latest pose in the frame of the team: utime, w_T_a (3,), covariance (3, 3).
-
-        None while we are not localised.
-        """
+    def pose(self) -> PoseNow | None:
+        """Our latest pose in the frame of the team; None while we are not localised."""
         solved = self.back.trajectory(self.own.robot)
         track = self.front.reckoning.track
         if solved is None or self.back.estimate is None or not len(track):
@@ -299,7 +282,7 @@ class Robot:
             return None
         pose = se2.compose(solved.poses[-1], se2.between(track.at(last), track.at(now)))
         covariance = self.back.estimate.covariances[self.own.robot]
-        return now * GRID_US, np.append(pose[:2], se2.wrap(pose[2])), covariance
+        return PoseNow(now * GRID_US, np.append(pose[:2], se2.wrap(pose[2])), covariance)
 
     def _check_health(self, utime: int) -> list[Effect]:
         self.team.forget_silent(utime)
@@ -319,26 +302,18 @@ class Robot:
     # ---- time passes, and ends ----
 
     def _on_tick(self, event: Tick) -> list[Effect]:
-        effects: list[Effect] = []
-        for action, period in self._timers.items():
-            due = self._due.setdefault(action, event.utime)
-            if event.utime >= due:
-                # after a stall the timer starts afresh instead of catching up in a burst
-                late = event.utime - due > period
-                self._due[action] = event.utime + period if late else due + period
-                effects += action(event.utime)
-        self.next_tick = min(self._due.values())
-        return effects
+        due = self.timers.take_due(event.utime)
+        return [effect for action in due for effect in action(event.utime)]
 
     def state(self) -> dict[str, Any]:
         """What must outlive this start."""
         state = {"epoch": self.own.epoch, "epochs": self.team.seal.epochs}
-        return {**state, "calibration": self.memory.latest.state()}
+        return {**state, "calibration": self.calibration.latest.state()}
 
     def _save(self, utime: int) -> list[Effect]:
-        if self.team.seal.epochs == self._saved_epochs and not self.memory.is_news():
+        if self.team.seal.epochs == self._saved_epochs and not self.calibration.is_news():
             return []
-        self.memory.saved()
+        self.calibration.on_saved()
         self._saved_epochs = dict(self.team.seal.epochs)
         return [Save(self.state())]
 

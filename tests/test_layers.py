@@ -12,6 +12,7 @@ from places import REPOSITORY
 
 PACKAGE = REPOSITORY / "drslamd"
 GENERATED = PACKAGE / "lcmtypes"
+LAB = REPOSITORY / "tools" / "lab"
 
 RINGS = {
     "vocabulary": ["conventions", "events", "config"],
@@ -20,6 +21,8 @@ RINGS = {
         "slam",
         "lcmtypes",
         "gossip",
+        "timers",
+        "jobs",
         "broadcast",
         "health",
         "diagnosis",
@@ -32,9 +35,46 @@ RINGS = {
 }
 """From the inside out; a module imports only from its own ring and those before it."""
 
-PURE_ORDER = ["sensors", "slam", "lcmtypes", "gossip", "broadcast", "health", "diagnosis", "robot",
-              "report"]  # fmt: skip
+PURE_ORDER = RINGS["pure"]
 """Inside the pure ring: each knows only what stands before it."""
+
+SLAM_ORDER = [
+    "se2",
+    "chi_squared",
+    "range_model",
+    "odometry",
+    "robot_model",
+    "graph",
+    "peer_in_range",
+    "relative_pose",
+    "consistency",
+    "calibration",
+    "optimizer",
+    "closure_method",
+    "tuning",
+    "settings",
+    "front_end",
+    "back_end",
+]
+"""The rooms of `slam` and what stands beside them, in the order of the paper."""
+
+OPTIMIZER_ORDER = [
+    "problem",
+    "complex_factors",
+    "vertex_cover",
+    "factors",
+    "contract",
+    "banded",
+    "rbcd",
+    "closures",
+]
+"""Inside module 3: the three solvers know what is common to them."""
+
+KNOWS_CONFIG = {"front_end", "back_end", "settings"}
+"""Where the configuration ends; rooms get numbers."""
+
+MAX_MODULES = 16
+"""Of one folder."""
 
 IMPURE = {
     "asyncio", "socket", "time", "os", "logging", "structlog", "threading", "subprocess", "random",
@@ -42,6 +82,9 @@ IMPURE = {
 }  # fmt: skip
 
 MAX_FILE, MAX_FUNCTION = 350, 60
+
+SAID_OF_MANY = {"solve"}
+"""Verbs that their module qualifies."""
 
 
 def modules() -> list[Path]:
@@ -102,6 +145,63 @@ def test_a_module_imports_only_inwards(path: Path) -> None:
             assert PURE_ORDER.index(other) <= PURE_ORDER.index(part), (
                 f"{name_of(path)} imports {imported}"
             )
+
+
+def room_of(name: str, order: list[str], below: str) -> int | None:
+    """Where the next name below a package stands in its order, None for others."""
+    if not name.startswith(below + "."):
+        return None
+    room = name.removeprefix(below + ".").split(".")[0]
+    assert room in order, f"{below}.{room} has no place in {__file__}"
+    return order.index(room)
+
+
+@pytest.mark.parametrize("path", modules(), ids=name_of)
+def test_a_room_knows_only_rooms_below_it(path: Path) -> None:
+    names = {name_of(p) for p in modules()}
+    for below, order in (
+        ("drslamd.slam", SLAM_ORDER),
+        ("drslamd.slam.optimizer", OPTIMIZER_ORDER),
+    ):
+        here = room_of(name_of(path), order, below)
+        for imported in imports_of(path) & names if here is not None else ():
+            there = room_of(imported, order, below)
+            assert there is None or here is None or there <= here, imported
+
+
+@pytest.mark.parametrize("path", modules(), ids=name_of)
+def test_the_rooms_of_slam_get_numbers_and_not_the_configuration(path: Path) -> None:
+    name = name_of(path)
+    if name.startswith("drslamd.slam.") and name.split(".")[2] not in KNOWS_CONFIG:
+        assert not any(i.startswith("drslamd.config") for i in imports_of(path))
+
+
+def test_no_folder_has_more_than_a_newcomer_can_look_over() -> None:
+    folders = {p.parent for p in modules()} | {p.parent for p in LAB.rglob("*.py")}
+    for folder in folders:
+        count = sum(p.name not in ("__init__.py", "__main__.py") for p in folder.glob("*.py"))
+        assert count <= MAX_MODULES, folder
+
+
+def definitions(path: Path) -> list[ast.ClassDef | ast.FunctionDef]:
+    """Public classes and functions of a module."""
+    body = ast.parse(path.read_text()).body
+    return [
+        node
+        for node in body
+        if isinstance(node, (ast.ClassDef, ast.FunctionDef)) and not node.name.startswith("_")
+    ]
+
+
+def test_no_name_stands_for_two_things() -> None:
+    """Classes of the package, and all public names of `slam`; a verb may be said of two modules."""
+    places: dict[str, list[str]] = {}
+    for path in modules():
+        for node in definitions(path):
+            if isinstance(node, ast.ClassDef) or "slam" in path.parts:
+                places.setdefault(node.name, []).append(name_of(path))
+    double = {name: where for name, where in places.items() if len(where) > 1}
+    assert set(double) <= SAID_OF_MANY, double
 
 
 @pytest.mark.parametrize("path", modules(), ids=name_of)

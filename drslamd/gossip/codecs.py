@@ -34,6 +34,7 @@ from drslamd.slam.graph.measurements import (
     RangeMeasurement,
     RelativePoses,
 )
+from drslamd.slam.robot_model import RobotModel
 
 MILLIMETRE_M = 1e-3
 LONGEST_STEP = 2**15 - 1
@@ -110,7 +111,8 @@ def _read_odometry(raw: Any) -> OdometryBatch:
 def _fill_graph(out: Any, m: GraphEntry) -> None:
     peers = _peers(m)
     number = {peer: k for k, peer in enumerate(peers)}
-    out.seq, out.traits, out.n_traits = m.seq, list(m.traits), len(m.traits)
+    traits = m.model.numbers() if m.model else ()
+    out.seq, out.traits, out.n_traits = m.seq, list(traits), len(traits)
     out.peers = [_filled_peer(chain) for chain in peers]
     out.keyframes = [_filled(lcmtypes.keyframe_t, k) for k in m.keyframes]
     out.ranges = [_filled_range(item, number[item.peer]) for item in m.ranges]
@@ -131,6 +133,7 @@ def _read_graph(raw: Any) -> GraphEntry:
     sigmas, antenna = raw.traits[:4], raw.traits[4:]
     if not all(0 < v < MAX_TRAIT for v in sigmas) or not all(abs(v) < MAX_TRAIT for v in antenna):
         raise ValueError("traits out of range")
+    model = RobotModel.of_numbers(tuple(raw.traits)) if raw.n_traits else None
     peers = [Chain(_robot(p.id), p.epoch) for p in raw.peers]
     keyframes = tuple(Keyframe(k.n, k.segment, k.x, k.y, k.theta) for k in raw.keyframes)
     if any(k.n < 0 or k.segment < 0 for k in keyframes):
@@ -138,7 +141,7 @@ def _read_graph(raw: Any) -> GraphEntry:
     ranges = tuple(_read_range(r, peers) for r in raw.ranges)
     closures = tuple(_read_closure(c, peers) for c in raw.closures)
     relative = tuple(_read_relative(r, peers) for r in raw.relative)
-    entry = GraphEntry(raw.seq, tuple(raw.traits), keyframes, ranges, closures, relative)
+    entry = GraphEntry(raw.seq, model, keyframes, ranges, closures, relative)
     if peers != _peers(entry):
         raise ValueError("peers that are not those of the items")
     return entry

@@ -61,10 +61,10 @@ class Peer:
         self._tallies: deque[tuple[int, int]] = deque(maxlen=LOSS_STATUSES)
         """(messages that it had sent, those of them that had come) at each of its statuses."""
 
-    def heard(self, sent: int, utime: int) -> None:
+    def on_message(self, sent: int, utime: int) -> None:
         """Any message straight from the peer."""
         self.last_heard = max(self.last_heard, utime)
-        self.clock.heard(sent, utime)
+        self.clock.on_message(sent, utime)
         self.received += 1
 
     @property

@@ -47,7 +47,7 @@ class PeerClock:
         self._echo: tuple[int, int] | None = None
         self._radio: tuple[int, int] | None = None
 
-    def heard(self, sent: int, arrived: int) -> None:
+    def on_message(self, sent: int, arrived: int) -> None:
         """A message straight from the peer: its stamp, and its arrival on our clock."""
         second, value = arrived // SECOND_US, arrived - sent
         if self._smallest and self._smallest[-1][0] == second:

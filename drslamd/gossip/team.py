@@ -21,10 +21,11 @@ from drslamd.slam.graph.measurements import (
     PublicPoses,
     RangeMeasurement,
 )
+from drslamd.slam.robot_model import RobotModel
 
 FORGET_US = 600 * SECOND_US
 """A peer that was silent for ten minutes is no longer listed."""
-TRAITS_EVERY = 64
+MODEL_EVERY = 64
 """Log entries between two that say what our sensors are like."""
 ITEMS_PER_ENTRY = 20
 """Keyframes, ranges and closures in one log entry; 20 closures with 20 peers are 1,282 bytes."""
@@ -111,7 +112,7 @@ class Team:
 
     def entries(
         self,
-        traits: tuple[float, ...],
+        model: RobotModel,
         keyframes: Sequence[Keyframe],
         ranges: Sequence[RangeMeasurement],
         closures: Sequence[ClosureMeasurement],
@@ -123,7 +124,7 @@ class Team:
             part = items[first : first + ITEMS_PER_ENTRY]
             yield GraphEntry(
                 seq,
-                traits if seq % TRAITS_EVERY == 0 else (),
+                model if seq % MODEL_EVERY == 0 else None,
                 tuple(i for i in part if isinstance(i, Keyframe)),
                 tuple(i for i in part if isinstance(i, RangeMeasurement)),
                 tuple(i for i in part if isinstance(i, ClosureMeasurement)),
@@ -141,7 +142,7 @@ class Team:
         """Whom we hear."""
         return {peer.chain for peer in self.peers.values() if peer.is_alive(utime)}
 
-    def heard(self, utime: int, needed: Container[int] = ()) -> tuple[Heard, ...]:
+    def heard_peers(self, utime: int, needed: Container[int] = ()) -> tuple[Heard, ...]:
         """For our next status: whom we hear, in turn when they are too many.
 
         Args:
@@ -209,7 +210,7 @@ class Team:
         if peer is None or peer.chain != origin:
             peer = self.peers[origin.robot] = Peer(origin, utime)
             self.logs.begin(origin)
-        peer.heard(header.utime, utime)
+        peer.on_message(header.utime, utime)
         if isinstance(message, Status):
             self._status(peer, message, header.counter, utime)
         elif isinstance(message, OdometryBatch):

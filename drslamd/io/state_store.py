@@ -14,7 +14,7 @@ from typing import Any
 
 from drslamd.config import ConfigError
 from drslamd.gossip.seal import KEY_BYTES
-from drslamd.slam.calibration import calibration_store
+from drslamd.slam.calibration import sensor_calibration
 
 SCHEMA = 1
 
@@ -71,7 +71,7 @@ def _is_sound(state: dict[str, Any]) -> bool:
         isinstance(state.get("epoch", 0), int)
         and isinstance(epochs, dict)
         and all(robot.isdecimal() and isinstance(n, int) for robot, n in epochs.items())
-        and calibration_store.is_sound(state.get("calibration", {}))
+        and sensor_calibration.is_sound(state.get("calibration", {}))
     )
 
 

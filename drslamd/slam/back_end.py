@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from drslamd.config import Config
 from drslamd.conventions import Chain, Segment
+from drslamd.slam import settings
 from drslamd.slam.graph import team_frame
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.history import History
@@ -15,35 +17,37 @@ from drslamd.slam.graph.measurements import GraphEntry, PublicPoses
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.graph.thinning import Thinning
-from drslamd.slam.optimizer.banded.banded_optimizer import BandedOptimizer
-from drslamd.slam.optimizer.closures.closure_optimizer import ClosureOptimizer
-from drslamd.slam.optimizer.contract import Job, Optimizer
-from drslamd.slam.optimizer.rbcd.rbcd_optimizer import RbcdOptimizer
+from drslamd.slam.optimizer.contract import Job
+from drslamd.slam.tuning import DEFAULTS, Tuning
 
-OPTIMIZERS: dict[str, Callable[[Config, Chain], Optimizer]] = {
-    "banded": BandedOptimizer,
-    "closures": ClosureOptimizer,
-    "rbcd": RbcdOptimizer,
-}
-"""By `optimizer.algorithm`."""
+
+class _Known(NamedTuple):
+    """What a job knows: log entries that are held, robots that live, public poses of the peers."""
+
+    inserted: int = -1
+    living: frozenset[int] = frozenset()
+    public: Mapping[int, PublicPoses] = {}
 
 
 class BackEnd:
-    """Graph and estimate."""
+    """Graph and estimate.
 
-    def __init__(self, config: Config, own: Chain) -> None:
+    Attributes:
+        history: where we were.
+        group: segments that are connected to our current one, as the last job knew them.
+        estimate: of that group; None while we are in none.
+    """
+
+    def __init__(self, config: Config, own: Chain, tuning: Tuning = DEFAULTS) -> None:
         self._own = own
-        self._optimizer = OPTIMIZERS[config.optimizer.algorithm](config, own)
+        self._optimizer = settings.optimizer(config, own, tuning)
         self.graph = PoseGraph()
         self._thinning = Thinning(self.graph)
         self.history = History()
-        """Where we were."""
         self.group: set[Segment] = set()
         self.estimate: TeamEstimate | None = None
-        """Of the group that our current segment is in; None while it is in none."""
         self._inserted = 0
-        self._known: tuple[int, set[int], Mapping[int, PublicPoses]] = (-1, set(), {})
-        """What the last job knew: items inserted, robots that live, public poses of the peers."""
+        self._known = _Known()
 
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
         self.graph.insert(origin, entry)
@@ -58,10 +62,10 @@ class BackEnd:
         """The solved keyframes of a robot, in the frame of the team."""
         return self.estimate.trajectories.get(robot) if self.estimate else None
 
-    def job(
+    def begin(
         self, present: set[int], shift_us: dict[int, int], public: Mapping[int, PublicPoses]
     ) -> Job | None:
-        """The computation that renews the estimate; None when nothing is new or connected.
+        """Begin to renew the estimate; None when nothing is new or connected.
 
         An estimate that has not converged is renewed without any news.
 
@@ -70,13 +74,14 @@ class BackEnd:
             shift_us: clock of each robot minus ours, us.
             public: lifted public poses of the peers.
         """
-        if not self._is_news(present, public) and (not self.estimate or self.estimate.converged):
+        now = _Known(self._inserted, frozenset(present), dict(public))
+        if not _is_news(self._known, now) and (not self.estimate or self.estimate.converged):
             return None
-        self._known = (self._inserted, present, dict(public))
-        items = self.graph.chains.get(self._own.robot)
-        if items is None or not len(items.rows):
+        self._known = now
+        data = self.graph.chains.get(self._own.robot)
+        if data is None or not len(data.keyframes):
             return None
-        current = Segment(*self._own, int(items.rows[-1, 1]))
+        current = Segment(*self._own, int(data.keyframes.segment[-1]))
         groups = [group for group in team_frame.groups(self.graph) if current in group]
         self.group = groups[0] if groups else set()
         frame = team_frame.gauge_segment(self.group, present)
@@ -87,15 +92,8 @@ class BackEnd:
         group = Group(self.group, frame, {**shift_us, self._own.robot: 0})
         return self._optimizer.job(self.graph, group, self.estimate, same)
 
-    def _is_news(self, present: set[int], public: Mapping[int, PublicPoses]) -> bool:
-        inserted, lived, heard = self._known
-        return (
-            (inserted, lived, heard.keys()) != (self._inserted, present, public.keys())
-            # poses of the same keyframes compare equal, whatever they are
-            or any(heard[robot] is not poses for robot, poses in public.items())
-        )
-
-    def solved(self, result: TeamEstimate) -> None:
+    def on_solution(self, result: TeamEstimate) -> None:
+        """Module 3 has answered."""
         self.estimate = result
         own = result.trajectories.get(self._own.robot)
         if own is not None:
@@ -111,3 +109,14 @@ class BackEnd:
         keyframes = tuple(int(n) for n in lifted.carriers)
         frame, rank = self.estimate.frame, len(lifted.anchor) // 2
         return PublicPoses(frame.robot, frame.epoch, rank, keyframes, values)
+
+
+def _is_news(before: _Known, now: _Known) -> bool:
+    """Does a job know anything that the one before it did not?"""
+    same = (before.inserted, before.living, before.public.keys()) == (
+        now.inserted,
+        now.living,
+        now.public.keys(),
+    )
+    # poses of the same keyframes compare equal, whatever they are
+    return not same or any(before.public[k] is not poses for k, poses in now.public.items())

@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 Array = NDArray[Any]
 """Of floats, unless a docstring says otherwise; docstrings also say the shapes."""
 
+Index = NDArray[np.int64]
+"""Places in other arrays."""
+
 
 def wrap(angle: Array | float) -> Array:
     """Angles in radians, brought into (-pi, pi]."""

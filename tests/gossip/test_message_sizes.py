@@ -18,8 +18,7 @@ from drslamd.slam.graph.measurements import (
     PublicPoses,
     RangeMeasurement,
 )
-
-TRAITS = (0.5, 0.25, 0.125, 0.0625, 0.5, -0.5, 0.25)
+from drslamd.slam.robot_model import UNTOLD
 
 
 def fits(send: Send) -> bool:
@@ -38,7 +37,7 @@ def test_the_status_of_a_robot_that_hears_254_others_fits() -> None:
     team = Team(a_seal(0))
     for robot in range(1, 255):
         team.receive(ChannelMessage(0, *sealed(a_seal(robot), a_status())))
-    heard, logs = team.heard(0), team.logs.states()
+    heard, logs = team.heard_peers(0), team.logs.states()
     assert len(heard) == len(logs) == 28
     assert fits(team.send(a_status(heard, logs, ranged=tuple(range(28))), 0))
 
@@ -75,7 +74,7 @@ def test_items_of_every_kind_are_said_completely_in_entries_that_fit(
     closures: tuple[ClosureMeasurement, ...],
 ) -> None:
     team = Team(a_seal(3))
-    entries = [team.append(e, 0) for e in team.entries(TRAITS, keyframes, ranges, closures)]
+    entries = [team.append(e, 0) for e in team.entries(UNTOLD, keyframes, ranges, closures)]
     assert all(fits(team.send_sealed(3, payload)) for _, payload in entries)
     assert [entry.seq for entry, _ in entries] == list(range(len(entries)))
     assert sum(len(e.keyframes) for e, _ in entries) == len(keyframes)
@@ -85,7 +84,7 @@ def test_items_of_every_kind_are_said_completely_in_entries_that_fit(
 
 def test_twenty_closures_with_twenty_peers_and_the_traits_have_1282_bytes() -> None:
     team = Team(a_seal(3))
-    (entry,) = team.entries(TRAITS, (), (), CLOSURES[:ITEMS_PER_ENTRY])
+    (entry,) = team.entries(UNTOLD, (), (), CLOSURES[:ITEMS_PER_ENTRY])
     assert len(messages.encode(HEADER, entry)) == 54 + 28 + 20 * (10 + 50) == 1282
 
 

@@ -23,6 +23,8 @@ from drslamd.slam.graph.measurements import (
     PublicPoses,
     RangeMeasurement,
 )
+from drslamd.slam.odometry.noise import OdometryNoise
+from drslamd.slam.robot_model import RobotModel
 
 i16 = st.integers(-(2**15), 2**15 - 1)
 i32 = st.integers(-(2**31), 2**31 - 1)
@@ -76,9 +78,13 @@ closures = st.builds(
     st.tuples(*[i32.map(tenths)] * 3), diagonals,
 )  # fmt: skip
 sigmas = st.floats(2**-20, 8, width=32)
-traits = st.tuples(sigmas, sigmas, sigmas, sigmas, *[st.floats(-8, 8, width=32)] * 3)
+models = st.builds(
+    RobotModel,
+    st.builds(OdometryNoise, sigmas, sigmas, sigmas, sigmas),
+    *[st.floats(-8, 8, width=32)] * 3,
+)
 entries = st.builds(
-    GraphEntry, n32, traits | st.just(()),
+    GraphEntry, n32, models | st.none(),
     st.lists(keyframes, max_size=6).map(tuple),
     st.lists(ranges, max_size=6).map(tuple),
     st.lists(closures, max_size=6).map(tuple),

@@ -34,7 +34,7 @@ def loss_after(messages: list[str], lost: set[int]) -> float:
         if kind == "entry":
             entries += 1
         elif k not in lost:
-            peer.heard(k * 100 * MS, T0 + k * 100 * MS)
+            peer.on_message(k * 100 * MS, T0 + k * 100 * MS)
             if kind == "status":
                 peer.take_status(a_status(logs=own_log(entries)), k + 1, OWN, 0)
     return peer.loss
@@ -79,7 +79,7 @@ def test_a_peer_that_lies_about_its_log_has_some_loss_and_breaks_nothing() -> No
 
 def test_a_peer_lives_for_five_seconds_after_its_last_message() -> None:
     peer = a_peer()
-    peer.heard(0, T0 + SECOND)
+    peer.on_message(0, T0 + SECOND)
     assert peer.is_alive(T0 + 6 * SECOND - 1)
     assert not peer.is_alive(T0 + 6 * SECOND)
 
@@ -110,7 +110,7 @@ def test_a_status_with_room_for_us_says_that_we_are_not_heard_and_a_full_one_doe
     others: int, remembered: bool
 ) -> None:
     peer = a_peer()
-    peer.heard(T0 + SECOND, T0)
+    peer.on_message(T0 + SECOND, T0)
     peer.take_status(full(Heard(*OWN, SECOND, 70), others=27), 1, OWN, T0)
     peer.take_status(full(others=others), 2, OWN, T0 + 3 * SECOND)
     assert peer.hears(OWN) == remembered
@@ -146,7 +146,7 @@ def test_what_is_said_of_us_anew_replaces_what_is_remembered() -> None:
 
 def test_what_it_hears_of_us_makes_its_clock_known() -> None:
     peer = a_peer()
-    peer.heard(T0 + SECOND, T0 + 10 * MS)
+    peer.on_message(T0 + SECOND, T0 + 10 * MS)
     peer.take_status(a_status((Heard(*OWN, SECOND + 10 * MS),)), 1, OWN, 0)
     offset = peer.clock.offset(T0)
     assert offset is not None
@@ -243,7 +243,7 @@ def test_a_break_in_the_odometry_of_the_peer_is_a_break_in_its_track() -> None:
 
 def test_a_neighbour_carries_what_the_peer_said() -> None:
     peer = a_peer()
-    peer.heard(T0 + SECOND, T0 + 10 * MS)
+    peer.on_message(T0 + SECOND, T0 + 10 * MS)
     peer.take_status(a_status((Heard(*OWN, SECOND),), ranged=(1, 9), uwb_id=44), 1, OWN, 0)
     neighbour = peer.neighbour(OWN, T0)
     assert (neighbour.chain, neighbour.uwb_id, neighbour.ranges_to_us) == (CHAIN, 44, True)
@@ -258,6 +258,6 @@ def test_a_clock_that_is_known_worse_than_a_grid_step_is_not_used(
 ) -> None:
     """The sum of both delays, halved, and 3.2 ms for the drift make 100 ms."""
     peer = a_peer()
-    peer.heard(T0, T0 + 96_800)
+    peer.on_message(T0, T0 + 96_800)
     peer.take_status(a_status((Heard(*OWN, 96_800 + excess_us),)), 1, OWN, T0)
     assert (peer.neighbour(OWN, T0).ahead_us is not None) == known

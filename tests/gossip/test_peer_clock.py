@@ -51,8 +51,8 @@ class Conversation:
         for k in range(5 * seconds):
             self.now += 200 * MS
             there = self.now + self.offset()
-            self.theirs.heard(self.now, there + self._out(self._random))
-            self.ours.heard(there, self.now + self._back(self._random))
+            self.theirs.on_message(self.now, there + self._out(self._random))
+            self.ours.on_message(there, self.now + self._back(self._random))
             if k % 5 == 0:
                 self.ours.echoed((self.theirs.delay_us or 0, self.now))
 
@@ -115,15 +115,15 @@ def test_a_drift_of_100_ppm_is_followed_to_ten_milliseconds_for_an_hour(ppm: int
 def test_the_smallest_delay_counts_and_not_the_last() -> None:
     clock = PeerClock()
     for delay in (30 * MS, 4 * MS, 50 * MS):
-        clock.heard(T0, T0 + delay)
+        clock.on_message(T0, T0 + delay)
     assert clock.delay_us == 4 * MS
 
 
 def test_a_small_delay_is_forgotten_after_sixteen_seconds() -> None:
     for later, smallest in ((15, 4 * MS), (16, 30 * MS)):
         clock = PeerClock()
-        clock.heard(T0, T0 + 4 * MS)
-        clock.heard(T0 + later * SECOND, T0 + later * SECOND + 30 * MS)
+        clock.on_message(T0, T0 + 4 * MS)
+        clock.on_message(T0 + later * SECOND, T0 + later * SECOND + 30 * MS)
         assert clock.delay_us == smallest
 
 
@@ -139,7 +139,7 @@ def test_what_was_heard_before_a_long_silence_is_forgotten_with_the_first_messag
 
 def test_a_peer_that_does_not_say_how_it_hears_us_is_known_to_a_tenth_of_a_second() -> None:
     clock = PeerClock()
-    clock.heard(T0 + 5 * SECOND, T0 + 40 * MS)
+    clock.on_message(T0 + 5 * SECOND, T0 + 40 * MS)
     assert clock.offset(T0) == Offset(5 * SECOND - 40 * MS, 100 * MS, "one way")
 
 
@@ -150,7 +150,7 @@ def test_what_the_peer_said_some_time_ago_stays_within_the_claim(silence_s: int,
     talk.talk(20)
     for _ in range(5 * silence_s):
         talk.now += 200 * MS
-        talk.ours.heard(talk.now + talk.offset(), talk.now + 2 * MS)
+        talk.ours.on_message(talk.now + talk.offset(), talk.now + 2 * MS)
     assert is_within_the_claim(talk)
 
 
@@ -235,7 +235,7 @@ def test_the_radio_alone_is_not_believed() -> None:
     clock = PeerClock()
     clock.radio(OWN_MINUS_SYSTEM, OWN_MINUS_SYSTEM, T0)
     assert clock.offset(T0) is None
-    clock.heard(T0, T0 + 40 * MS)
+    clock.on_message(T0, T0 + 40 * MS)
     found = clock.offset(T0)
     assert found is not None
     assert found.source == "one way"

@@ -22,6 +22,8 @@ from drslamd.gossip.message_types import Heard, LogState, Message, OdometryBatch
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
 from drslamd.slam.graph.measurements import PublicPoses
+from drslamd.slam.odometry.noise import OdometryNoise
+from drslamd.slam.robot_model import UNTOLD, RobotModel
 
 OWN = Chain(1, 10)
 T0 = 100 * SECOND
@@ -132,28 +134,29 @@ def test_a_message_goes_out_sealed_on_the_channel_of_its_robot() -> None:
 
 def test_our_entry_is_what_the_others_will_read() -> None:
     """0.1 is no float of 32 bits; the owner computes with what was sent."""
-    traits = (0.1,) * 7
+    model = RobotModel(OdometryNoise(0.1, 0.1, 0.1, 0.1))
     team = a_team()
-    (entry,) = team.entries(traits, an_entry(0, 5).keyframes, (), ())
+    (entry,) = team.entries(model, an_entry(0, 5).keyframes, (), ())
     own, payload = team.append(entry, T0)
     received = Team(a_seal(3)).receive(
         ChannelMessage(T0, "DRSLAM_GRAPH_001", team.send_sealed(1, payload).payload)
     )
     assert received is not None
     assert received.message == own
-    assert own.traits[0] != 0.1
+    assert own.model is not None
+    assert own.model.noise.scale != 0.1
 
 
-def test_traits_are_said_with_the_first_of_every_64_entries() -> None:
+def test_what_our_sensors_are_like_is_said_with_the_first_of_every_64_entries() -> None:
     team = a_team()
     for k in range(130):
-        for entry in team.entries((0.5,) * 7, an_entry(0, k).keyframes, (), ()):
+        for entry in team.entries(UNTOLD, an_entry(0, k).keyframes, (), ()):
             own, _ = team.append(entry, T0)
-            assert bool(own.traits) == (own.seq in (0, 64, 128))
+            assert bool(own.model) == (own.seq in (0, 64, 128))
 
 
 def test_nothing_to_say_makes_no_entry() -> None:
-    assert list(a_team().entries((), (), (), ())) == []
+    assert list(a_team().entries(UNTOLD, (), (), ())) == []
 
 
 def test_what_a_peer_lacks_is_repeated_as_it_was_sealed() -> None:
@@ -198,14 +201,14 @@ def test_we_vouch_for_those_whom_we_heard_of_late() -> None:
     tell(team, a_seal(3), a_status())
     tell(team, a_seal(4), a_status(leaving=True))
     for utime, heard in ((T0 + 5 * SECOND - 1, [3]), (T0 + 5 * SECOND, [])):
-        assert [h.id for h in team.heard(utime)] == heard
+        assert [h.id for h in team.heard_peers(utime)] == heard
 
 
 def test_we_name_those_whom_we_hear_and_what_their_messages_took() -> None:
     team = a_team()
     for robot, arrived in ((5, 40 * MS), (3, 30 * MS), (4, 50 * MS)):
         team.receive(ChannelMessage(T0 + arrived, *sealed(a_seal(robot), a_status(), T0)))
-    assert team.heard(T0 + 60 * MS) == (
+    assert team.heard_peers(T0 + 60 * MS) == (
         Heard(3, 1, 30 * MS), Heard(4, 1, 50 * MS), Heard(5, 1, 40 * MS),
     )  # fmt: skip
 
@@ -218,7 +221,7 @@ def test_peers_that_do_not_fit_one_status_take_turns(others: int, statuses: int)
     named: list[int] = []
     for _ in range(statuses):
         assert len(set(named)) < others
-        ids = [h.id for h in team.heard(T0)]
+        ids = [h.id for h in team.heard_peers(T0)]
         assert len(set(ids)) == len(ids) == min(28, others)
         named += ids
     assert set(named) == set(range(1, others + 1))
@@ -230,8 +233,8 @@ def test_a_robot_that_falls_silent_costs_nobody_else_its_turn() -> None:
     team = Team(a_seal(0))
     for robot in range(1, 41):
         tell(team, a_seal(robot), a_status(), T0 if robot == 28 else T0 + SECOND)
-    assert [h.id for h in team.heard(T0 + SECOND)] == list(range(1, 29))
-    assert [h.id for h in team.heard(T0 + 5 * SECOND)] == [*range(29, 41), *range(1, 17)]
+    assert [h.id for h in team.heard_peers(T0 + SECOND)] == list(range(1, 29))
+    assert [h.id for h in team.heard_peers(T0 + 5 * SECOND)] == [*range(29, 41), *range(1, 17)]
 
 
 def test_a_peer_is_forgotten_after_ten_silent_minutes_and_its_log_is_not() -> None:
@@ -343,7 +346,7 @@ def test_a_robot_that_lost_its_memory_learns_its_last_epoch_after_any_silence() 
     peer = Team(a_seal(3))
     tell(peer, a_seal(1, epoch=12), a_status(), T0)
     team = a_team()
-    status = a_status(peer.heard(T0 + 60 * SECOND), peer.logs.states())
+    status = a_status(peer.heard_peers(T0 + 60 * SECOND), peer.logs.states())
     tell(team, a_seal(3), status, T0 + 60 * SECOND)
     assert team.superseded_by == 12
 

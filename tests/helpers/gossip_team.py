@@ -11,6 +11,7 @@ from message_builders import MS, SECOND, a_seal, a_status
 from drslamd.events import ChannelMessage, Send
 from drslamd.gossip.team import Received, Team
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
+from drslamd.slam.robot_model import UNTOLD
 
 STEP = 100 * MS
 DELAY = 2 * MS
@@ -43,7 +44,7 @@ class Air:
     def say(self, robot: int, *, aloud: bool = True) -> None:
         """A robot adds an entry to its log, and sends it if `aloud`."""
         team = self.teams[robot]
-        for entry in team.entries((), (Keyframe(self.utime // STEP, 0, robot, 0, 0),), (), ()):
+        for entry in team.entries(UNTOLD, (Keyframe(self.utime // STEP, 0, robot, 0, 0),), (), ()):
             own, sealed = team.append(entry, self.utime)
             self.held[robot][robot, own.seq] = own
             if aloud:
@@ -79,7 +80,7 @@ class Air:
             for send in team.repeats(self.utime):
                 self.carry(robot, send)
             if self.utime // STEP % self._steps == self._phase[robot]:
-                status = a_status(team.heard(self.utime), team.logs.states())
+                status = a_status(team.heard_peers(self.utime), team.logs.states())
                 self.carry(robot, team.send(status, self.utime))
 
     def seconds(self, count: int, speakers: Iterable[int] = (), *, aloud: bool = True) -> None:

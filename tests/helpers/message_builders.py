@@ -18,6 +18,8 @@ from drslamd.slam.graph.measurements import (
     PublicPoses,
     RangeMeasurement,
 )
+from drslamd.slam.odometry.noise import OdometryNoise
+from drslamd.slam.robot_model import RobotModel
 
 MS = 1_000
 SECOND = 1_000_000
@@ -61,7 +63,7 @@ def one_of_each_kind() -> list[Message]:
         OdometryBatch(40, 40, steps),
         GraphEntry(
             2,
-            (0.5, 0.25, 0.125, 0.0625, 0.5, -0.5, 0.25),
+            RobotModel(OdometryNoise(0.5, 0.25, 0.125, 0.0625), 0.5, -0.5, 0.25),
             (Keyframe(40, 1, -100, 200, -30),),
             (RangeMeasurement(40, peer, 41, (0.25, 0.0), (-0.125, 0.5), 3.5, 0.125),),
             (ClosureMeasurement(8, True, 40, peer, 41, (1.5, -2.5, 0.25), COVARIANCE),),

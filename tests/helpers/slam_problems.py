@@ -7,21 +7,17 @@ import math
 import numpy as np
 from slam_scenes import Array, inverted, product, wander
 
-from drslamd.slam.optimizer.banded.normal_equations import (
-    GAUGE_SIGMA,
-    ROBUST_SIGMAS,
-    Layout,
-    System,
-)
+from drslamd.slam.optimizer.banded.layout import BandLayout
+from drslamd.slam.optimizer.banded.normal_equations import GAUGE_SIGMA, System
 from drslamd.slam.optimizer.problem import (
-    NEAR_RANGE_M,
+    BetweenFactors,
     Calibration,
-    Links,
-    PoseEdges,
+    OdometryFactors,
     Priors,
     Problem,
-    Ranges,
+    RangeFactors,
 )
+from drslamd.slam.range_model import LINKTRACK
 
 
 def random_covariance(rng: np.random.Generator, sigma: tuple[float, float, float]) -> Array:
@@ -35,7 +31,7 @@ def pose_edges(
     pairs: list[tuple[int, int]],
     sigma: tuple[float, float, float],
     error: float = 1.0,
-) -> PoseEdges:
+) -> BetweenFactors:
     """Relative poses of pairs of true poses; `error` scales the noise that is drawn."""
     measured, covariances = [], []
     for i, j in pairs:
@@ -44,12 +40,14 @@ def pose_edges(
         measured.append(product(inverted(truth[i]), truth[j]) + error * noise)
         covariances.append(covariance)
     i, j = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-    return PoseEdges(i, j, np.reshape(measured, (-1, 3)), np.reshape(covariances, (-1, 3, 3)))
+    return BetweenFactors(i, j, np.reshape(measured, (-1, 3)), np.reshape(covariances, (-1, 3, 3)))
 
 
-def no_ranges() -> Ranges:
+def no_ranges() -> RangeFactors:
     none = np.zeros(0, dtype=np.int64)
-    return Ranges(none, none, np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0), none)
+    return RangeFactors(
+        none, none, np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0), none
+    )
 
 
 def team_problem(
@@ -77,15 +75,15 @@ def team_problem(
     chain = [
         (robots * k + r, robots * (k + 1) + r) for k in range(count - 1) for r in range(robots)
     ]
-    links = pose_edges(rng, truth, chain, link_sigma, link_error)
-    robot = links.i % robots
-    path = np.hypot(links.measured[:, 0], links.measured[:, 1])
-    measured = links.measured.copy()
+    odometry = pose_edges(rng, truth, chain, link_sigma, link_error)
+    robot = odometry.i % robots
+    path = np.hypot(odometry.measured[:, 0], odometry.measured[:, 1])
+    measured = odometry.measured.copy()
     for k, r in enumerate(robot):
         bend = yaw[r] * path[k]
         x, y = (1 + scale[r]) * measured[k, :2]
         measured[k] = [x - bend / 2 * y, y + bend / 2 * x, measured[k, 2] + bend]
-    odometry = Links(links.i, links.j, measured, links.covariance, robot, path)
+    odometry = OdometryFactors(odometry.i, odometry.j, measured, odometry.covariance, robot, path)
     names = [(a, b) for a in range(robots) for b in range(a + 1, robots)]
     rows = []
     q = rng.normal(0, 0.2, (robots, 2))
@@ -98,11 +96,13 @@ def team_problem(
             # the term is of what is measured, itself included
             for _ in range(30):
                 measured_m = (
-                    distance + biases[number] + near_bias * math.exp(-measured_m / NEAR_RANGE_M)
+                    distance
+                    + biases[number]
+                    + near_bias * math.exp(-measured_m / LINKTRACK.near_reach_m)
                 )
             rows.append((i, j, *q[a], *q[b], measured_m, number))
     table = np.reshape(rows, (-1, 8))
-    ranges = Ranges(
+    ranges = RangeFactors(
         table[:, 0].astype(int), table[:, 1].astype(int), table[:, 2:4], table[:, 4:6],
         table[:, 6] + range_error * rng.normal(size=len(table)), np.full(len(table), 0.05),
         table[:, 7].astype(int),
@@ -124,7 +124,7 @@ def team_problem(
 
 
 def unpacked(problem: Problem, x: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Poses, biases, scales, yaw rates and bias of near_bias signals of one vector of all unknowns."""
+    """Poses, biases, scales, yaw rates and near-range bias of one vector of all unknowns."""
     count, priors = len(problem.initial), problem.priors
     ends = np.cumsum([3 * count, len(priors.bias), len(priors.scale), len(priors.yaw)])
     poses, bias, scale, yaw, near_bias = np.split(x, ends)
@@ -144,12 +144,12 @@ def residual_vector(problem: Problem, x: Array, robust: bool = True) -> Array:
     """
     poses, bias, scale, yaw, near_bias = unpacked(problem, x)
     out: list[float] = []
-    links = problem.links
-    for m in range(len(links)):
-        mx, my, mt = links.measured[m]
-        s, b = scale[links.robot[m]], yaw[links.robot[m]] * links.path[m]
+    odometry = problem.odometry
+    for m in range(len(odometry)):
+        mx, my, mt = odometry.measured[m]
+        s, b = scale[odometry.robot[m]], yaw[odometry.robot[m]] * odometry.path[m]
         right = ((1 - s) * mx + b / 2 * my, (1 - s) * my - b / 2 * mx, mt - b)
-        out += whitened(poses[links.i[m]], poses[links.j[m]], right, links.covariance[m])
+        out += whitened(poses[odometry.i[m]], poses[odometry.j[m]], right, odometry.covariance[m])
     closures = problem.closures
     for m in range(len(closures)):
         ends = poses[closures.i[m]], poses[closures.j[m]]
@@ -157,9 +157,9 @@ def residual_vector(problem: Problem, x: Array, robust: bool = True) -> Array:
     r = problem.ranges
     for m in range(len(r)):
         i, j = (product(poses[k], (*q, 0)) for k, q in ((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m])))
-        wrong = bias[r.pair[m]] + near_bias[0] * math.exp(-r.measured[m] / NEAR_RANGE_M)
+        wrong = bias[r.pair[m]] + near_bias[0] * math.exp(-r.measured[m] / LINKTRACK.near_reach_m)
         e = (math.hypot(*(j - i)[:2]) + wrong - r.measured[m]) / r.sigma[m]
-        out.append(cauchy_root(e, ROBUST_SIGMAS) if robust else e)
+        out.append(cauchy_root(e, LINKTRACK.cauchy_sigmas) if robust else e)
     for e in np.concatenate([bias / problem.priors.bias, scale / problem.priors.scale]):
         out.append(cauchy_root(e, 1.0) if robust else e)
     out += (yaw / problem.priors.yaw).tolist() + (near_bias / problem.priors.near_bias).tolist()
@@ -184,10 +184,10 @@ def whitened(
 def range_weights(problem: Problem, x: Array) -> Array:
     """Cauchy's weight of every residual of `residual_vector`; 1 where there is none."""
     plain = residual_vector(problem, x, robust=False)
-    first = 3 * (len(problem.links) + len(problem.closures))
+    first = 3 * (len(problem.odometry) + len(problem.closures))
     weights = np.ones(len(plain))
     part = slice(first, first + len(problem.ranges))
-    weights[part] = 1 / (1 + (plain[part] / ROBUST_SIGMAS) ** 2)
+    weights[part] = 1 / (1 + (plain[part] / LINKTRACK.cauchy_sigmas) ** 2)
     loose = len(problem.priors.bias) + len(problem.priors.scale)
     sensors = slice(part.stop, part.stop + loose)
     weights[sensors] = 1 / (1 + plain[sensors] ** 2)
@@ -204,7 +204,7 @@ def jacobian(problem: Problem, x: Array, robust: bool, h: float = 1e-6) -> Array
     return np.stack(columns, axis=1)
 
 
-def dense(system: System, layout: Layout) -> Array:
+def dense(system: System, layout: BandLayout) -> Array:
     """The whole matrix of a system in the order of `packed`."""
     n, b = layout.band, layout.border
     full = np.zeros((n + b, n + b))

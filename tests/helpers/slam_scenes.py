@@ -25,8 +25,10 @@ from drslamd.slam.graph.measurements import (
 )
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
-from drslamd.slam.odometry.track import OdometryNoise
+from drslamd.slam.odometry.noise import OdometryNoise
+from drslamd.slam.optimizer.banded.banded_optimizer import BandedOptimizer
 from drslamd.slam.relative_pose.window import Window
+from drslamd.slam.robot_model import RobotModel
 
 Array = NDArray[Any]
 
@@ -165,11 +167,10 @@ def range_item(
     return RangeMeasurement(a_n, peer, b_n, q_a, q_b, range_m, sigma)
 
 
-def traits_of(
+def model_of(
     noise: OdometryNoise, antenna: tuple[float, float] = (0.0, 0.0), height: float = 0.0
-) -> tuple[float, ...]:
-    return (noise.scale, noise.yaw_rad_per_m, noise.translation_per_sqrt_m,
-            noise.yaw_rad_per_sqrt_m, *antenna, height)  # fmt: skip
+) -> RobotModel:
+    return RobotModel(noise, *antenna, height)
 
 
 # ---- a small team with a graph -----------------------------------------------------------------
@@ -215,7 +216,7 @@ def small_team(
     entries = []
     for r, chain in chains.items():
         odometry = driven(rng, truth[r], noise)
-        entry = GraphEntry(0, traits_of(NOISE), keyframes(n[r], odometry))
+        entry = GraphEntry(0, model_of(NOISE), keyframes(n[r], odometry))
         entries.append((chain, entry))
     for a in range(robots):
         ranges: list[RangeMeasurement] = []
@@ -236,7 +237,7 @@ def small_team(
                         len(closures), int(n[a][k]), chains[b], int(n[b][k]), true + error, 0.05
                     )
                 )
-        entries.append((chains[a], GraphEntry(1, (), (), tuple(ranges), tuple(closures))))
+        entries.append((chains[a], GraphEntry(1, None, (), tuple(ranges), tuple(closures))))
     for chain, entry in entries:
         graph.insert(chain, entry)
     return SmallTeam(graph, truth, n, chains, entries)
@@ -260,6 +261,8 @@ def driven(rng: np.random.Generator, truth: Array, noise: OdometryNoise) -> Arra
     return out
 
 
+BANDED = BandedOptimizer(bias_sigma=0.30, range_sigma=0.10)
+"""As the configuration has it by default."""
 CLOCKS = {0: 0, 1: 1000 * GRID_US, 2: 2000 * GRID_US}
 """Of `small_team` minus those of its robot 0, us."""
 

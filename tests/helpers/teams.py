@@ -12,7 +12,7 @@ from lab.recordings import world
 from lab.recordings.recording import Recording
 from lab.score.outcome import Outcome, score
 
-from drslamd.slam.calibration.calibration_store import UNLEARNED, SensorCalibration
+from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
 
 EASY = world.Scene(
     robots=3,

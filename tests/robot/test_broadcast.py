@@ -20,6 +20,7 @@ from drslamd.gossip.seal import Seal, team_key
 from drslamd.gossip.team import Team
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.front_end import FrontEnd
+from drslamd.slam.graph.estimate import PoseNow
 
 RUN_S = 55
 
@@ -102,8 +103,8 @@ def test_a_pose_that_moved_less_than_it_is_uncertain_waits_for_its_second(
     )
     covariance = np.diag([0.2, 0.1, 0.3]) ** 2
     first = np.array([1.0, 2.0, 3.0])
-    assert broadcast.pose((0, first, covariance), SECOND_US)
-    found = (0, first + moved, covariance)
+    assert broadcast.pose(PoseNow(0, first, covariance), SECOND_US)
+    found = PoseNow(0, first + moved, covariance)
     assert bool(broadcast.pose(found, SECOND_US + 100_000)) == said
     assert broadcast.pose(found, 3 * SECOND_US)
 

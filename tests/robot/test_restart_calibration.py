@@ -11,7 +11,7 @@ from lab.play.playback import equip
 from lab.score.metrics import at_times
 from teams import EASY, VirtualTeam
 
-from drslamd.slam.calibration.calibration_store import UNLEARNED, SensorCalibration, is_sound
+from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration, is_sound
 from drslamd.slam.graph.estimate import Learned
 from drslamd.slam.se2 import Array
 
@@ -55,19 +55,19 @@ def test_what_was_learned_is_in_the_state_that_an_orderly_stop_keeps(first: Virt
     assert kept.bias[1].value == pytest.approx(BIAS_M, abs=0.15)
     assert first.member(0).traces.saved
     # the other one does not own the pair
-    assert not first.member(1).robot.memory.latest.bias
+    assert not first.member(1).robot.calibration.latest.bias
 
 
 @pytest.mark.slow
 def test_a_restarted_robot_begins_with_what_it_knew(first: VirtualTeam) -> None:
-    kept = first.member(0).robot.memory.latest
+    kept = first.member(0).robot.calibration.latest
     team = wronged_team(kept)
     team.run(20.0)
     robot = team.member(0).robot
     trail = team.recording.trails[0]
     driven = path_length(at_times(trail.t, trail.truth, np.arange(20.0)))
     assert path_length(robot.front.reckoning.track.poses[::10]) == pytest.approx(driven, rel=0.04)
-    assert robot.front.noise.scale < 0.05
+    assert robot.front.model.noise.scale < 0.05
     assert robot.front.ranges[1].bias_m == kept.bias[1].value
     # so early nothing better is known, and nothing is forgotten
     assert SensorCalibration.of_state(robot.state()["calibration"]).scale == kept.scale
@@ -80,13 +80,13 @@ def test_with_what_it_knew_it_is_better_from_the_first_half_minute(first: Virtua
         team.run(30.0)
         return team.errors()["ate_rmse_m"]
 
-    known = after_half_a_minute(first.member(0).robot.memory.latest)
+    known = after_half_a_minute(first.member(0).robot.calibration.latest)
     assert known < 0.5 * after_half_a_minute(UNLEARNED)
 
 
 @pytest.mark.slow
 def test_a_changed_antenna_is_learned_anew(first: VirtualTeam) -> None:
-    kept = replace(first.member(0).robot.memory.latest, bias={1: Learned(0.0, 0.02)})
+    kept = replace(first.member(0).robot.calibration.latest, bias={1: Learned(0.0, 0.02)})
     team = wronged_team(kept)
     team.run(123.0)
-    assert team.member(0).robot.memory.latest.bias[1].value == pytest.approx(BIAS_M, abs=0.2)
+    assert team.member(0).robot.calibration.latest.bias[1].value == pytest.approx(BIAS_M, abs=0.2)

@@ -206,7 +206,7 @@ def test_after_silent_wheels_the_path_is_a_new_piece_that_finds_its_place() -> N
     team.run(38.0)
     assert "wheels" in team.problems(1)
     team.run(93.0)
-    keyframes = team.member(0).robot.back.graph.chains[1].rows
+    keyframes = team.member(0).robot.back.graph.chains[1].keyframes.rows
     assert len(np.unique(keyframes[:, 1])) == 2
     assert team.frames() == {0: 0, 1: 0, 2: 0}
     assert team.errors()["ate_rmse_m"] < 0.15

@@ -16,10 +16,11 @@ from lab.recordings import world
 from drslamd.config import parse
 from drslamd.daemon import Daemon
 from drslamd.events import Event, SerialData, Solve
-from drslamd.slam.odometry.track import OdometryNoise
+from drslamd.slam.odometry.noise import OdometryNoise
+from drslamd.slam.range_model import RangeNoise
 from drslamd.slam.relative_pose import solver
+from drslamd.slam.relative_pose.estimate import PairNoise
 from drslamd.slam.relative_pose.window import Window
-from drslamd.slam.relative_pose.window_noise import RangeNoise
 
 pytestmark = pytest.mark.slow
 
@@ -31,7 +32,7 @@ def long_solve() -> int:
     window = Window(np.linspace(-30, 0, 60), rng.uniform(2, 8, 60), poses, poses[::-1],
                     np.zeros(2), np.zeros(2))  # fmt: skip
     odometry = OdometryNoise(0.03, 0.0026, 0.01, 0.0087)
-    noise = solver.PairNoise(RangeNoise(0.1, 0.3), odometry, odometry)
+    noise = PairNoise(RangeNoise(0.1, 0.3), odometry, odometry)
     count, end = 0, time.monotonic() + 3.0
     while time.monotonic() < end:
         solver.solve(window, noise, 0.1)

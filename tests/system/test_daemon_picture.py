@@ -60,7 +60,7 @@ def test_how_late_the_loop_was_is_in_the_status(
     daemon: Daemon, clock: Stepped, late_ms: int
 ) -> None:
     async def one_tick() -> None:
-        daemon.robot.next_tick = clock.utime + 10 * MILLISECOND_US
+        daemon.robot.timers.next = clock.utime + 10 * MILLISECOND_US
         daemon._wake()
         clock.utime += (10 + late_ms) * MILLISECOND_US
         while daemon.robot.next_tick <= clock.utime:

@@ -8,7 +8,7 @@ errors e_i and sigmas sigma_i,
     scatter^2 = (m + sum min(|e_i|, c sigma_i)^2 / sigma^2) / (m + n)
 
 is the posterior mean of a variance (1 where nothing is measured), and c is module 3's own threshold
-(`normal_equations.ROBUST_SIGMAS`). Neighbouring ranges share their errors, so the prior counts as
+(`RangeModel.cauchy_sigmas`). Neighbouring ranges share their errors, so the prior counts as
 often as they do.
 """
 
@@ -16,12 +16,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from drslamd.slam.optimizer.banded.normal_equations import ROBUST_SIGMAS
-from drslamd.slam.optimizer.problem import Index
-from drslamd.slam.se2 import Array
+from drslamd.slam.se2 import Array, Index
 
 PRIOR_RANGES = 20
-"""m: as much as five independent ranges (see `self_calibration.SHARED`) would say, which leaves
+"""m: as much as five independent ranges (see `RangeModel.shared`) would say, which leaves
 what was configured uncertain by a third."""
 PLAIN = 1.05
 """A range with a sigma so many times the smallest of its pair is doubted for reasons of its own,
@@ -29,7 +27,13 @@ being short or blocked, and tells nothing of the others."""
 
 
 def scatter_ratios(
-    errors: Array, sigmas: Array, pair: Index, pairs: int, configured: float
+    errors: Array,
+    sigmas: Array,
+    pair: Index,
+    *,
+    pairs: int,
+    configured: float,
+    most_sigmas: float,
 ) -> Array:
     """(pairs,) true sigma of ranges over the configured one.
 
@@ -38,12 +42,12 @@ def scatter_ratios(
         sigmas: (n,) m, what each was sent with: more where a range is doubted.
         pair: (n,) which pair measured it.
         configured: m, what windows allow for.
+        most_sigmas: bursts count as far as module 3 believes them.
     """
     least = np.full(pairs, np.inf)
     np.minimum.at(least, pair, sigmas)
     plain = sigmas <= PLAIN * least[pair]
-    # bursts are another matter: here as in the solution they count as far as they are credible
-    sizes = np.minimum(np.abs(errors), ROBUST_SIGMAS * sigmas)[plain]
+    sizes = np.minimum(np.abs(errors), most_sigmas * sigmas)[plain]
     squares = (sizes / configured) ** 2
     total = np.bincount(pair[plain], squares, pairs)
     count = np.bincount(pair[plain], minlength=pairs)

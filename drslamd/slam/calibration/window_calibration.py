@@ -1,15 +1,15 @@
 """Self-calibration: what module 3 learned of the sensors serves module 1.
 
 A window alone hardly tells a range bias from distance, or a wheel's scale from speed; hours of
-driving do. Module 3 carries the bias of each pair, what that of all pairs does at short range
-(`problem.near_range_shape`) and the scale of each robot's odometry as unknowns. Here a window is rid of what
-is known of them, and its noise says what is still unknown:
+driving do. Module 3 carries the bias of each pair, the near-range bias of the team and the scale of
+each robot's odometry as unknowns. Here a window is rid of what is known of them, and its noise says
+what is still unknown:
 
     r' = r - bias - near_bias exp(-r / L)     p' = (1 - scale) p
     sigma'^-2 = sigma^-2 + (k s sigma_measured)^-2
 
-k accounts for ranges that share their errors, s is how much those of the pair scatter
-(`range_scatter`); nothing falls below what no constant can describe.
+k accounts for ranges that share their errors (`RangeModel.shared`), s is how much those of the pair
+scatter (`range_scatter`); nothing falls below what no constant can describe.
 """
 
 from __future__ import annotations
@@ -20,18 +20,12 @@ from typing import NamedTuple
 import numpy as np
 
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
-from drslamd.slam.odometry.track import OdometryNoise
-from drslamd.slam.optimizer.problem import near_range_shape
-from drslamd.slam.relative_pose.solver import PairNoise
+from drslamd.slam.odometry.noise import OdometryNoise
+from drslamd.slam.range_model import RangeNoise
+from drslamd.slam.relative_pose.estimate import PairNoise
 from drslamd.slam.relative_pose.window import Window
-from drslamd.slam.relative_pose.window_noise import RangeNoise
 from drslamd.slam.se2 import Array
 
-SHARED = 2.0
-"""k: ranges of one second and the next have a correlation of 0.3 to 0.7, so four of them say about
-as much as one would alone."""
-LEAST_BIAS_M = 0.05
-"""Biases move by so much with distance and bearing."""
 LEAST_SCALE = 0.01
 """Floors and loads change wheels by so much."""
 
@@ -43,7 +37,7 @@ class PairCalibration(NamedTuple):
         bias: of the pair, m.
         scale_a, scale_b: of both odometries, fractions.
         scatter: of the pair's ranges over the configured sigma, see `range_scatter`.
-        near_bias: of the team, m at range 0, see `problem.near_range_shape`.
+        near_bias: of the team, m at range 0, see `RangeModel.near_range_shape`.
     """
 
     bias: Learned = Learned()
@@ -67,35 +61,37 @@ class PairCalibration(NamedTuple):
         )
 
 
-def remaining(learned: Learned, before: float, least: float, scatter: float = 1.0) -> float:
+def remaining(learned: Learned, before: float, least: float, widened: float) -> float:
     """Sigma of what is left of a constant when its learned value is taken out.
 
     Args:
         before: its sigma before anything was measured.
         least: what no constant can describe.
-        scatter: of the ranges from which it was learned, see `range_scatter`.
+        widened: how many times the learned sigma it is really as wrong by.
     """
-    spread = float(np.hypot(SHARED * scatter * learned.sigma, least))
+    spread = float(np.hypot(widened * learned.sigma, least))
     return float((before**-2.0 + spread**-2.0) ** -0.5)
 
 
 def calibrated_window(
-    window: Window, noise: PairNoise, sensors: PairCalibration
+    window: Window, noise: PairNoise, known: PairCalibration
 ) -> tuple[Window, PairNoise]:
     """The window without its known errors, and the noise that is left."""
-    near = sensors.near_bias.value * near_range_shape(window.ranges)
+    model = noise.model
+    near = known.near_bias.value * model.near_range_shape(window.ranges)
     better = replace(
         window,
-        ranges=window.ranges - sensors.bias.value - near,
-        a_poses=_scaled(window.a_poses, sensors.scale_a),
-        b_poses=_scaled(window.b_poses, sensors.scale_b),
+        ranges=window.ranges - known.bias.value - near,
+        a_poses=_scaled(window.a_poses, known.scale_a),
+        b_poses=_scaled(window.b_poses, known.scale_b),
     )
-    scatter = sensors.scatter
-    bias = remaining(sensors.bias, noise.ranges.bias_sigma, LEAST_BIAS_M, scatter)
+    widened = model.shared * known.scatter
+    bias = remaining(known.bias, noise.ranges.bias_sigma, model.least_bias_m, widened)
     return better, PairNoise(
-        RangeNoise(noise.ranges.sigma, bias, scatter),
-        _narrowed(noise.a, sensors.scale_a, scatter),
-        _narrowed(noise.b, sensors.scale_b, scatter),
+        RangeNoise(noise.ranges.sigma, bias, known.scatter),
+        _narrowed(noise.a, known.scale_a, widened),
+        _narrowed(noise.b, known.scale_b, widened),
+        model,
     )
 
 
@@ -103,6 +99,6 @@ def _scaled(poses: Array, scale: Learned) -> Array:
     return np.asarray(poses * [1 - scale.value, 1 - scale.value, 1.0])
 
 
-def _narrowed(noise: OdometryNoise, scale: Learned, scatter: float) -> OdometryNoise:
+def _narrowed(noise: OdometryNoise, scale: Learned, widened: float) -> OdometryNoise:
     """As if the ranges of this pair alone had taught the scale, which those of all pairs did."""
-    return replace(noise, scale=remaining(scale, noise.scale, LEAST_SCALE, scatter))
+    return replace(noise, scale=remaining(scale, noise.scale, LEAST_SCALE, widened))

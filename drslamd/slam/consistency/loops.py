@@ -10,7 +10,6 @@ from typing import Union
 
 import numpy as np
 
-from drslamd.slam.odometry.track import OdometryNoise
 from drslamd.slam.se2 import Array
 
 Places = Union[int, slice, Array]
@@ -37,31 +36,8 @@ def twists(later: Array, earlier: Array) -> tuple[Array, Array, Array]:
     return a * x + half * y, a * y - half * x, turn
 
 
-def odometry_covariance(noise: OdometryNoise, way: Array, sums: Array) -> Array:
-    """(6, m): the same as `odometry.covariance_between`, in either direction of time.
-
-    Args:
-        way: (2, m) difference of the places at both ends.
-        sums: (6, m) difference of `odometry.growth` there.
-    """
-    s, y, x_neg, yy, xy_neg, xx = np.where(sums[:1] < 0, -sums, sums)
-    turn, shift = noise.yaw_rad_per_sqrt_m**2, noise.translation_per_sqrt_m**2
-    drawn = shift * s
-    # constant scale and yaw rate: squares of what they do over the whole way
-    wx, wy = noise.scale * way
-    by, bx, bs = (noise.yaw_rad_per_m * part for part in (y, x_neg, s))
-    out = np.empty(sums.shape)
-    out[0] = turn * yy + drawn + wx * wx + by * by
-    out[1] = turn * xy_neg + wx * wy + by * bx
-    out[2] = turn * y + by * bs
-    out[3] = turn * xx + drawn + wy * wy + bx * bx
-    out[4] = turn * x_neg + bx * bs
-    out[5] = turn * s + bs * bs
-    return out
-
-
-def carried(pose: Array, covariance: Array) -> Array:
-    """(6, m) covariances of twists, carried by the adjoint of poses (3, m) or (3, 1)."""
+def carried_covariance(pose: Array, covariance: Array) -> Array:
+    """(6, m) covariances of twists, carried_covariance by the adjoint of poses (3, m) or (3, 1)."""
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     wx, wy = pose[1], -pose[0]
     xx, xy, xt, yy, yt, tt = covariance

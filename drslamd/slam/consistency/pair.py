@@ -13,22 +13,19 @@ from functools import partial
 
 import numpy as np
 
-from drslamd.config import Config
 from drslamd.conventions import Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.consistency.pcm import Candidate, PairConsistency
+from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import ClosureMeasurement
-from drslamd.slam.graph.pose_graph import ChainData
-from drslamd.slam.odometry.track import OdometryNoise
-from drslamd.slam.relative_pose.pair_window import RangeSampler, Request, at_keyframes
+from drslamd.slam.odometry.noise import OdometryNoise
+from drslamd.slam.relative_pose.estimate import RelativePoseEstimate
+from drslamd.slam.relative_pose.pair_end import at_keyframes
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
-from drslamd.slam.relative_pose.solver import RelativePoseEstimate
+from drslamd.slam.relative_pose.range_sampler import RangeSampler
+from drslamd.slam.relative_pose.window_request import WindowRequest
 from drslamd.slam.se2 import Array
 
-AGREEING = 5
-"""Closures that must agree before the pair counts as connected."""
-OUTNUMBER = 2
-"""And they must be so many times the largest set that contradicts them."""
 PENDING = 8
 """Estimates that wait for module 2, which runs as often as module 1 by default."""
 HISTORY = 2_000
@@ -37,6 +34,19 @@ TELL_EVERY = 100
 """Grid samples between closures that are sent when the graph's edges are the ranges."""
 SHRINK = 1e-4
 """Of correlations, before rounding: far above a rounding of 6e-8, far below what anyone knows."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """When a pair counts as connected.
+
+    Attributes:
+        least: so many closures must agree.
+        outnumber: and be so many times the largest set that contradicts them; 0 asks for nothing.
+    """
+
+    least: int
+    outnumber: int
 
 
 @dataclass(frozen=True)
@@ -54,43 +64,69 @@ class Checked:
 
     segments: tuple[Segment, Segment]
     consistency: PairConsistency
-    items: list[ClosureMeasurement]
+    measurements: list[ClosureMeasurement]
+
+    def kept(self) -> tuple[ClosureMeasurement, ...]:
+        """Closures of the consistent set."""
+        return tuple(self.measurements[v] for v in self.consistency.kept_vertices())
 
     def renew_sums(self, own: ChainData, peer: ChainData) -> None:
         """Keyframes that came late may lie between those of the candidates."""
-        a, a_there = own.find(np.array([item.a_n for item in self.items]))
-        b, b_there = peer.find(np.array([item.b_n for item in self.items]))
+        a, a_there = own.keyframes.find(np.array([m.a_n for m in self.measurements]))
+        b, b_there = peer.keyframes.find(np.array([m.b_n for m in self.measurements]))
         both = a_there & b_there
         self.consistency.renew_sums(np.flatnonzero(both), own.sums[a[both]], peer.sums[b[both]])
 
 
 class PairTracker:
-    """The state of one owned pair."""
+    """The state of one owned pair.
 
-    def __init__(self, config: Config, peer: Chain, ranges: RangeBuffer) -> None:
-        self._config = config
+    Attributes:
+        verdicts: how many windows came to which verdict; last_verdict: of the latest.
+        history: answers of module 1, oldest first.
+        kept: closures of the consistent set, as module 2 last left it.
+        connected: do so many agree that they are believed?
+    """
+
+    def __init__(
+        self,
+        peer: Chain,
+        ranges: RangeBuffer,
+        sampler: RangeSampler,
+        epsilon: float,
+        agreement: Agreement,
+    ) -> None:
+        """
+        Args:
+            epsilon: significance of equation (3).
+        """
         self.peer = peer
         self.ranges = ranges
-        self.range_items = RangeSampler(config.relative_pose.range_sigma_m)
+        self.sampler = sampler
+        self._epsilon, self._agreement = epsilon, agreement
         self.verdicts: Counter[str] = Counter()
         self.last_verdict = ""
         self.history: deque[WindowAnswer] = deque(maxlen=HISTORY)
         self.closures_seen = 0
-        self.established = False
-        self.checked: Checked | None = None
-        self._busy = False
+        self.kept: tuple[ClosureMeasurement, ...] = ()
+        self.connected = False
+        self._checked: Checked | None = None
+        self._is_busy = False
         self._segments: tuple[Segment, Segment] | None = None
-        self._pending: deque[tuple[int, Request, RelativePoseEstimate]] = deque(maxlen=PENDING)
-        self._said: dict[int, ClosureMeasurement] = {}
+        self._pending: deque[tuple[int, WindowRequest, RelativePoseEstimate]]
+        self._pending = deque(maxlen=PENDING)
+        self._told: dict[int, ClosureMeasurement] = {}
         self._kept_before: set[int] = set()
         self._number = 0
+
+    # ---- module 1 ----
 
     def count(self, verdict: str) -> None:
         """Remember what became of a window."""
         self.verdicts[verdict] += 1
         self.last_verdict = verdict
 
-    def estimated(self, request: Request, estimate: RelativePoseEstimate) -> None:
+    def on_estimate(self, request: WindowRequest, estimate: RelativePoseEstimate) -> None:
         """Module 1 has answered."""
         self.count(estimate.verdict.value)
         self.history.append(WindowAnswer(self._number, request.utime, estimate))
@@ -99,11 +135,13 @@ class PairTracker:
             self._pending.append((self._number, request, estimate))
             self._number += 1
 
-    def check(
+    # ---- module 2 ----
+
+    def begin_check(
         self, own: ChainData, peer: ChainData, noise: OdometryNoise
     ) -> Callable[[], Checked] | None:
-        """Module 2 on what came in since; the pair's set belongs to the job until `settle`."""
-        if self._busy:
+        """Module 2 on what came in since; the pair's set belongs to the job until `on_check`."""
+        if self._is_busy:
             return None
         work: list[tuple[Candidate, ClosureMeasurement]] = []
         while self._pending:
@@ -114,100 +152,110 @@ class PairTracker:
             )
             if segments != self._segments:
                 # odometry broke: what was kept stays in the graph, a new set begins
-                self._kept_before = self.accepted() if self.established else self._kept_before
-                self._segments, self.checked, self.established, work = segments, None, False, []
+                self._kept_before = self.accepted() if self.connected else self._kept_before
+                self._segments, self._checked, work = segments, None, []
+                self.connected, self.kept = False, ()
             work += self._candidates(number, request, estimate, own, peer)
         if not work or self._segments is None:
             return None
-        checked = self.checked
+        checked = self._checked
         if checked is None:
-            epsilon = self._config.consistency.epsilon
-            checked = Checked(self._segments, PairConsistency(noise, peer.noise, epsilon), [])
+            consistency = PairConsistency(noise, peer.model.noise, self._epsilon)
+            checked = Checked(self._segments, consistency, [])
         else:
             checked.renew_sums(own, peer)
-        self._busy, self.checked = True, None
+        self._is_busy, self._checked = True, None
         return partial(extended, checked, work)
 
     def _candidates(
         self,
         number: int,
-        request: Request,
+        request: WindowRequest,
         estimate: RelativePoseEstimate,
         own: ChainData,
         peer: ChainData,
     ) -> list[tuple[Candidate, ClosureMeasurement]]:
         """Every hypothesis of one window, at its two keyframes."""
-        a, a_there = own.find(np.array([float(request.a.n)]))
-        b, b_there = peer.find(np.array([float(request.b.n)]))
+        a, a_there = own.keyframes.find(np.array([float(request.a.n)]))
+        b, b_there = peer.keyframes.find(np.array([float(request.b.n)]))
         if not (a_there[0] and b_there[0]):
             return []
-        ends = (own.poses[a[0]], peer.poses[b[0]], own.sums[a[0]], peer.sums[b[0]])
         out = []
         for hypothesis in estimate.hypotheses:
             pose, covariance = at_keyframes(
                 hypothesis.a_T_b, hypothesis.covariance, request.a, request.b
             )
             x, y, theta = pose.tolist()
-            item = ClosureMeasurement(
-                number, True, request.a.n, self.peer, request.b.n,
-                (x, y, theta), se2.packed(sendable(covariance)),
-            )  # fmt: skip
-            out.append((Candidate(number, pose, covariance, *ends), item))
+            measurement = ClosureMeasurement(
+                number=number,
+                kept=True,
+                a_n=request.a.n,
+                peer=self.peer,
+                b_n=request.b.n,
+                a_T_b=(x, y, theta),
+                covariance=se2.packed(sendable(covariance)),
+            )
+            candidate = Candidate(
+                closure=number,
+                a_T_b=pose,
+                covariance=covariance,
+                a_pose=own.keyframes.poses[a[0]],
+                b_pose=peer.keyframes.poses[b[0]],
+                a_sums=own.sums[a[0]],
+                b_sums=peer.sums[b[0]],
+            )
+            out.append((candidate, measurement))
         return out
 
-    def settle(self, checked: Checked) -> None:
+    def on_check(self, checked: Checked) -> None:
         """Module 2 has answered: is the pair connected now?"""
-        self._busy = False
-        self.checked = checked
-        kept = len(checked.consistency.kept_vertices())
-        if self._config.relative_pose.algorithm == "paper":
-            self.established = kept >= 2
-        elif not self.established or kept < AGREEING:
-            # the rivals are searched last: that takes a while
-            self.established = kept >= AGREEING and kept >= OUTNUMBER * checked.consistency.rivals()
+        self._is_busy = False
+        self._checked, self.kept = checked, checked.kept()
+        enough = len(self.kept) >= self._agreement.least
+        if self.connected and enough:
+            return
+        # the rivals are searched last: that takes a while
+        rivals = self._agreement.outnumber and checked.consistency.rivals()
+        self.connected = enough and len(self.kept) >= self._agreement.outnumber * rivals
 
     def accepted(self) -> set[int]:
         """Numbers of all closures that are kept, of earlier segments too, back to `history`."""
         oldest = self.history[0].number if self.history else 0
-        now = {item.number for item in self.kept()}
+        now = {m.number for m in self.kept}
         return {number for number in self._kept_before | now if number >= oldest}
 
-    def kept(self) -> list[ClosureMeasurement]:
-        """Closures of the consistent set."""
-        if self.checked is None:
-            return []
-        return [self.checked.items[v] for v in self.checked.consistency.kept_vertices()]
+    # ---- what the team hears ----
 
-    def news(self, every: bool) -> list[ClosureMeasurement]:
-        """What the team must hear: closures that are now kept, and those that no longer are.
+    def tell(self, every: bool) -> list[ClosureMeasurement]:
+        """Take what the team must hear: closures that are now kept, those that no longer are.
 
         Args:
             every: closures are the graph's edges, so each one counts; otherwise one in a while
                 tells where the peer is and the ranges do the rest.
         """
-        if self.checked is None:
+        if self._checked is None:
             return []
-        kept = {item.number: item for item in self.kept()} if self.established else {}
-        remembered = min((item.number for item in self.checked.items), default=0)
+        kept = {m.number: m for m in self.kept} if self.connected else {}
+        remembered = min((m.number for m in self._checked.measurements), default=0)
         gone = [
-            replace(item, kept=False)
-            for number, item in self._said.items()
-            if number >= remembered and kept.get(number) != item
+            replace(m, kept=False)
+            for number, m in self._told.items()
+            if number >= remembered and kept.get(number) != m
         ]
-        recent = max((said.a_n for said in self._said.values()), default=-TELL_EVERY)
-        withdrawn = {item.number for item in gone}
-        self._said = {
-            number: item
-            for number, item in self._said.items()
-            if number not in withdrawn and (number >= remembered or item.a_n == recent)
+        recent = max((told.a_n for told in self._told.values()), default=-TELL_EVERY)
+        withdrawn = {m.number for m in gone}
+        self._told = {
+            number: m
+            for number, m in self._told.items()
+            if number not in withdrawn and (number >= remembered or m.a_n == recent)
         }
         new: list[ClosureMeasurement] = []
-        recent = max((said.a_n for said in self._said.values()), default=-TELL_EVERY)
-        for number, item in kept.items():
-            if number not in self._said and (every or item.a_n - recent >= TELL_EVERY):
-                new.append(item)
-                self._said[number] = item
-                recent = max(recent, item.a_n)
+        recent = max((told.a_n for told in self._told.values()), default=-TELL_EVERY)
+        for number, m in kept.items():
+            if number not in self._told and (every or m.a_n - recent >= TELL_EVERY):
+                new.append(m)
+                self._told[number] = m
+                recent = max(recent, m.a_n)
         return gone + new
 
 
@@ -220,10 +268,10 @@ def sendable(covariance: Array) -> Array:
 
 
 def extended(checked: Checked, work: list[tuple[Candidate, ClosureMeasurement]]) -> Checked:
-    """Equation 2 for each new hypothesis."""
-    for candidate, item in work:
+    """Equation (3) for each new hypothesis."""
+    for candidate, measurement in work:
         forgotten = checked.consistency.forgotten
         checked.consistency.add(candidate)
-        del checked.items[: checked.consistency.forgotten - forgotten]
-        checked.items.append(item)
+        del checked.measurements[: checked.consistency.forgotten - forgotten]
+        checked.measurements.append(measurement)
     return checked

@@ -1,12 +1,12 @@
-"""Module 2: which closures of one pair of robots belong together (paper III-B, equation 2).
+"""Module 2: which closures of one pair of robots belong together (paper III-B, equation (3)).
 
 Two closures k and i agree when the loop that they form with both odometries,
 
-    x_a^{k,i} + x_ab^i + x_b^{i,k} - x_ab^k,
+    x_a^{k,i} + x_ab^i + x_b^{i,k} - x_ab^k,                                         eq. (3)
 
 is short: its squared Mahalanobis length is below the chi-squared quantile of 1 - epsilon with
 three degrees of freedom. Each closure is carried to one place, the frame of a's odometry, as
-``oa_T_ob = oa_T_a a_T_b (ob_T_b)^-1``; there the loop is one difference of twists and the noise of
+``oa_T_ob = oa_T_a a_T_b (ob_T_b)^-1``. There the loop is one difference of twists and the noise of
 both odometries is a difference of running sums, so a new closure costs one vectorised row.
 """
 
@@ -21,7 +21,7 @@ from drslamd.slam.chi_squared import quantile3
 from drslamd.slam.consistency import loops
 from drslamd.slam.consistency.clique import IncrementalClique, bits
 from drslamd.slam.consistency.loops import Places, columns
-from drslamd.slam.odometry.track import OdometryNoise
+from drslamd.slam.odometry.noise import OdometryNoise, twist_covariance
 from drslamd.slam.se2 import Array
 
 MAX_VERTICES = 1_000
@@ -105,8 +105,11 @@ class PairConsistency:
         for column, value in zip(self._columns.all(), row, strict=True):
             column[:, k] = value
         distance = self.distances(k)
-        agrees = (distance <= quantile3(1 - self.epsilon)) & (
-            self._columns.closure[0, :k] != candidate.closure
+        agrees = (
+            (distance <= quantile3(1 - self.epsilon))
+            & (  # eq. (3)
+                self._columns.closure[0, :k] != candidate.closure
+            )
         )
         self.graph.add(int.from_bytes(np.packbits(agrees, bitorder="little").tobytes(), "little"))
         if not self.graph.is_verified():
@@ -121,7 +124,7 @@ class PairConsistency:
         c = self._columns
         offset = columns(c.offset, k)
         moved_a, moved_b = (
-            loops.odometry_covariance(
+            twist_covariance(
                 noise, columns(place, k) - columns(place, i), columns(sums, k) - columns(sums, i)
             )
             for noise, place, sums in (
@@ -130,7 +133,7 @@ class PairConsistency:
             )
         )
         covariance = columns(c.covariance, i) + columns(c.covariance, k)
-        covariance += moved_a + loops.carried(offset, moved_b)
+        covariance += moved_a + loops.carried_covariance(offset, moved_b)
         return loops.squared_length(loops.twists(offset, columns(c.offset, i)), covariance)
 
     def renew_sums(self, vertices: Array, a_sums: Array, b_sums: Array) -> None:

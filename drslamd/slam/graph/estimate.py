@@ -41,23 +41,37 @@ class Learned(NamedTuple):
     sigma: float = float("inf")
 
 
+class PoseNow(NamedTuple):
+    """Where a robot is: utime on its clock, w_T_a (3,), covariance (3, 3) of x, y, theta."""
+
+    utime: int
+    pose: Array
+    covariance: Array
+
+
 @dataclass(frozen=True)
 class TeamEstimate:
-    """The last solution, in the frame of segment `frame`."""
+    """The last solution, in the frame of segment `frame`.
+
+    Attributes:
+        trajectories: by robot.
+        covariances: (3, 3) of each robot's last pose.
+        bias_m: range bias of each pair, m.
+        scale, yaw: of each robot's odometry, fraction and rad/m.
+        near_bias_m: of the team, at range 0 (`RangeModel.near_range_shape`).
+        scatter: how many times the configured sigma the ranges of a pair scatter.
+        lifted: state of the relaxation, with `rbcd`.
+    """
 
     frame: Segment
     trajectories: dict[int, Trajectory]
     covariances: dict[int, Array] = field(default_factory=dict)
-    """(3, 3) of each robot's last pose."""
     bias_m: dict[tuple[int, int], Learned] = field(default_factory=dict)
     scale: dict[int, Learned] = field(default_factory=dict)
     yaw: dict[int, Learned] = field(default_factory=dict)
-    """rad/m"""
+    near_bias_m: Learned = field(default_factory=Learned)
     scatter: dict[tuple[int, int], float] = field(default_factory=dict)
-    """How many times the configured sigma the ranges of a pair scatter (`range_scatter`)."""
     cost: float = 0.0
     iterations: int = 0
     converged: bool = True
     lifted: Lifted | None = None
-    near_bias_m: Learned = field(default_factory=Learned)
-    """Of the team, at range 0 (`problem.near_range_shape`)."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drslamd.conventions import Chain
+from drslamd.slam.robot_model import RobotModel
 from drslamd.slam.se2 import Array
 
 MAX_PUBLIC = 4_000
@@ -76,8 +77,8 @@ class GraphEntry:
     """One message of a robot's log."""
 
     seq: int
-    traits: tuple[float, ...] = ()
-    """Now and then: the four sigmas of `OdometryNoise`, antenna x, y, z in the body frame."""
+    model: RobotModel | None = None
+    """Of the robot's own sensors, now and then."""
     keyframes: tuple[Keyframe, ...] = ()
     ranges: tuple[RangeMeasurement, ...] = ()
     closures: tuple[ClosureMeasurement, ...] = ()

@@ -16,7 +16,9 @@ from drslamd.conventions import Segment
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import ClosureMeasurement
-from drslamd.slam.graph.pose_graph import PairData, PoseGraph
+from drslamd.slam.graph.pair_data import PairData
+from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.graph.tables import KeyframeTable
 from drslamd.slam.se2 import Array
 
 
@@ -52,7 +54,7 @@ def joints(graph: PoseGraph) -> list[tuple[ClosureMeasurement, Segment, Segment]
     """Kept closures whose both keyframes are held, with the segments that they join."""
     out = []
     for pair in graph.usable():
-        kept = pair.kept()
+        kept = pair.kept_closures()
         a = _segments(graph, pair, 0, [c.a_n for c in kept])
         b = _segments(graph, pair, 1, [c.b_n for c in kept])
         for closure, one, other in zip(kept, a, b, strict=True):
@@ -63,9 +65,9 @@ def joints(graph: PoseGraph) -> list[tuple[ClosureMeasurement, Segment, Segment]
 
 def _segments(graph: PoseGraph, pair: PairData, end: int, n: list[int]) -> list[Segment | None]:
     chain = (pair.a, pair.b)[end]
-    items = graph.chains[chain.robot]
-    at, there = items.find(np.array(n, dtype=float))
-    numbers = items.rows[at, 1] if len(items.rows) else np.zeros(len(n))
+    keyframes = graph.chains[chain.robot].keyframes
+    at, there = keyframes.find(np.array(n, dtype=float))
+    numbers = keyframes.segment[at] if len(keyframes) else np.zeros(len(n))
     return [
         Segment(*chain, int(number)) if held else None
         for number, held in zip(numbers, there, strict=True)
@@ -85,18 +87,18 @@ def placed(graph: PoseGraph, group: Group, previous: TeamEstimate | None) -> dic
     out: dict[Segment, Array] = {}
     known = _in_frame(graph, group.frame, previous)
     for segment in sorted(group.members):
-        rows = graph.segment_rows(segment)
+        keyframes = graph.segment(segment)
         trajectory = known.get(segment.robot)
         if trajectory is not None and trajectory.chain == segment.chain:
-            there = np.isin(rows[:, 0], trajectory.n)
+            there = np.isin(keyframes.n, trajectory.n)
             if there.any():
-                at = np.searchsorted(trajectory.n, rows[there, 0])
-                out[segment] = carried(rows, rows[there], trajectory.poses[at])
+                at = np.searchsorted(trajectory.n, keyframes.n[there])
+                out[segment] = by_odometry(keyframes, keyframes.chosen(there), trajectory.poses[at])
     if group.frame not in out:
-        out = {group.frame: graph.segment_rows(group.frame)[:, 2:]}
+        out = {group.frame: graph.segment(group.frame).poses}
     while len(out) < len(group.members):
         segment, anchors, poses = _next_to_place(graph, group.members, out)
-        out[segment] = carried(graph.segment_rows(segment), anchors, poses)
+        out[segment] = by_odometry(graph.segment(segment), anchors, poses)
     return out
 
 
@@ -111,41 +113,39 @@ def _in_frame(
     old = previous.trajectories.get(frame.robot)
     if old is None or old.chain != frame.chain:
         return {}
-    rows = graph.segment_rows(frame)
-    there = np.isin(rows[:, 0], old.n)
-    if not there.any():
+    keyframes = graph.segment(frame)
+    known = keyframes.chosen(np.isin(keyframes.n, old.n))
+    if not len(known):
         return {}
-    first = rows[there][0]
-    before = old.poses[np.searchsorted(old.n, first[0])]
-    w_T_old = se2.compose(first[2:], se2.inverse(before))
+    before = old.poses[np.searchsorted(old.n, known.n[0])]
+    w_T_old = se2.compose(known.poses[0], se2.inverse(before))
     return {
         robot: Trajectory(t.chain, t.n, se2.compose(w_T_old[None], t.poses))
         for robot, t in previous.trajectories.items()
     }
 
 
-def carried(rows: Array, anchors: Array, w_T_anchor: Array) -> Array:
-    """Poses of all keyframes by odometry from the nearest anchor.
+def by_odometry(keyframes: KeyframeTable, anchors: KeyframeTable, w_T_anchor: Array) -> Array:
+    """(k, 3) poses of all keyframes by odometry from the nearest anchor.
 
     Args:
-        rows: (k, 5) keyframes of one segment.
-        anchors: (m, 5) rows that are known, ascending.
+        keyframes: k of one segment.
+        anchors: those m of them that are known.
         w_T_anchor: (m, 3).
     """
-    middle = (anchors[1:, 0] + anchors[:-1, 0]) / 2
-    nearest = np.searchsorted(middle, rows[:, 0])
-    step = se2.between(anchors[nearest, 2:], rows[:, 2:])
+    middle = (anchors.n[1:] + anchors.n[:-1]) / 2
+    nearest = np.searchsorted(middle, keyframes.n)
+    step = se2.between(anchors.poses[nearest], keyframes.poses)
     return se2.compose(w_T_anchor[nearest], step)
 
 
 def _next_to_place(
     graph: PoseGraph, members: set[Segment], done: dict[Segment, Array]
-) -> tuple[Segment, Array, Array]:
-    """The segment that most closures join to what is placed: its anchor rows and their poses."""
+) -> tuple[Segment, KeyframeTable, Array]:
+    """The segment that most closures join to what is placed: its anchors and their poses."""
 
     def pose(segment: Segment, n: int) -> Array:
-        rows = graph.segment_rows(segment)
-        return np.asarray(done[segment][np.searchsorted(rows[:, 0], n)])
+        return np.asarray(done[segment][np.searchsorted(graph.segment(segment).n, n)])
 
     found: dict[Segment, dict[int, Array]] = {}
     for closure, a, b in joints(graph):
@@ -157,7 +157,7 @@ def _next_to_place(
             w_T_a = se2.compose(pose(b, closure.b_n), se2.inverse(a_T_b))
             found.setdefault(a, {})[closure.a_n] = w_T_a
     segment = max(found, key=lambda s: (len(found[s]), s))
-    rows, anchors = graph.segment_rows(segment), found[segment]
+    keyframes, anchors = graph.segment(segment), found[segment]
     n = np.array(sorted(anchors))
-    at = np.searchsorted(rows[:, 0], n)
-    return segment, rows[at], np.array([anchors[int(k)] for k in n])
+    at = np.searchsorted(keyframes.n, n)
+    return segment, keyframes.chosen(at), np.array([anchors[int(k)] for k in n])

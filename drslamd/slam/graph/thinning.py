@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from drslamd.conventions import GRID_HZ, Chain
 from drslamd.slam import se2
+from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import ClosureMeasurement
-from drslamd.slam.graph.pose_graph import ChainData, PairData, PoseGraph
-from drslamd.slam.odometry.track import covariance_between
-from drslamd.slam.optimizer.problem import Index
-from drslamd.slam.se2 import Array
+from drslamd.slam.graph.pair_data import PairData
+from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.odometry.noise import covariance_between
+from drslamd.slam.se2 import Array, Index
 
 RECENT_S = 300
 """Keyframes of the last five minutes all stay ..."""
@@ -44,9 +45,9 @@ class Thinning:
     def after(self, robot: int) -> None:
         """Thin a chain that has grown by a stretch of time, and what was measured with it."""
         items = self._graph.chains.get(robot)
-        if items is None or items.relative or not len(items.rows):
+        if items is None or not len(items.keyframes):
             return
-        stretch = int(items.rows[-1, 0]) // (EVERY_S * GRID_HZ)
+        stretch = int(items.keyframes.n[-1]) // (EVERY_S * GRID_HZ)
         if self._done.get(items.chain) == stretch:
             return
         self._done = {key: s for key, s in self._done.items() if key.robot != robot}
@@ -81,7 +82,7 @@ def survivors(items: ChainData, now: int, recent: int) -> NDArray[np.bool_]:
     Returns:
         (k,): the first of each segment, and the first in each cell of time.
     """
-    n, segment = items.n, items.rows[:, 1]
+    n, segment = items.keyframes.n, items.keyframes.segment
     age = (now - n) / (GRID_HZ * recent)
     level = np.where(age < 1, 0, 1 + np.floor(np.log2(np.maximum(age, 1)))).astype(int)
     cell = np.where(level > 0, n // (GRID_HZ * 4 ** np.minimum(level, 12)), n)
@@ -96,7 +97,7 @@ def _carry(pair: PairData, items: ChainData, stays: NDArray[np.bool_], own: bool
     _carry_ranges(pair, items, anchors, own)
     closures = dict(pair.closures)
     for number, (seq, closure) in closures.items():
-        at, there = items.find(np.array([closure.a_n if own else closure.b_n]))
+        at, there = items.keyframes.find(np.array([closure.a_n if own else closure.b_n]))
         if there[0] and not stays[at[0]]:
             pair.closures[number] = seq, _carried(closure, items, anchors, int(at[0]), own)
     seen: set[tuple[int, int]] = set()
@@ -107,28 +108,29 @@ def _carry(pair: PairData, items: ChainData, stays: NDArray[np.bool_], own: bool
 
 
 def _carry_ranges(pair: PairData, items: ChainData, anchors: Index, own: bool) -> None:
-    table = pair.keyed_ranges.copy()
+    table, keyframes = pair.ranges.copy(), items.keyframes
     if not len(table):
         return
-    end, arm = (1, slice(3, 5)) if own else (2, slice(5, 7))
-    at, there = items.find(table[:, end])
+    end, arm = (table.a_n, table.q_a) if own else (table.b_n, table.q_b)
+    at, there = keyframes.find(end)
     moved = np.flatnonzero(there & (anchors[at] != at))
     body, anchor = at[moved], anchors[at[moved]]
-    antenna = se2.transform(items.poses[body], table[moved, arm])
-    table[moved, arm] = se2.transform(se2.inverse(items.poses[anchor]), antenna)
-    table[moved, end] = items.n[anchor]
-    table[moved, 8] = np.hypot(table[moved, 8], _spread(items, anchor, body, antenna))
+    antenna = se2.transform(keyframes.poses[body], arm[moved])
+    arm[moved] = se2.transform(se2.inverse(keyframes.poses[anchor]), antenna)
+    end[moved] = keyframes.n[anchor]
+    spread = _spread(items, anchor, body, antenna)
+    table.sigma_m[moved] = np.hypot(table.sigma_m[moved], spread)
     # of several between the same keyframes one stays: they share their slow bias
-    touched = np.isin(table[:, end], items.n[np.unique(anchor)])
-    _, first = np.unique(table[:, 1:3], axis=0, return_index=True)
+    touched = np.isin(end, keyframes.n[np.unique(anchor)])
+    _, first = np.unique(np.stack([table.a_n, table.b_n]), axis=1, return_index=True)
     keep = ~touched
     keep[first] = True
-    pair.replace_ranges(table[keep])
+    pair.replace_ranges(table.chosen(keep))
 
 
 def _spread(items: ChainData, anchor: Index, body: Index, point: Array) -> Array:
     """Sigma, m, that odometry between two keyframes (m,) adds to a point (m, 2) of the body."""
-    twist = covariance_between(items.noise, items.poses, items.sums, anchor, body)
+    twist = covariance_between(items.model.noise, items.keyframes.poses, items.sums, anchor, body)
     moves = np.zeros((len(point), 2, 3))
     moves[:, 0, 0] = moves[:, 1, 1] = 1.0
     moves[:, 0, 2], moves[:, 1, 2] = -point[:, 1], point[:, 0]
@@ -141,15 +143,16 @@ def _carried(
 ) -> ClosureMeasurement:
     """A closure whose keyframe goes, at the keyframe before it."""
     anchor = int(anchors[at])
-    k_T_body = se2.between(items.poses[anchor], items.poses[at])
+    poses = items.keyframes.poses
+    k_T_body = se2.between(poses[anchor], poses[at])
     a_T_b = np.array(closure.a_T_b)
     moved = se2.compose(k_T_body, a_T_b) if own else se2.compose(a_T_b, se2.inverse(k_T_body))
-    twist = covariance_between(items.noise, items.poses, items.sums, anchor, at)
-    reach = float(np.hypot(*moved[:2])) + float(np.hypot(*items.poses[at, :2]))
+    twist = covariance_between(items.model.noise, poses, items.sums, anchor, at)
+    reach = float(np.hypot(*moved[:2])) + float(np.hypot(*poses[at, :2]))
     wider = np.diag([1.0, 1.0, 0.0]) * (twist[0, 0] + twist[1, 1] + reach**2 * twist[2, 2])
     wider[2, 2] = twist[2, 2]
     covariance = se2.unpacked(closure.covariance) + wider
-    number = int(items.n[anchor])
+    number = int(items.keyframes.n[anchor])
     ends = {"a_n": number} if own else {"b_n": number}
     return replace(
         closure,

@@ -1,4 +1,4 @@
-"""A whole trajectory out of the solved keyframes: the 10 Hz track deform_track to go through them."""
+"""A whole trajectory out of the solved keyframes: the 10 Hz track bent to go through them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The edges of a connected group: the graph's items between poses that are numbered by time."""
+"""The factors of a connected group: what the graph holds between poses numbered by time."""
 
 from __future__ import annotations
 
@@ -10,20 +10,29 @@ from numpy.typing import NDArray
 
 from drslamd.conventions import GRID_US, Segment
 from drslamd.slam import se2
-from drslamd.slam.graph.pose_graph import ChainData, PairData, PoseGraph
-from drslamd.slam.odometry.track import OdometryNoise, link_covariance
-from drslamd.slam.optimizer.banded.normal_equations import vertex_cover
-from drslamd.slam.optimizer.problem import Index, Links, PoseEdges, Ranges
-from drslamd.slam.se2 import Array
+from drslamd.slam.graph import team_frame
+from drslamd.slam.graph.chain_data import ChainData
+from drslamd.slam.graph.estimate import TeamEstimate
+from drslamd.slam.graph.pair_data import PairData
+from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.graph.tables import RANGE_COLUMNS, RangeTable
+from drslamd.slam.graph.team_frame import Group
+from drslamd.slam.odometry.noise import link_covariance
+from drslamd.slam.optimizer.problem import BetweenFactors, OdometryFactors, RangeFactors
+from drslamd.slam.optimizer.vertex_cover import vertex_cover
+from drslamd.slam.se2 import Array, Index
 
-LINK_FLOOR_M, LINK_FLOOR_RAD = 5e-4, 5e-4
-"""No wheel is better than this over one link, and a robot that stands may still be pushed."""
+LINK_FLOOR_M = 5e-4
+"""No wheel is better than this between two keyframes, and a robot that stands may be pushed."""
+LINK_FLOOR_RAD = 5e-4
+"""Likewise of angles."""
 SAME_TIME = 20
-"""Samples: the keyframes of one measurement are at most 1.5 s from it (`pair_window.NEAR_US`)."""
-FAR, STANDING = 128, 64
-"""So many poses lie between the ends of an edge that joins different times, and so many poses may
-have such edges: those of robots that stood while the others drove on. What is beyond is nonsense,
-and would make the team's problem too wide to be solved."""
+"""Samples: the keyframes of one measurement are at most 1.5 s from it (`pair_end.NEAR_US`)."""
+FAR = 128
+"""So many poses lie between the ends of a factor that joins different times."""
+STANDING = 64
+"""So many poses may have such factors: those of robots that stood while the others drove on. What
+is beyond is nonsense, and would make the team's problem too wide to be solved."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +48,17 @@ class Numbering:
     n: Index
     place: dict[int, Index]
 
+    def of_robot(self, robot: int) -> Index:
+        """Places of all numbered keyframes of a robot, in the order of time."""
+        place = self.place[robot]
+        return place[place >= 0]
+
     def of(self, items: ChainData, n: Array) -> Index:
         """Places of keyframes n (m,) of one chain, -1 where one is not there."""
         place = self.place.get(items.chain.robot)
         if place is None or not len(place):
             return np.full(len(n), -1)
-        at, there = items.find(n)
+        at, there = items.keyframes.find(n)
         return np.where(there, place[at], -1)
 
 
@@ -60,9 +74,9 @@ def numbering(graph: PoseGraph, members: set[Segment], shift_us: dict[int, int])
     for robot, shift in sorted(shifts.items()):
         items = graph.chains[robot]
         wanted = [s.segment for s in members if s.chain == items.chain]
-        inside = np.isin(items.rows[:, 1], wanted)
+        inside = np.isin(items.keyframes.segment, wanted)
         place[robot] = np.where(inside, 0, -1)
-        keyframes.append(items.n[inside])
+        keyframes.append(items.keyframes.n[inside])
         when.append(keyframes[-1] - shift)
         robots.append(np.full(len(keyframes[-1]), robot))
     robot_of, n_of = np.concatenate(robots), np.concatenate(keyframes)
@@ -71,6 +85,23 @@ def numbering(graph: PoseGraph, members: set[Segment], shift_us: dict[int, int])
     for robot, places in place.items():
         places[places == 0] = np.flatnonzero(robot_of == robot)
     return Numbering(robot_of, n_of, place)
+
+
+def initial_poses(
+    graph: PoseGraph, group: Group, previous: TeamEstimate | None, places: Numbering
+) -> Array:
+    """(k, 3) w_T_k from which a solver may start."""
+    initial = np.zeros((len(places.n), 3))
+    for segment, poses in team_frame.placed(graph, group, previous).items():
+        rows = graph.chains[segment.robot].keyframes.of_segment(segment.segment)
+        initial[places.place[segment.robot][rows]] = poses
+    return initial
+
+
+def gauge_place(graph: PoseGraph, group: Group, places: Numbering) -> int:
+    """The first pose of the segment whose odometry frame is the team's."""
+    first = graph.segment(group.frame).n[:1]
+    return int(places.of(graph.chains[group.frame.robot], first)[0])
 
 
 def clock_shifts(graph: PoseGraph, robots: set[int], shift_us: dict[int, int]) -> dict[int, float]:
@@ -86,8 +117,8 @@ def clock_shifts(graph: PoseGraph, robots: set[int], shift_us: dict[int, int]) -
     while len(shifts) < len(robots):
         reached = [p for p in pairs if (p.a.robot in shifts) != (p.b.robot in shifts)]
         for pair in reached:
-            closed = [c.b_n - c.a_n for c in pair.kept()]
-            ahead = _mode(np.concatenate([pair.ranges[:, 1] - pair.ranges[:, 0], closed]))
+            closed = [c.b_n - c.a_n for c in pair.kept_closures()]
+            ahead = _mode(np.concatenate([pair.ranges.b_n - pair.ranges.a_n, closed]))
             if pair.a.robot in shifts:
                 shifts.setdefault(pair.b.robot, shifts[pair.a.robot] + ahead)
             else:
@@ -106,7 +137,7 @@ def _mode(values: Array) -> float:
     return float(np.median(values[inside]))
 
 
-def links(graph: PoseGraph, numbers: Numbering, robots: list[int]) -> Links:
+def odometry(graph: PoseGraph, numbers: Numbering, robots: list[int]) -> OdometryFactors:
     """Odometry between neighbouring keyframes of each segment, its scale and yaw rate left in."""
     parts: list[tuple[Array, ...]] = []
     for index, robot in enumerate(robots):
@@ -117,48 +148,48 @@ def links(graph: PoseGraph, numbers: Numbering, robots: list[int]) -> Links:
         used = (i >= 0) & (j >= 0)
         rows = (i, j, edges.measured, edges.covariance, np.full(len(i), index), path)
         parts.append(tuple(row[used] for row in rows))
-    return Links(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    return OdometryFactors(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def chain_links(items: ChainData, calibrated: bool) -> PoseEdges:
+def chain_links(items: ChainData, calibrated: bool) -> BetweenFactors:
     """Odometry between neighbouring rows of one chain, across no break.
 
     Args:
         calibrated: scale and constant yaw rate are unknowns of the optimiser, so the covariance
             holds only what is random; otherwise they are part of it.
     """
-    rows, noise = items.rows, items.noise
-    i = np.flatnonzero(rows[1:, 1] == rows[:-1, 1])
+    keyframes, noise = items.keyframes, items.model.noise
+    i = np.flatnonzero(keyframes.segment[1:] == keyframes.segment[:-1])
     if calibrated:
-        noise = OdometryNoise(0.0, 0.0, noise.translation_per_sqrt_m, noise.yaw_rad_per_sqrt_m)
-    measured = se2.between(items.poses[i], items.poses[i + 1])
+        noise = noise.random_part()
+    measured = se2.between(keyframes.poses[i], keyframes.poses[i + 1])
     # a left twist at pose i moves the end of the link by its turn times the lever
     lever = np.tile(np.eye(3), (len(i), 1, 1))
     lever[:, 0, 2], lever[:, 1, 2] = -measured[:, 1], measured[:, 0]
     twist = link_covariance(noise, measured)
     floor = np.diag([LINK_FLOOR_M**2, LINK_FLOOR_M**2, LINK_FLOOR_RAD**2])
-    return PoseEdges(i, i + 1, measured, lever @ twist @ np.swapaxes(lever, 1, 2) + floor)
+    return BetweenFactors(i, i + 1, measured, lever @ twist @ np.swapaxes(lever, 1, 2) + floor)
 
 
-def closures(graph: PoseGraph, numbers: Numbering) -> PoseEdges:
+def closures(graph: PoseGraph, numbers: Numbering) -> BetweenFactors:
     """All kept closures between numbered poses."""
     ends, upper = [np.zeros((2, 0), dtype=np.int64)], [np.zeros((0, 9))]
     for pair in graph.usable():
-        kept = pair.kept()
-        places = np.array([(c.a_n, c.b_n) for c in kept]).reshape(-1, 2)
-        both = np.stack(_ends(graph, numbers, pair, places))
+        kept = pair.kept_closures()
+        ends_n = np.array([(c.a_n, c.b_n) for c in kept]).reshape(-1, 2)
+        both = _ends(graph, numbers, pair, ends_n[:, 0], ends_n[:, 1])
         used = (both >= 0).all(axis=0)
         ends.append(both[:, used])
         upper.append(np.array([(*c.a_T_b, *c.covariance) for c in kept]).reshape(-1, 9)[used])
     i, j = np.concatenate(ends, axis=1)
     values = np.concatenate(upper)
     full = values[:, 3 + np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])]
-    return PoseEdges(i, j, values[:, :3], full)
+    return BetweenFactors(i, j, values[:, :3], full)
 
 
-def pose_edges(rows: Sequence[tuple[int, int, Sequence[float], Array]]) -> PoseEdges:
-    """Edges out of (i, j, measured (3,), covariance (3, 3)), also of none."""
-    return PoseEdges(
+def between_factors(rows: Sequence[tuple[int, int, Sequence[float], Array]]) -> BetweenFactors:
+    """Factors out of (i, j, measured (3,), covariance (3, 3)), also of none."""
+    return BetweenFactors(
         np.array([r[0] for r in rows], dtype=np.int64),
         np.array([r[1] for r in rows], dtype=np.int64),
         np.array([r[2] for r in rows], dtype=float).reshape(-1, 3),
@@ -166,21 +197,30 @@ def pose_edges(rows: Sequence[tuple[int, int, Sequence[float], Array]]) -> PoseE
     )
 
 
-def ranges(graph: PoseGraph, numbers: Numbering) -> tuple[Ranges, list[tuple[int, int]]]:
+def ranges(graph: PoseGraph, numbers: Numbering) -> tuple[RangeFactors, list[tuple[int, int]]]:
     """All ranges between numbered poses, and the pairs of robots that `pair` numbers."""
-    found: list[tuple[tuple[int, int], Array, Array]] = []
+    found: list[tuple[tuple[int, int], Index, Array]] = []
     for pair in graph.usable():
-        rows = pair.ranges
-        ends = np.stack(_ends(graph, numbers, pair, rows[:, :2]))
+        table = pair.ranges
+        ends = _ends(graph, numbers, pair, table.a_n, table.b_n)
         used = (ends >= 0).all(axis=0)
         if used.any():
-            found.append((_name(pair), ends[:, used], rows[used]))
+            found.append((_name(pair), ends[:, used], table.rows[used]))
     names = sorted({name for name, _, _ in found})
     i, j = np.concatenate([np.zeros((2, 0), dtype=np.int64), *(e for _, e, _ in found)], axis=1)
-    row = np.concatenate([np.zeros((0, 8)), *(r for _, _, r in found)])
+    table = RangeTable(np.concatenate([np.zeros((0, RANGE_COLUMNS)), *(r for _, _, r in found)]))
     index = [np.full(len(rows), names.index(name)) for name, _, rows in found]
     pair_of = np.concatenate([np.zeros(0, dtype=np.int64), *index])
-    return Ranges(i, j, row[:, 2:4], row[:, 4:6], row[:, 6], row[:, 7], pair_of), names
+    ranges = RangeFactors(
+        i=i,
+        j=j,
+        q_i=table.q_a,
+        q_j=table.q_b,
+        measured=table.range_m,
+        sigma=table.sigma_m,
+        pair=pair_of,
+    )
+    return ranges, names
 
 
 def sensible(i: Index, j: Index) -> NDArray[np.bool_]:
@@ -195,7 +235,7 @@ def _name(pair: PairData) -> tuple[int, int]:
     return low, high
 
 
-def _ends(graph: PoseGraph, numbers: Numbering, pair: PairData, n: Array) -> tuple[Index, Index]:
-    """Places of the keyframes n (m, 2) of a pair."""
+def _ends(graph: PoseGraph, numbers: Numbering, pair: PairData, a_n: Array, b_n: Array) -> Index:
+    """(2, m) places of the keyframes of both robots of a pair."""
     a, b = graph.chains[pair.a.robot], graph.chains[pair.b.robot]
-    return numbers.of(a, n[:, 0]), numbers.of(b, n[:, 1])
+    return np.stack([numbers.of(a, a_n), numbers.of(b, b_n)])

@@ -1,6 +1,6 @@
 """The team's least-squares problem as plain arrays: what every optimiser of module 3 receives.
 
-Poses ``w_T_k`` are numbered in the order of time over all robots. An edge names its two poses by
+Poses ``w_T_k`` are numbered in the order of time over all robots. A factor names its two poses by
 that number. Errors are defined here once, so that every optimiser minimises the same cost:
 
     odometry   e = [R_i' (p_j - p_i), theta_j - theta_i] - measured, corrected by scale and yaw rate
@@ -16,21 +16,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from drslamd.slam import se2
-from drslamd.slam.se2 import Array
+from drslamd.slam import range_model, se2
+from drslamd.slam.range_model import LINKTRACK, RangeModel
+from drslamd.slam.se2 import Array, Index
 
-Index = NDArray[np.int64]
-
-NEAR_RANGE_M = 3.0
-"""L: at this range a third is left of what receivers misjudge of strong signals. The LinkTrack
-modules of the MURP recordings have -0.25 m below 1 m, -0.14 m at 2 to 4 m and -0.06 m beyond 6 m;
-Decawave's note APS011 prints such a curve over received power."""
 RIDGE = 1e-10
 """Added to correlations before they are inverted; nobody knows his correlations so well."""
 
 
 @dataclass(frozen=True)
-class PoseEdges:
+class BetweenFactors:
     """m relative poses i_T_j with covariances (m, 3, 3) of x, y, theta in frame i."""
 
     i: Index
@@ -41,9 +36,9 @@ class PoseEdges:
     def __len__(self) -> int:
         return len(self.i)
 
-    def chosen(self, which: NDArray[np.bool_]) -> PoseEdges:
+    def chosen(self, which: NDArray[np.bool_]) -> BetweenFactors:
         columns = (self.i, self.j, self.measured, self.covariance)
-        return PoseEdges(*(column[which] for column in columns))
+        return BetweenFactors(*(column[which] for column in columns))
 
     @cached_property
     def information(self) -> Array:
@@ -55,16 +50,27 @@ class PoseEdges:
 
 
 @dataclass(frozen=True)
-class Links(PoseEdges):
-    """Odometry: `robot` (m,) numbers the robot whose calibration applies, `path` (m,) metres."""
+class OdometryFactors(BetweenFactors):
+    """Odometry between neighbouring keyframes.
+
+    Attributes:
+        robot: (m,) the robot whose calibration applies, as the problem numbers them.
+        path: (m,) metres.
+    """
 
     robot: Index
     path: Array
 
 
 @dataclass(frozen=True)
-class Ranges:
-    """m distances between the points q_i on pose i and q_j on pose j (m, 2), body frames."""
+class RangeFactors:
+    """m distances.
+
+    Attributes:
+        q_i, q_j: (m, 2) between which points, in the frames of poses i and j, m.
+        measured, sigma: (m,) m.
+        pair: (m,) the pair of robots whose bias applies, as the problem numbers them.
+    """
 
     i: Index
     j: Index
@@ -73,30 +79,39 @@ class Ranges:
     measured: Array
     sigma: Array
     pair: Index
-    """(m,) numbers the pair of robots whose bias applies."""
 
     def __len__(self) -> int:
         return len(self.i)
 
-    def chosen(self, which: NDArray[np.bool_]) -> Ranges:
+    def chosen(self, which: NDArray[np.bool_]) -> RangeFactors:
         columns = (self.i, self.j, self.q_i, self.q_j, self.measured, self.sigma, self.pair)
-        return Ranges(*(column[which] for column in columns))
+        return RangeFactors(*(column[which] for column in columns))
 
 
 @dataclass(frozen=True)
 class Priors:
-    """Sigmas of the calibration before anything is measured."""
+    """Sigmas of the sensors' constants before anything is measured.
+
+    Attributes:
+        bias: (pairs,) m, half widths of Cauchy's distribution (or sigmas of Gauss's).
+        scale: (robots,) fraction, likewise.
+        yaw: (robots,) rad/m.
+        near_bias: (1,) m, for the whole team: its modules are of one kind, and the near-range bias
+            follows the power that is received.
+        has_cauchy_tails: have biases and scales?
+    """
 
     bias: Array
-    """(pairs,) metres, of Cauchy's distribution: most modules are calibrated to a decimetre, some
-    by half a metre not at all, and few trajectories fix a bias well."""
     scale: Array
-    """(robots,) fraction, likewise."""
     yaw: Array
-    """(robots,) rad/m."""
     near_bias: Array
-    """(1,) metres, for the whole team: its modules are of one kind, and the bias follows the power
-    that is received."""
+    has_cauchy_tails: bool = True
+
+    def stiffness(self, values: Array, widths: Array) -> Array:
+        """Information that priors of these widths hold values with: the weight of their cost."""
+        if not self.has_cauchy_tails:
+            return np.asarray(widths**-2.0)
+        return np.asarray(1 / (widths**2 * (1 + (values / widths) ** 2)))
 
 
 @dataclass(frozen=True)
@@ -107,16 +122,18 @@ class Problem:
         robot, n: (k,) whose keyframe each pose is, and which.
         initial: (k, 3) w_T_k.
         gauge: the pose that is held where `initial` has it.
+        model: of its ranges.
     """
 
     robot: Index
     n: Index
     initial: Array
     gauge: int
-    links: Links
-    closures: PoseEdges
-    ranges: Ranges
+    odometry: OdometryFactors
+    closures: BetweenFactors
+    ranges: RangeFactors
     priors: Priors
+    model: RangeModel = LINKTRACK
 
 
 @dataclass(frozen=True)
@@ -135,14 +152,21 @@ class Calibration:
 
     def plus(self, step: Calibration) -> Calibration:
         return Calibration(
-            self.bias + step.bias, self.scale + step.scale, self.yaw + step.yaw,
-            self.near_bias + step.near_bias,
-        )  # fmt: skip
+            bias=self.bias + step.bias,
+            scale=self.scale + step.scale,
+            yaw=self.yaw + step.yaw,
+            near_bias=self.near_bias + step.near_bias,
+        )
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Poses (k, 3) in the order of the problem, and how they were reached."""
+    """Poses (k, 3) in the order of the problem, and how they were reached.
+
+    Attributes:
+        covariances: marginals (3, 3) of x, y, theta in w, for the poses that were asked for.
+        spread: sigmas of the calibration, priors included, where marginals were asked for.
+    """
 
     poses: Array
     calibration: Calibration
@@ -150,39 +174,35 @@ class Solution:
     iterations: int
     converged: bool
     covariances: dict[int, Array] = field(default_factory=dict)
-    """Marginals (3, 3) of x, y, theta in w, for the poses that were asked for."""
     spread: Calibration | None = None
-    """Sigmas of the calibration, priors included, where marginals were asked for."""
 
 
-def pose_errors(poses: Array, edges: PoseEdges, measured: Array) -> Array:
+def pose_errors(poses: Array, factors: BetweenFactors, measured: Array) -> Array:
     """(m, 3) predicted minus measured relative poses, in frame i."""
-    error = se2.between(poses[edges.i], poses[edges.j]) - measured
+    error = se2.between(poses[factors.i], poses[factors.j]) - measured
     error[:, 2] = se2.wrap(error[:, 2])
     return error
 
 
-def corrected(links: Links, calibration: Calibration) -> Array:
-    """(m, 3) odometry with scale and yaw rate taken out; the bend acts over half of the link."""
-    x, y, theta = links.measured.T
-    keep = 1 - calibration.scale[links.robot]
-    bend = calibration.yaw[links.robot] * links.path
+def corrected(odometry: OdometryFactors, calibration: Calibration) -> Array:
+    """(m, 3) odometry with scale and yaw rate taken out; the bend acts over half of the way."""
+    x, y, theta = odometry.measured.T
+    keep = 1 - calibration.scale[odometry.robot]
+    bend = calibration.yaw[odometry.robot] * odometry.path
     return np.stack([keep * x + bend / 2 * y, keep * y - bend / 2 * x, theta - bend], axis=-1)
 
 
-def near_range_shape(ranges: Array) -> Array:
-    """How much of the bias of strong signals is in ranges (n,) m: all of it in those of none."""
-    return np.asarray(np.exp(-np.maximum(ranges, 0.0) / NEAR_RANGE_M))
-
-
 def range_errors(
-    poses: Array, ranges: Ranges, calibration: Calibration
+    poses: Array, ranges: RangeFactors, calibration: Calibration, model: RangeModel
 ) -> tuple[Array, Array, Array, Array]:
-    """Errors (m,), unit line of sight from i to j in w (m, 2), and both arms in w (m, 2)."""
-    arm_i = se2.rotate(poses[ranges.i, 2], ranges.q_i)
-    arm_j = se2.rotate(poses[ranges.j, 2], ranges.q_j)
-    sight = poses[ranges.j, :2] + arm_j - poses[ranges.i, :2] - arm_i
-    distance = np.maximum(np.hypot(sight[:, 0], sight[:, 1]), 1e-6)
-    error = distance + calibration.bias[ranges.pair] - ranges.measured
-    error += calibration.near_bias * near_range_shape(ranges.measured)
-    return error, sight / distance[:, None], arm_i, arm_j
+    """Errors (m,), unit line of sight from i to j in w (m,), and both arms in w (m,); x + iy."""
+    arm_i, arm_j = (
+        np.exp(1j * poses[k, 2]) * (q[:, 0] + 1j * q[:, 1])
+        for k, q in ((ranges.i, ranges.q_i), (ranges.j, ranges.q_j))
+    )
+    place = poses[:, 0] + 1j * poses[:, 1]
+    sight = place[ranges.j] + arm_j - place[ranges.i] - arm_i
+    error, direction = range_model.residuals(sight, ranges.measured)  # eq. (1)
+    error += calibration.bias[ranges.pair]
+    error += calibration.near_bias * model.near_range_shape(ranges.measured)
+    return error, direction, arm_i, arm_j

@@ -1,4 +1,4 @@
-"""The coarse search of module 1 (paper, algorithm 1), whole grid at once.
+"""The coarse search of module 1 (paper, algorithm 1 over the search set of eq. (2)), all at once.
 
 With the radius fixed to the latest range, ``t = rho [cos phi, sin phi]``, the squared-range error
 
@@ -86,4 +86,4 @@ def seeds(
     at = np.flatnonzero(cost <= lowest.ravel())
     at = at[np.argsort(cost[at], kind="stable")[:most]]
     phi, theta = angles[at // m], angles[at % m]
-    return np.stack([rho * np.cos(phi), rho * np.sin(phi), theta], axis=-1)
+    return np.stack([rho * np.cos(phi), rho * np.sin(phi), theta], axis=-1)  # eq. (2)

@@ -7,16 +7,20 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import get_lapack_funcs
 
-from drslamd.slam.relative_pose.range_fit import PRIOR, ROBUST_SIGMAS, Minima, RangeFit, stepped
+from drslamd.slam.relative_pose.descent import WEAK_PRIOR
+from drslamd.slam.relative_pose.range_fit import Minima, RangeFit, stepped
 from drslamd.slam.relative_pose.window_noise import WindowNoise
 from drslamd.slam.se2 import Array
 
-STEPS = 12
-"""At most."""
-SAME_SIGMAS, SAME_SIGHT = 0.5, 0.1
-"""The covariance stays the same while no residual and no line of sight (rad) has moved by more."""
-SETTLED, SETTLED_CHI2 = 1e-3, 1e-2
-"""A step below this (m, rad), or that promises less (2 log-likelihood), is the last one."""
+MOST_ITERATIONS = 12
+SAME_SIGMAS = 0.5
+"""The covariance stays as it is while no residual has moved by more sigmas ..."""
+SAME_SIGHT = 0.1
+"""... and no line of sight has turned by more, rad."""
+SETTLED = 1e-3
+"""A step below this, m and rad, is the last one ..."""
+SETTLED_CHI2 = 1e-2
+"""... and so is one that promises less (2 log-likelihood)."""
 LONGEST = 0.5
 """m, rad: what one step may do."""
 
@@ -37,18 +41,18 @@ class Refined(NamedTuple):
 
 
 def refine(fit: RangeFit, noise: WindowNoise, centred: Array) -> Refined | None:
-    """Where the noise of the window puts some minima (k, 2); None where it leaves it vague."""
+    """Where the noise of the window puts some minima (k, 2); None where it leaves one vague."""
     x = centred
     made_at: tuple[Array, Array] | None = None
-    for n in range(STEPS):
+    for n in range(MOST_ITERATIONS):
         u, rows = fit.linear(x)
         e = rows[:, 4]
         if made_at is None or not _same(e, u, made_at, noise.sigma):
-            factors, sound = _factors(noise.covariance(u, x[:, 1], _weights(e, noise.sigma)))
+            factors, sound = _factors(noise.covariance(u, x[:, 1], _weights(e, noise)))
             made_at = e, u
         weighted = np.array([_solve(f, r.T)[0] for r, f in zip(rows, factors, strict=True)])
         normal = rows @ weighted
-        covariance = np.linalg.inv(normal[:, :3, :3] + PRIOR * np.eye(3))
+        covariance = np.linalg.inv(normal[:, :3, :3] + WEAK_PRIOR * np.eye(3))
         step = -(covariance @ normal[:, :3, 4:])[..., 0]
         promise = -(normal[:, 4, :3] * step).sum(axis=1)
         minima = Minima(x, covariance, np.where(sound, normal[:, 4, 4] - promise, np.inf))
@@ -82,9 +86,9 @@ def middle(values: Array) -> Array:
     return np.asarray((ordered[..., (n - 1) // 2] + ordered[..., n // 2]) / 2)
 
 
-def _weights(e: Array, sigma: float) -> Array:
+def _weights(e: Array, noise: WindowNoise) -> Array:
     """(k, n): ranges lose weight that are far from the middle of all."""
-    beyond = ROBUST_SIGMAS * sigma
+    beyond = noise.huber_sigmas * noise.sigma
     return np.asarray((beyond / np.maximum(np.abs(e - middle(e)[:, None]), beyond)) ** 2)
 
 

@@ -1,8 +1,8 @@
-"""Least squares on the ranges of one window, from several start poses at once.
+"""The ranges of one window as a function of the pose that they are to explain.
 
 All of it works on centred poses: where the centroid of b's points lies, seen from the centroid of
 a's points in frame a, and how b is turned. A window that says little leaves a valley, and the
-valley is an arc about that centroid: steps go along the line between both centroids and around it,
+valley is an arc about that centroid. Steps go along the line between both centroids and around it,
 so that what is an arc in x and y is straight here.
 """
 
@@ -12,31 +12,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from drslamd.slam.relative_pose.window_noise import RangeNoise
+from drslamd.slam.range_model import residuals
 from drslamd.slam.se2 import Array
 
-FIRST_STEPS, STEPS = 3, 14
-"""Of a descent until a first look, when most seeds are settled, and in all; what is not settled
-then lies in a valley without an end."""
-SETTLED_CHI2 = 0.3
-"""A step that promises less than this (2 log-likelihood) is not worth the next one."""
-HOPELESS, HOPELESS_CHI2 = 5.0, 60.0
-"""A minimum that is worse by this factor and sum cannot come back under correlated noise."""
-LEAST_DAMPING, MOST_DAMPING = 1e-12, 1e6
-"""Relative to the diagonal: above rounding, so that no step meets a singular matrix however
-little a window says."""
-PRIOR = 1e-9
-"""Information, 1/m^2 and 1/rad^2, of directions of which a window says nothing at all."""
-ROBUST_SIGMAS = 2.5
-"""Huber's threshold: beyond it a range loses weight (bursts are 0.3 m and more)."""
 AROUND_M = 1.0
 """Centroids nearer than this have no direction to speak of: steps are straight."""
-MAX_SIGMA_M, MAX_SIGMA_RAD = 1.5, 0.5
-"""A pose known worse than this helps nobody."""
-VAGUE, SURELY_CHI2 = 1.5, 10.0
-"""A minimum this many times vaguer, and no worse than the best by more than this, hardly ever
-becomes known or is excluded by the last steps: one usable window in forty is lost to the first
-looks, and only among short ones; the time of all short ones is halved."""
+MAX_SIGMA_M = 1.5
+"""A position known worse than this helps nobody."""
+MAX_SIGMA_RAD = 0.5
+"""Likewise a heading."""
+VAGUE = 1.5
+"""A minimum this many times vaguer than allowed hardly ever becomes known by further steps: one
+usable window in forty is lost to the first looks, and only among short ones. The time of all short
+ones is halved."""
+SURELY_CHI2 = 10.0
+"""A minimum that is no worse than the best by more than this is hardly ever excluded later."""
 POOR_FIT = 4.0
 """Chi-squared per degree of freedom beyond which the model does not explain the window."""
 
@@ -138,7 +128,7 @@ class RangeFit:
         return out
 
     def linear(self, centred: Array) -> tuple[Array, Array]:
-        """Equation 1 about centred poses.
+        """Equation (1) about centred poses.
 
         Returns:
             Unit lines of sight from a to b in frame a, complex (k, n); and (k, 5, n): derivatives
@@ -148,14 +138,13 @@ class RangeFit:
         turned = centred[:, 1:] * self._b
         sight = turned - self._a
         sight += centred[:, :1]
-        distance = np.maximum(np.abs(sight), 1e-6)
-        u = sight / distance
+        e, u = residuals(sight, self._ranges)  # eq. (1)
         along = u * _direction(centred[:, :1]).conj()
         rows = np.empty((len(centred), 5, len(self._ranges)))
         rows[:, 0], rows[:, 1] = along.real, along.imag
         rows[:, 2] = (u * turned.conj()).imag
         rows[:, 3] = 1.0
-        np.subtract(distance, self._ranges, out=rows[:, 4])
+        rows[:, 4] = e
         return u, rows
 
 
@@ -179,76 +168,3 @@ def _angle(number: Array) -> Array:
 
 def _direction(place: Array) -> Array:
     return np.asarray(np.exp(1j * _angle(place)))
-
-
-class Descent:
-    """Robust Levenberg-Marquardt from all seeds at once, the pair's bias a fourth unknown."""
-
-    def __init__(self, fit: RangeFit, seeds: Array, noise: RangeNoise) -> None:
-        """From centred poses (k, 2)."""
-        self._fit, self._noise = fit, noise
-        self._x, self._bias = seeds, np.zeros(len(seeds))
-        self._damping = np.full(len(seeds), 1e-3)
-        self._cost, self._normal = _normal_equations(fit, seeds, self._bias, noise)
-        self._is_settled = False
-
-    def run(self, steps: int) -> None:
-        """At most so many steps, until all that may still count are settled."""
-        for _ in range(steps):
-            if self._is_settled:
-                break
-            step, promise = _damped_step(self._normal, self._damping)
-            x, bias = stepped(self._x, step), self._bias + step[:, 3]
-            cost, normal = _normal_equations(self._fit, x, bias, self._noise)
-            settled = (promise < SETTLED_CHI2) | (self._damping > MOST_DAMPING)
-            better = cost <= self._cost
-            self._x = np.where(better[:, None], x, self._x)
-            self._bias = np.where(better, bias, self._bias)
-            self._cost = np.where(better, cost, self._cost)
-            self._normal = np.where(better[:, None, None], normal, self._normal)
-            self._damping *= np.where(better, 0.2, 8.0)
-            self._is_settled = bool((settled | ~self._may_count()).all())
-
-    def minima(self) -> Minima:
-        """Best first, without those that are worse than the best beyond doubt.
-
-        What ranges scatter counts as white and never as more than was allowed for, which flatters.
-        """
-        order = np.argsort(self._cost, kind="stable")
-        order = order[self._may_count()[order]]
-        covariance = np.linalg.inv(self._normal[order, :4, :4])[:, :3, :3]
-        covariance *= min(1.0, self._noise.scatter) ** 2
-        return Minima(self._x[order], covariance, self._cost[order])
-
-    def _may_count(self) -> Array:
-        return np.asarray(self._cost < self._cost.min() * HOPELESS + HOPELESS_CHI2)
-
-
-def _damped_step(normal: Array, damping: Array) -> tuple[Array, Array]:
-    """Steps (k, 4), and (k,) what they promise to take off the cost: at most that much."""
-    hessian, gradient = normal[:, :4, :4].copy(), normal[:, :4, 4:]
-    diagonal = np.einsum("kii->ki", hessian)
-    diagonal *= 1 + np.maximum(damping, LEAST_DAMPING)[:, None]
-    step = np.linalg.solve(hessian, gradient)[..., 0]
-    return -step, (step * gradient[..., 0]).sum(axis=1)
-
-
-def _normal_equations(
-    fit: RangeFit, x: Array, bias: Array, noise: RangeNoise
-) -> tuple[Array, Array]:
-    """Huber's cost (k,), and (k, 5, 5): Gauss-Newton Hessian, gradient in the last column."""
-    _, rows = fit.linear(x)
-    e = rows[:, 4]
-    e += bias[:, None]
-    beyond = ROBUST_SIGMAS * noise.sigma
-    weighted = rows * (ROBUST_SIGMAS / noise.sigma / np.maximum(np.abs(e), beyond))[:, None]
-    normal = weighted @ rows.transpose(0, 2, 1)
-    # e^2 within the threshold, 2 c |e| - c^2 beyond it
-    shrunk = weighted[:, 4]
-    cost = 2 * normal[:, 4, 4] - np.einsum("kn,kn->k", shrunk, shrunk) * noise.sigma**2
-    prior = noise.bias_sigma**-2.0
-    cost += bias * bias * prior
-    normal[:, 3, 4] += bias * prior
-    normal[:, 3, 3] += prior
-    np.einsum("kii->ki", normal)[:, :4] += PRIOR
-    return cost, normal

@@ -14,70 +14,19 @@ matrix product of rank ten.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from drslamd.slam.odometry.track import OdometryNoise, growth
+from drslamd.slam.odometry.noise import OdometryNoise, growth, random_covariance
+from drslamd.slam.range_model import LINKTRACK, RangeModel, RangeNoise
 from drslamd.slam.relative_pose.window import Window
 from drslamd.slam.se2 import Array
 
-SLOW_TIME_S = 2.5
-"""Correlation time of the slow range bias (0.7 at 1 s, 0.45 at 2 s in LinkTrack recordings)."""
-SLOW_SHARE = 0.8
-"""Share of the range sigma that is slow; the rest is white."""
-
-NEAR_BIAS_M, NEAR_REACH_M = 0.20, 1.5
-"""Modules misjudge strong signals, each in its own way: what of that one curve for the whole team
-(`problem.near_range_shape`) does not describe. In the MURP recordings a range of below 1 m is 0.11 m shorter
-than one of 2 to 4 m, one of 1 to 2 m 0.05 m."""
-
-_TERMS = np.array([[3, 4, 1], [4, 5, 2], [1, 2, 0], [1, 2, 0]])
-"""Where `growth` has the covariance of the twist that random yaw adds up to, and a twist of yaw."""
+_MATRIX = [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
+"""Where a packed covariance has the elements of its matrix."""
 
 
-@dataclass(frozen=True)
-class RangeNoise:
-    """Sigmas of a range in metres: around its bias, and of the constant bias of the pair.
-
-    `sigma` is what must be allowed for and weighs ranges against odometry; where more is known,
-    they scatter by `scatter` times as much, and that is what a pose is as wrong by.
-    """
-
-    sigma: float
-    bias_sigma: float
-    scatter: float = 1.0
-
-
-def near_bias(ranges: Array | float) -> Array:
-    """Sigma, m, of what the bias of a pair does at short range and not elsewhere."""
-    return np.asarray(NEAR_BIAS_M * np.exp(-np.maximum(ranges, 0.0) / NEAR_REACH_M))
-
-
-def scatter_covariance(t: Array, sigma: float) -> Array:
-    """(n, n): the slow and the white part of ranges at times t (n,), s, around their bias."""
-    slow = (SLOW_SHARE * sigma) ** 2
-    covariance = np.exp(np.abs(t[:, None] - t) * (-1 / SLOW_TIME_S))
-    covariance *= slow
-    covariance.ravel()[:: len(t) + 1] += sigma**2 - slow
-    return np.asarray(covariance)
-
-
-def range_covariance(t: Array, ranges: Array, noise: RangeNoise) -> Array:
-    """(n, n): white, slow and constant parts, and what the bias does at short range.
-
-    Args:
-        t: (n,) s.
-        ranges: (n,) m.
-        noise: sigmas.
-    """
-    near = near_bias(ranges)
-    covariance = scatter_covariance(t, noise.sigma)
-    covariance += near[:, None] * near + noise.bias_sigma**2
-    return covariance
-
-
-def twists(paths: Array, noises: Sequence[OdometryNoise], before: int) -> Array:
+def way_twists(paths: Array, noises: Sequence[OdometryNoise], before: int) -> Array:
     """What the noise of odometry adds up to between measurements and reference time.
 
     Args:
@@ -97,17 +46,12 @@ def twists(paths: Array, noises: Sequence[OdometryNoise], before: int) -> Array:
     track[:, there] = paths
     sums = growth(track)
     sums = (sums[:, there] - sums[:, before, None]).transpose(0, 2, 1)
-    of_robot = [(v.scale, v.yaw_rad_per_m, v.translation_per_sqrt_m, v.yaw_rad_per_sqrt_m)
-                for v in noises]  # fmt: skip
-    scale, bend, shift, turn = np.array(of_robot).T[..., None]
     out = np.zeros((m, 5, 3, n))
-    out[:, :4] = sums[:, _TERMS]
-    out[:, :3] *= np.copysign(turn**2, sums[:, 0])[:, None, None]
-    shift = shift**2 * np.abs(sums[:, 0])
-    out[:, 0, 0] += shift
-    out[:, 1, 1] += shift
-    out[:, 3] *= bend[:, None]
-    out[:, 4, :2] = scale[:, None] * paths.transpose(0, 2, 1)
+    for robot, noise in enumerate(noises):
+        way = sums[robot]
+        out[robot, :3] = random_covariance(noise, np.where(way[0] < 0, -way, way))[_MATRIX]
+        out[robot, 3] = noise.yaw_rad_per_m * way[[1, 2, 0]]
+        out[robot, 4, :2] = noise.scale * paths[robot].T
     return out
 
 
@@ -121,7 +65,7 @@ def odometry_covariance(twist: Array, moment: Array, before: int) -> Array:
     """(k, n, n): what odometry noise does to the residuals; only the lower triangles are meant.
 
     Args:
-        twist: (m, 5, 3, n) `twists` of m robots.
+        twist: (m, 5, 3, n) `way_twists` of m robots.
         moment: (k, m, 3, n) `moments` of the antennas along the lines of sight.
         before: how many measurements lie before the reference time.
     """
@@ -150,16 +94,18 @@ class WindowNoise:
         ranges: RangeNoise,
         a: OdometryNoise,
         b: OdometryNoise,
+        model: RangeModel = LINKTRACK,
     ) -> None:
-        """PairNoise of a window with antennas at a_points, b_points (n, 2), of its sensors."""
+        """Noise of a window with antennas at a_points, b_points (n, 2), of its sensors."""
         self.sigma = ranges.sigma
+        self.huber_sigmas = model.huber_sigmas
         self._before = window.before
-        self._ranges = range_covariance(window.t, window.ranges, ranges)
-        self._t = window.t
+        self._ranges = model.covariance(window.t, window.ranges, ranges)
+        self._t, self._model = window.t, model
         self._excess = ranges.scatter**2 - 1
         self._points = np.stack([_complex(a_points), _complex(b_points)])
         paths = np.stack([window.a_poses[:, :2], window.b_poses[:, :2]])
-        self._twists = twists(paths, (a, b), self._before)
+        self._twists = way_twists(paths, (a, b), self._before)
 
     def covariance(self, u: Array, heading: Array, weights: Array) -> Array:
         """(k, n, n), of which only the lower triangles are meant.
@@ -185,7 +131,7 @@ class WindowNoise:
         """
         if not self._excess:
             return np.zeros((len(gain), 3, 3))
-        scatter = scatter_covariance(self._t, self.sigma)
+        scatter = self._model.correlated_covariance(self._t, self.sigma)
         return np.asarray(self._excess * (gain @ scatter @ gain.transpose(0, 2, 1)))
 
 

@@ -1,68 +1,71 @@
-"""Doing without one piece, and having it back."""
+"""Doing without one piece: every one of them is really run."""
 
 from __future__ import annotations
 
+import math
+from functools import cache
 from pathlib import Path
 
-import numpy as np
 import pytest
 from lab.accuracy.__main__ import NO_INPUT, main
-from lab.accuracy.ablation import PIECES, without
+from lab.accuracy.ablation import PIECES, Piece
+from lab.play import virtual_team
+from lab.play.playback import equip
+from lab.play.simulator import Simulator
+from lab.recordings import world
 
-from drslamd.config import parse
-from drslamd.slam.optimizer.banded.normal_equations import System
-from drslamd.slam.relative_pose import pair_window
-from drslamd.slam.relative_pose.window_noise import near_bias
+from drslamd import report
 
-ROBOT = """
-[robot]
-id = 1
-[team]
-insecure = true
-[uwb]
-port = "x"
-[wheels]
-source = "kobuki"
-port = "y"
-"""
-
-
-@pytest.mark.parametrize("name", list(PIECES))
-def test_each_piece_changes_something_and_is_back_afterwards(name: str) -> None:
-    piece = PIECES[name]
-    assert piece.toml or piece.exchanged
-    assert (parse(ROBOT + piece.toml) != parse(ROBOT)) == bool(piece.toml)
-    before = [getattr(owner, key) for owner, key, _ in piece.exchanged]
-    with without(piece):
-        now = [getattr(owner, key) for owner, key, _ in piece.exchanged]
-        assert all(a is not b for a, b in zip(before, now, strict=True))
-    assert [getattr(owner, key) for owner, key, _ in piece.exchanged] == before
+ALL = Piece("everything as it is")
+SCENE = world.Scene(
+    robots=2,
+    seconds=32.0,
+    width=5.0,
+    height=5.0,
+    ranges=world.RangeModel(bias=0.4, burst_share=0.1),
+    odometry=world.OdometryModel(scale=0.1),
+    range_hz=10,
+    odometry_hz=10,
+)
+"""Everything is wrong enough, and near enough, for each piece to matter."""
 
 
-def test_what_is_exchanged_is_what_is_read() -> None:
-    with without(PIECES["short-range-doubt"]):
-        assert near_bias(0.5) == 0.0
-    assert near_bias(0.5) > 0.1
-    with without(PIECES["closure-dating"]):
-        assert pair_window.CONFIRM_US == 0
+def played(piece: Piece, optimizer: str = "banded") -> Simulator:
+    recording = world.simulate(SCENE, 5)
+    hardware = equip(recording)
+    for device in hardware.values():
+        # a wall, for 2 s of every 5
+        device.uwb.gap_db = lambda t, peer: 12.0 if math.fmod(t, 5.0) < 2.0 else 3.0
+    extra = f'[optimizer]\nalgorithm = "{optimizer}"\n{piece.toml}'
+    return virtual_team.play(recording, 5, None, extra, hardware, tuning=piece.tuning)
 
 
-def test_gauss_holds_the_far_away_as_tightly_as_the_near() -> None:
-    def pull(error: float) -> float:
-        system = System(np.zeros((1, 0)), np.zeros((0, 1)), np.zeros((1, 1)), np.zeros(1), 0.0)
-        system.add_cauchy_prior(np.array([0]), np.array([error]), np.array([0.1]))
-        return float(system.gradient[0] / error)
-
-    assert pull(1.0) < 0.02 * pull(0.01)
-    with without(PIECES["cauchy-priors"]):
-        assert pull(1.0) == pytest.approx(pull(0.01)) == pytest.approx(100.0)
+def said(simulator: Simulator) -> str:
+    """What the first robot makes of it."""
+    robot = simulator.members[0].robot
+    return repr([report.trajectories(robot), report.closures(robot)])
 
 
-def test_a_failure_puts_everything_back() -> None:
-    before = pair_window.CONFIRM_US
-    with pytest.raises(RuntimeError), without(PIECES["closure-dating"]):
-        raise RuntimeError
-    assert before == pair_window.CONFIRM_US
+@cache
+def with_everything() -> str:
+    return said(played(ALL))
+
+
+@pytest.mark.parametrize("name", [name for name in PIECES if name != "gnc"])
+def test_without_a_piece_the_team_comes_to_another_answer(name: str) -> None:
+    without = played(PIECES[name])
+    assert without.members[0].robot.back.estimate is not None
+    assert said(without) != with_everything()
+
+
+def test_without_gnc_closures_are_believed_as_module_2_left_them() -> None:
+    simulator = played(PIECES["gnc"], "closures")
+    assert simulator.members[0].robot.back.estimate is not None
+
+
+def test_the_same_run_comes_to_the_same_answer() -> None:
+    """So what differs above differs because of the piece."""
+    assert said(played(ALL)) == with_everything()
 
 
 def test_a_section_in_both_is_wrong_usage(

@@ -14,7 +14,7 @@ from drslamd.slam import se2
 from drslamd.slam.graph.measurements import GraphEntry, RelativePoses
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
-from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
+from drslamd.slam.optimizer.complex_factors import ComplexFactors
 
 A, B = Chain(2, 10), Chain(5, 20)
 LENGTH = 12
@@ -83,7 +83,7 @@ def test_two_measurements_of_one_relative_pose_both_count() -> None:
         for o, b in batches for k in range(len(b.a_n))
     ]  # fmt: skip
     i, j, shift, theta, tau, kappa = (np.array(column) for column in zip(*rows, strict=True))
-    edges = ComplexEdges(i, j, np.exp(1j * theta), shift, kappa, tau)
+    edges = ComplexFactors(i, j, np.exp(1j * theta), shift, kappa, tau)
     assert len(edges) == 2 * (LENGTH - 1) + 3 + 2
     assert solved.cost == pytest.approx(PoseGraphSolver(edges, len(at)).cost(solved.poses))
 

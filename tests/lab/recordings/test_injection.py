@@ -12,7 +12,7 @@ from lab.recordings import injection
 from lab.recordings.recording import EdgeRecording, Recording, Trail
 from lab.score import metrics
 
-from drslamd.slam.odometry.track import OdometryNoise
+from drslamd.slam.odometry.noise import OdometryNoise
 
 SIGMAS = (0.1, math.radians(2.0))
 

@@ -11,17 +11,16 @@ from slam_scenes import NOISE, Array, same_pose, wander, window_of
 
 from drslamd.conventions import Segment
 from drslamd.slam.calibration.window_calibration import (
-    LEAST_BIAS_M,
     LEAST_SCALE,
-    SHARED,
     PairCalibration,
     calibrated_window,
     remaining,
 )
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
-from drslamd.slam.relative_pose.solver import PairNoise, solve
+from drslamd.slam.range_model import LINKTRACK, RangeNoise
+from drslamd.slam.relative_pose.estimate import PairNoise
+from drslamd.slam.relative_pose.solver import solve
 from drslamd.slam.relative_pose.window import Window
-from drslamd.slam.relative_pose.window_noise import RangeNoise
 
 SENSORS = PairNoise(RangeNoise(0.10, 0.30), NOISE, NOISE)
 KNOWN = PairCalibration(Learned(-0.4, 0.01), Learned(0.15, 0.001), Learned(-0.05, 0.001))
@@ -61,7 +60,7 @@ def test_what_was_never_measured_changes_nothing() -> None:
 def test_what_is_left_is_never_below_what_no_constant_describes() -> None:
     _, noise = calibrated_window(uncalibrated(4)[0], SENSORS, KNOWN)
     assert noise.ranges.bias_sigma == pytest.approx(1 / math.hypot(1 / 0.3, 1 / 0.0539), rel=1e-3)
-    assert noise.ranges.bias_sigma > 0.98 * LEAST_BIAS_M
+    assert noise.ranges.bias_sigma > 0.98 * LINKTRACK.least_bias_m
     assert 0.9 * LEAST_SCALE < noise.b.scale < NOISE.scale
     assert noise.a.yaw_rad_per_m == NOISE.yaw_rad_per_m
 
@@ -85,8 +84,8 @@ def test_ranges_that_scatter_less_have_taught_more(scatter: float) -> None:
 
 @pytest.mark.parametrize("sigma", [0.01, 0.1, 10.0])
 def test_knowledge_adds_up_as_information(sigma: float) -> None:
-    left = remaining(Learned(0.2, sigma), before=0.3, least=0.0)
-    assert left**-2 == pytest.approx(0.3**-2 + (SHARED * sigma) ** -2)
+    left = remaining(Learned(0.2, sigma), before=0.3, least=0.0, widened=2.0)
+    assert left**-2 == pytest.approx(0.3**-2 + (2.0 * sigma) ** -2)
 
 
 def test_what_strong_signals_do_is_taken_out_of_near_ranges_alone() -> None:

@@ -8,13 +8,12 @@ from slam_scenes import NOISE, Array, wander
 
 from drslamd.slam import se2
 from drslamd.slam.consistency.loops import (
-    carried,
+    carried_covariance,
     columns,
-    odometry_covariance,
     squared_length,
     twists,
 )
-from drslamd.slam.odometry.track import covariance_between, growth
+from drslamd.slam.odometry.noise import covariance_between, growth, twist_covariance
 
 RNG = np.random.default_rng(2)
 POSES = RNG.normal(0, 2, (50, 3))
@@ -46,8 +45,10 @@ def test_twists_of_small_turns_lose_no_digits(turn: float) -> None:
 def test_covariances_are_carried_by_the_adjoint() -> None:
     adjoint = se2.adjoint(POSES)
     expected = adjoint @ COVARIANCES @ np.swapaxes(adjoint, 1, 2)
-    np.testing.assert_allclose(carried(POSES.T, rows(COVARIANCES)), rows(expected), rtol=1e-9)
-    one = carried(POSES[:1].T, rows(COVARIANCES))
+    np.testing.assert_allclose(
+        carried_covariance(POSES.T, rows(COVARIANCES)), rows(expected), rtol=1e-9
+    )
+    one = carried_covariance(POSES[:1].T, rows(COVARIANCES))
     expected = adjoint[0] @ COVARIANCES @ adjoint[0].T
     np.testing.assert_allclose(one, rows(expected), rtol=1e-9, atol=1e-12)
 
@@ -60,7 +61,7 @@ def test_odometry_adds_the_same_noise_in_both_directions(k: int) -> None:
     way, grown = path[k, :2] - path[:, :2], sums[k] - sums
     expected = covariance_between(NOISE, path, sums, i, k)
     np.testing.assert_allclose(
-        odometry_covariance(NOISE, way.T, grown.T), rows(expected), rtol=1e-9, atol=1e-15
+        twist_covariance(NOISE, way.T, grown.T), rows(expected), rtol=1e-9, atol=1e-15
     )
 
 

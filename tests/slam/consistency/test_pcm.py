@@ -11,7 +11,7 @@ from drslamd.slam.chi_squared import quantile3
 from drslamd.slam.consistency import pcm
 from drslamd.slam.consistency.clique import IncrementalClique
 from drslamd.slam.consistency.pcm import Candidate, PairConsistency
-from drslamd.slam.odometry.track import growth
+from drslamd.slam.odometry.noise import growth
 
 EPSILON = 0.1
 

@@ -9,13 +9,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from slam_scenes import NOISE, closure, keyframes, range_item, small_team, traits_of, wander
+from slam_scenes import NOISE, closure, keyframes, model_of, range_item, small_team, wander
 
 from drslamd.conventions import Chain, Segment
-from drslamd.slam.graph import pose_graph
+from drslamd.slam.graph import chain_data, pair_data, tables
+from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
-from drslamd.slam.graph.pose_graph import ChainData, PoseGraph, Rows
-from drslamd.slam.odometry.track import growth
+from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.graph.tables import KeyedRows
+from drslamd.slam.odometry.noise import growth
+from drslamd.slam.robot_model import UNTOLD, RobotModel
 
 A, B, C = Chain(0, 5), Chain(1, 6), Chain(2, 7)
 EVERYBODY = {0, 1, 2}
@@ -43,7 +46,7 @@ def some_entries() -> list[tuple[Chain, GraphEntry]]:
             closures = [closure(seq, n[1], peer, n[1], (1.0, seq, 0.1))]
             if seq == 3:
                 closures.append(closure(1, 50, peer, 50, (1.0, 1, 0.1), kept=False))
-            traits = traits_of(replace(NOISE, scale=0.01 * (seq + 1)), (0.1 * seq, 0.0))
+            traits = model_of(replace(NOISE, scale=0.01 * (seq + 1)), (0.1 * seq, 0.0))
             out.append((chain, GraphEntry(seq, traits, part, ranges, tuple(closures))))
     return out
 
@@ -56,8 +59,8 @@ def test_a_repeated_entry_changes_nothing() -> None:
     once, twice = graph_of(*entries), graph_of(*entries, *entries[::2], *entries)
     assert once.digest(EVERYBODY) == twice.digest(EVERYBODY)
     for key, pair in once.pairs.items():
-        assert np.array_equal(pair.ranges, twice.pairs[key].ranges)
-        assert pair.kept() == twice.pairs[key].kept()
+        assert np.array_equal(pair.ranges.rows, twice.pairs[key].ranges.rows)
+        assert pair.kept_closures() == twice.pairs[key].kept_closures()
 
 
 def test_every_order_of_arrival_gives_the_same_graph() -> None:
@@ -74,20 +77,19 @@ def test_every_order_of_arrival_gives_the_same_graph() -> None:
         assert graph.digest(EVERYBODY) == reference.digest(EVERYBODY)
         for robot, items in reference.chains.items():
             other = graph.chains[robot]
-            assert np.array_equal(items.rows, other.rows)
-            assert items.noise == other.noise
-            assert np.array_equal(items.antenna, other.antenna)
+            assert np.array_equal(items.keyframes.rows, other.keyframes.rows)
+            assert items.model == other.model
         for key, pair in reference.pairs.items():
-            assert np.array_equal(pair.ranges, graph.pairs[key].ranges)
-            assert pair.kept() == graph.pairs[key].kept()
+            assert np.array_equal(pair.ranges.rows, graph.pairs[key].ranges.rows)
+            assert pair.kept_closures() == graph.pairs[key].kept_closures()
 
 
 def test_the_latest_word_counts_on_traits_and_on_closures() -> None:
     for order in itertools.permutations(e for e in some_entries() if e[0] == A):
         graph = graph_of(*order, (B, GraphEntry(0)))
-        assert graph.chains[0].noise.scale == pytest.approx(0.05)
-        assert graph.chains[0].antenna.tolist() == [0.4, 0.0]
-        assert [c.number for c in graph.pairs[0, 1].kept()] == [0, 2, 3, 4]
+        assert graph.chains[0].model.noise.scale == pytest.approx(0.05)
+        assert graph.chains[0].model.antenna.tolist() == [0.4, 0.0]
+        assert [c.number for c in graph.pairs[0, 1].kept_closures()] == [0, 2, 3, 4]
 
 
 def test_the_digest_tells_every_item_apart() -> None:
@@ -114,7 +116,9 @@ def test_keyframes_that_contradict_each_other_are_settled_the_same_way_everywher
         for order in itertools.permutations([one, other, rest])
     ]
     assert {g.digest({0}) for g in graphs} == {graphs[0].digest({0})}
-    assert np.allclose(graphs[0].chains[0].rows, [[10, 0, 5e-4, 4e-4, 9e-4], [20, 0, *[7e-4] * 3]])
+    assert np.allclose(
+        graphs[0].chains[0].keyframes.rows, [[10, 0, 5e-4, 4e-4, 9e-4], [20, 0, *[7e-4] * 3]]
+    )
 
 
 # ---- epochs ----
@@ -125,7 +129,7 @@ def test_a_new_epoch_forgets_the_old_chain_and_what_it_measured() -> None:
     again = Chain(0, 50)
     graph.insert(again, GraphEntry(0, keyframes=(Keyframe(3, 0, 1, 2, 3),)))
     assert graph.chains[0].chain == again
-    assert graph.chains[0].n.tolist() == [3]
+    assert graph.chains[0].keyframes.n.tolist() == [3]
     assert [key for key in graph.pairs if key[0] == 0] == []
     # what others measured to the old chain is of no use until they name the new one
     assert [(p.a.robot, p.b.robot) for p in graph.usable()] == [(1, 2)]
@@ -134,7 +138,7 @@ def test_a_new_epoch_forgets_the_old_chain_and_what_it_measured() -> None:
 def test_an_old_epoch_is_not_listened_to() -> None:
     graph = graph_of((A, GraphEntry(0, keyframes=(Keyframe(3, 0, 1, 2, 3),))))
     graph.insert(Chain(0, 4), GraphEntry(1, keyframes=(Keyframe(4, 0, 1, 2, 3),)))
-    assert graph.chains[0].n.tolist() == [3]
+    assert graph.chains[0].keyframes.n.tolist() == [3]
 
 
 def test_ranges_to_an_old_start_of_a_peer_are_dropped_whichever_comes_first() -> None:
@@ -144,7 +148,7 @@ def test_ranges_to_an_old_start_of_a_peer_are_dropped_whichever_comes_first() ->
     for order in ((to_old, to_new), (to_new, to_old)):
         pair = graph_of(*order).pairs[0, 1]
         assert pair.b == new
-        assert pair.ranges[:, 6].tolist() == [2.0]
+        assert pair.ranges.range_m.tolist() == [2.0]
 
 
 # ---- what waits, what is bounded ----
@@ -156,16 +160,16 @@ def test_an_item_may_name_a_keyframe_that_has_not_come_yet() -> None:
     graph.insert(B, GraphEntry(0))
     assert len(graph.usable()) == 1
     items = graph.chains[0]
-    assert items.find(np.array([10.0]))[1].tolist() == [False]
+    assert items.keyframes.find(np.array([10.0]))[1].tolist() == [False]
     graph.insert(A, GraphEntry(1, keyframes=(Keyframe(10, 0, 0, 0, 0),)))
-    assert items.find(np.array([10.0, 9.0, 11.0]))[1].tolist() == [True, False, False]
+    assert items.keyframes.find(np.array([10.0, 9.0, 11.0]))[1].tolist() == [True, False, False]
 
 
 @pytest.mark.parametrize("count", [29, 30, 31, 75])
 def test_rows_keep_the_last_ones_in_the_order_of_their_keys(count: int) -> None:
     shuffled = np.random.default_rng(2).permutation(count)
     for looked in (False, True):
-        rows = Rows(2, 30)
+        rows = KeyedRows(2, 30)
         for key in shuffled:
             rows.add([float(key), -float(key)])
             if looked:
@@ -175,40 +179,40 @@ def test_rows_keep_the_last_ones_in_the_order_of_their_keys(count: int) -> None:
 
 
 def test_rows_that_nobody_looks_at_are_bounded_too() -> None:
-    rows = Rows(2, 100)
+    rows = KeyedRows(2, 100)
     for key in range(5_000):
         rows.add([float(key), 0.0])
-        assert len(rows._new) < pose_graph.WAITING
+        assert len(rows._new) < tables.WAITING
     assert len(rows.data) == 100
 
 
 def test_a_chain_keeps_the_last_keyframes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pose_graph, "MAX_KEYFRAMES", 50)
+    monkeypatch.setattr(chain_data, "MAX_KEYFRAMES", 50)
     items = ChainData(A)
     path = wander(np.random.default_rng(3), 80, 0.4)
     for k in keyframes(range(80), path):
         items.add(k)
-        assert len(items.rows) == min(50, k.n + 1)
-    assert items.n.tolist() == list(range(30, 80))
+        assert len(items.keyframes.rows) == min(50, k.n + 1)
+    assert items.keyframes.n.tolist() == list(range(30, 80))
 
 
 def test_a_pair_keeps_the_last_ranges_and_closures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pose_graph, "MAX_RANGES", 10)
-    monkeypatch.setattr(pose_graph, "MAX_CLOSURES", 10)
+    monkeypatch.setattr(pair_data, "MAX_RANGES", 10)
+    monkeypatch.setattr(pair_data, "MAX_CLOSURES", 10)
     graph = PoseGraph()
     for seq in reversed(range(12)):
         ranges = (range_item(seq, B, seq, 1.0),)
-        graph.insert(A, GraphEntry(seq, (), (), ranges, (closure(seq, 0, B, 0, (0, 0, 0)),)))
+        graph.insert(A, GraphEntry(seq, None, (), ranges, (closure(seq, 0, B, 0, (0, 0, 0)),)))
     pair = graph.pairs[0, 1]
-    assert pair.ranges[:, 0].tolist() == list(range(2, 12))
-    assert [c.number for c in pair.kept()] == list(range(2, 12))
+    assert pair.ranges.a_n.tolist() == list(range(2, 12))
+    assert [c.number for c in pair.kept_closures()] == list(range(2, 12))
 
 
 # ---- sums ----
 
 
 def sums_between(items: ChainData, i: int, k: int) -> np.ndarray:
-    at, there = items.find(np.array([i, k], dtype=float))
+    at, there = items.keyframes.find(np.array([i, k], dtype=float))
     assert there.all()
     return np.asarray(items.sums[at[1]] - items.sums[at[0]])
 
@@ -217,7 +221,7 @@ def test_sums_are_those_of_the_whole_chain_however_it_came(monkeypatch: pytest.M
     path = wander(np.random.default_rng(4), 60, 0.4)
     frames = keyframes(range(60), path)
     expected = growth(np.array([[k.x, k.y, k.theta] for k in frames]) * 1e-4)
-    monkeypatch.setattr(pose_graph, "MAX_KEYFRAMES", 40)
+    monkeypatch.setattr(chain_data, "MAX_KEYFRAMES", 40)
     shuffle = random.Random(5)
     for _ in range(10):
         order = list(frames)
@@ -226,7 +230,7 @@ def test_sums_are_those_of_the_whole_chain_however_it_came(monkeypatch: pytest.M
         for k in order:
             items.add(k)
             if shuffle.random() < 0.5:
-                assert len(items.sums) == len(items.rows)
+                assert len(items.sums) == len(items.keyframes.rows)
         assert np.allclose(sums_between(items, 25, 55), expected[55] - expected[25])
 
 
@@ -234,16 +238,16 @@ def test_what_came_late_or_was_dropped_does_not_move_the_sums(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Candidates of module 2 remember them."""
-    monkeypatch.setattr(pose_graph, "MAX_KEYFRAMES", 40)
+    monkeypatch.setattr(chain_data, "MAX_KEYFRAMES", 40)
     frames = keyframes(range(60), wander(np.random.default_rng(6), 60, 0.4))
     items = ChainData(A)
     for k in frames[20:45]:
         items.add(k)
-    remembered = items.sums[items.find(np.array([30.0]))[0][0]].copy()
+    remembered = items.sums[items.keyframes.find(np.array([30.0]))[0][0]].copy()
     for part in (frames[5:20], frames[45:], frames[0:5]):
         for k in part:
             items.add(k)
-        now = items.sums[items.find(np.array([30.0]))[0][0]]
+        now = items.sums[items.keyframes.find(np.array([30.0]))[0][0]]
         assert np.allclose(now, remembered, atol=1e-9)
 
 
@@ -252,18 +256,22 @@ def test_what_came_late_or_was_dropped_does_not_move_the_sums(
 
 def test_rows_of_a_segment_are_found_and_of_one_that_is_not_there_are_none() -> None:
     graph = graph_of(*some_entries())
-    assert graph.chains[0].rows_of(0) == slice(0, 12)
-    assert graph.chains[0].rows_of(1) == slice(12, 20)
-    assert graph.segment_rows(Segment(*A, 1))[:, 0].tolist() == list(range(120, 200, 10))
-    assert len(graph.segment_rows(Segment(*A, 7))) == 0
+    assert graph.chains[0].keyframes.of_segment(0) == slice(0, 12)
+    assert graph.chains[0].keyframes.of_segment(1) == slice(12, 20)
+    assert graph.segment(Segment(*A, 1)).n.tolist() == list(range(120, 200, 10))
+    assert len(graph.segment(Segment(*A, 7))) == 0
 
 
 def test_a_segment_never_comes_back_whatever_a_robot_says() -> None:
     items = ChainData(A)
     for n, segment in enumerate([0, 3, 1, 1, 5, 0]):
         items.add(Keyframe(n, segment, 0, 0, 0))
-    assert items.rows[:, 1].tolist() == [0, 3, 3, 3, 5, 5]
-    assert [items.rows_of(s) for s in (0, 3, 5)] == [slice(0, 1), slice(1, 4), slice(4, 6)]
+    assert items.keyframes.rows[:, 1].tolist() == [0, 3, 3, 3, 5, 5]
+    assert [items.keyframes.of_segment(s) for s in (0, 3, 5)] == [
+        slice(0, 1),
+        slice(1, 4),
+        slice(4, 6),
+    ]
 
 
 # ---- nonsense is not taken in ----
@@ -281,17 +289,17 @@ def test_no_range_is_farther_than_any_radio_reaches(metres: float, taken: bool) 
 def test_closures_are_as_good_as_can_be_measured(sigma: float, taken: bool) -> None:
     """(The angle has half the sigma.)"""
     graph = graph_of((A, GraphEntry(0, closures=(closure(0, 0, B, 0, (1, 2, 3), sigma),))))
-    assert (len(graph.pairs[0, 1].kept()) == 1) is taken
+    assert (len(graph.pairs[0, 1].kept_closures()) == 1) is taken
 
 
 @pytest.mark.parametrize("x", [1e9, -1e9, math.nan, math.inf])
 def test_no_closure_leads_out_of_the_world(x: float) -> None:
     graph = graph_of((A, GraphEntry(0, closures=(closure(0, 0, B, 0, (1, x, 3)),))))
-    assert graph.pairs[0, 1].kept() == []
+    assert graph.pairs[0, 1].kept_closures() == []
 
 
 def test_nobody_is_a_pair_with_himself() -> None:
-    both = GraphEntry(0, (), (), (range_item(0, A, 1, 1.0),), (closure(0, 0, A, 1, (1, 0, 0)),))
+    both = GraphEntry(0, None, (), (range_item(0, A, 1, 1.0),), (closure(0, 0, A, 1, (1, 0, 0)),))
     graph = graph_of((A, both))
     assert graph.pairs == {}
 
@@ -299,19 +307,19 @@ def test_nobody_is_a_pair_with_himself() -> None:
 @pytest.mark.parametrize(
     "traits",
     [
-        traits_of(replace(NOISE, scale=9.0)),
-        traits_of(replace(NOISE, translation_per_sqrt_m=0.0)),
-        traits_of(NOISE, (9.0, 0.0)),
-        traits_of(NOISE, (0.0, math.nan)),
+        model_of(replace(NOISE, scale=9.0)),
+        model_of(replace(NOISE, translation_per_sqrt_m=0.0)),
+        model_of(NOISE, (9.0, 0.0)),
+        model_of(NOISE, (0.0, math.nan)),
     ],
 )
-def test_traits_that_no_configuration_allows_are_not_believed(traits: tuple[float, ...]) -> None:
+def test_traits_that_no_configuration_allows_are_not_believed(traits: RobotModel) -> None:
     graph = graph_of((A, GraphEntry(0, traits)))
-    assert graph.chains[0].noise == pose_graph.DEFAULT_NOISE
-    assert graph.chains[0].antenna.tolist() == [0.0, 0.0]
+    assert graph.chains[0].model == UNTOLD
+    assert graph.chains[0].model.antenna.tolist() == [0.0, 0.0]
 
 
 def test_the_small_team_of_the_other_tests_is_whole() -> None:
     team = small_team(0)
     assert len(team.graph.usable()) == 3 - 1 + 1
-    assert all(len(items.rows) == 40 for items in team.graph.chains.values())
+    assert all(len(items.keyframes.rows) == 40 for items in team.graph.chains.values())

@@ -22,7 +22,8 @@ from drslamd.slam.graph import team_frame
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
-from drslamd.slam.graph.team_frame import Group, carried, gauge_segment, groups, placed
+from drslamd.slam.graph.tables import KeyframeTable
+from drslamd.slam.graph.team_frame import Group, by_odometry, gauge_segment, groups, placed
 
 CHAINS = [Chain(r, 10 + r) for r in range(5)]
 A, B, C, D, E = CHAINS
@@ -47,7 +48,7 @@ def team_of(*joined: tuple[Chain, Chain], breaks: tuple[Chain, ...] = ()) -> Pos
 
 
 def in_frame(graph: PoseGraph, members: set[Segment], frame: Segment) -> Group:
-    known = {Segment(*c.chain, int(s)) for c in graph.chains.values() for s in c.rows[:, 1]}
+    known = {Segment(*c.chain, int(s)) for c in graph.chains.values() for s in c.keyframes.segment}
     assert members <= known
     return Group(members, frame, {})
 
@@ -122,7 +123,7 @@ def exact(robots: int = 3) -> tuple[PoseGraph, Group, dict[int, Array]]:
 def as_estimate(group: Group, graph: PoseGraph, poses: dict[int, Array]) -> TeamEstimate:
     return TeamEstimate(
         group.frame,
-        {r: Trajectory(graph.chains[r].chain, graph.chains[r].n[: len(p)], p)
+        {r: Trajectory(graph.chains[r].chain, graph.chains[r].keyframes.n[: len(p)], p)
          for r, p in poses.items()},
     )  # fmt: skip
 
@@ -167,7 +168,7 @@ def test_a_new_frame_carries_all_poses_over() -> None:
     other = Group(group.members, Segment(*graph.chains[1].chain, 0), {})
     start = placed(graph, other, before)
     # robot 1 is now at its own odometry, and nobody moved against it
-    assert same_pose(start[other.frame][0], graph.chains[1].poses[0], 1e-9)
+    assert same_pose(start[other.frame][0], graph.chains[1].keyframes.poses[0], 1e-9)
     for member, poses in start.items():
         before_between = product(inverted(before.trajectories[1].poses[7]),
                                  before.trajectories[member.robot].poses[20])  # fmt: skip
@@ -177,7 +178,7 @@ def test_a_new_frame_carries_all_poses_over() -> None:
 
 def test_an_estimate_of_strangers_is_of_no_use() -> None:
     graph, group, _ = exact()
-    rows = graph.chains[0].poses
+    rows = graph.chains[0].keyframes.poses
     stranger = Segment(9, 9, 0)
     elsewhere = TeamEstimate(stranger, {9: Trajectory(Chain(9, 9), np.array([0]), np.ones((1, 3)))})
     assert np.allclose(placed(graph, group, elsewhere)[group.frame], rows)
@@ -188,7 +189,7 @@ def test_an_earlier_start_of_the_same_robot_is_a_stranger() -> None:
     before = as_estimate(group, graph, truth)
     old = {r: Trajectory(Chain(r, 1), t.n, t.poses + 5.0) for r, t in before.trajectories.items()}
     start = placed(graph, group, TeamEstimate(group.frame, old))
-    assert np.allclose(start[group.frame], graph.chains[0].poses)
+    assert np.allclose(start[group.frame], graph.chains[0].keyframes.poses)
 
 
 def test_an_earlier_start_of_the_new_frame_s_robot_carries_nothing_over() -> None:
@@ -207,7 +208,7 @@ def test_two_segments_of_one_robot_are_placed_each_by_itself() -> None:
     graph.insert(A, GraphEntry(9, closures=(closure(5, 70, B, 70, (-1, 0, 0.5)),)))
     members = {segment(A, 0), segment(A, 1), segment(B)}
     start = placed(graph, in_frame(graph, members, segment(A, 0)), None)
-    assert np.allclose(start[segment(A, 0)], graph.chains[0].poses[:5])
+    assert np.allclose(start[segment(A, 0)], graph.chains[0].keyframes.poses[:5])
     b = start[segment(B)]
     assert same_pose(b[1], product(start[segment(A, 0)][1], (1, 2, 0.3)), 1e-9)
     assert same_pose(product(start[segment(A, 1)][2], (-1, 0, 0.5)), b[7], 1e-9)
@@ -221,7 +222,7 @@ def test_the_robot_that_most_closures_join_is_placed_first() -> None:
     graph.insert(B, GraphEntry(9, closures=(closure(50, 50, C, 50, (5, 5, 1)),)))
     members = {segment(A), segment(B), segment(C)}
     start = placed(graph, in_frame(graph, members, segment(A)), None)
-    b, own = start[segment(B)], graph.chains[B.robot].poses
+    b, own = start[segment(B)], graph.chains[B.robot].keyframes.poses
     assert same_pose(b[3], product(start[segment(A)][3], (1, 2, 0.3)), 1e-9)
     assert same_pose(b[5], product(b[3], product(inverted(own[3]), own[5])), 1e-9)
     assert same_pose(start[segment(C)][5], product(b[5], (5, 5, 1)), 1e-9)
@@ -231,9 +232,10 @@ def test_keyframes_follow_the_nearest_that_is_known() -> None:
     rows = np.zeros((6, 5))
     rows[:, 0] = [0, 10, 20, 30, 40, 50]
     rows[:, 2] = np.arange(6)
-    anchors = rows[[1, 4]]
+    keyframes = KeyframeTable(rows)
+    anchors = keyframes.chosen(np.array([1, 4]))
     at = np.array([[100.0, 0, 0], [200.0, 0, np.pi / 2]])
-    poses = carried(rows, anchors, at)
+    poses = by_odometry(keyframes, anchors, at)
     assert np.allclose(poses[:3], [[99, 0, 0], [100, 0, 0], [101, 0, 0]])
     assert np.allclose(poses[3:, :2], [[200, -1], [200, 0], [200, 1]])
     assert angle_between(poses[5, 2], np.pi / 2) == pytest.approx(0)

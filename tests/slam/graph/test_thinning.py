@@ -23,7 +23,9 @@ from drslamd.slam.graph.estimate import Trajectory
 from drslamd.slam.graph.history import History
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.graph.tables import RangeTable
 from drslamd.slam.graph.thinning import RECENT_S, TEAM_S, Thinning, recent_s
+from drslamd.slam.se2 import Array
 
 A, B = Chain(0, 1), Chain(1, 1)
 AHEAD = 20
@@ -42,12 +44,12 @@ def driven(seconds: int, order: list[int] | None = None) -> PoseGraph:
 
 def test_five_minutes_stay_as_they_are() -> None:
     for seconds, all_stay in ((RECENT_S + 20, True), (RECENT_S + 21, False)):
-        assert (len(driven(seconds).chains[0].rows) == seconds) == all_stay
+        assert (len(driven(seconds).chains[0].keyframes.rows) == seconds) == all_stay
 
 
 @pytest.mark.parametrize("seconds", [1_200, 3_600, 14_400])
 def test_the_rest_of_any_time_is_at_most_half_as_much_again(seconds: int) -> None:
-    n = driven(seconds).chains[0].n
+    n = driven(seconds).chains[0].keyframes.n
     assert len(n) <= 1.5 * RECENT_S + 64 + 10
     assert n[0] == 0
     age = (10 * seconds - n[:-1]) / 10
@@ -61,7 +63,9 @@ def test_which_stay_does_not_depend_on_the_order_in_which_they_came() -> None:
     order = list(range(seconds))
     for k in range(0, seconds - 3, 3):
         order[k], order[k + 2] = order[k + 2], order[k]
-    assert np.array_equal(driven(seconds).chains[0].rows, driven(seconds, order).chains[0].rows)
+    assert np.array_equal(
+        driven(seconds).chains[0].keyframes.rows, driven(seconds, order).chains[0].keyframes.rows
+    )
 
 
 @pytest.mark.parametrize(("robots", "seconds"), [(1, 300), (10, 300), (11, 150), (20, 150),
@@ -81,10 +85,14 @@ def two_robots(seconds: int) -> tuple[PoseGraph, np.ndarray, np.ndarray]:
         measured = (range_item(10 * k, B, AHEAD + 10 * k, distance),)
         seen = (closure(k, 10 * k, B, AHEAD + 10 * k, product(inverted(a), b)),)
         graph.insert(B, GraphEntry(k, keyframes=keyframes([AHEAD + 10 * k], [b])))
-        graph.insert(A, GraphEntry(k, (), keyframes([10 * k], [a]), measured, seen))
+        graph.insert(A, GraphEntry(k, None, keyframes([10 * k], [a]), measured, seen))
         thinning.after(B.robot)
         thinning.after(A.robot)
     return graph, one, other
+
+
+def columns(table: RangeTable) -> tuple[Array, ...]:
+    return table.a_n, table.b_n, table.q_a, table.q_b, table.range_m
 
 
 def test_what_was_measured_at_a_keyframe_that_goes_is_true_at_the_one_that_stays() -> None:
@@ -92,30 +100,32 @@ def test_what_was_measured_at_a_keyframe_that_goes_is_true_at_the_one_that_stays
     pair = graph.pairs[0, 1]
     a, b = graph.chains[0], graph.chains[1]
     assert len(pair.ranges) < 600
-    for row in pair.ranges:
+    for a_n, b_n, q_a, q_b, range_m in zip(*columns(pair.ranges), strict=True):
         ends = []
-        for items, n, arm in ((a, row[0], row[2:4]), (b, row[1], row[4:6])):
-            at, there = items.find(np.array([n]))
+        for items, n, arm in ((a, a_n, q_a), (b, b_n, q_b)):
+            at, there = items.keyframes.find(np.array([n]))
             assert there[0]
-            ends.append(product(items.poses[at[0]], [*arm, 0.0])[:2])
-        assert np.hypot(*(ends[0] - ends[1])) == pytest.approx(row[6], abs=2e-3)
-    assert len(pair.kept()) < 600
-    for item in pair.kept():
+            ends.append(product(items.keyframes.poses[at[0]], [*arm, 0.0])[:2])
+        assert np.hypot(*(ends[0] - ends[1])) == pytest.approx(range_m, abs=2e-3)
+    assert len(pair.kept_closures()) < 600
+    for item in pair.kept_closures():
         pose = product(inverted(one[item.a_n // 10]), other[(item.b_n - AHEAD) // 10])
         assert same_pose(np.array(item.a_T_b), pose, 1e-3)
 
 
 def test_what_was_carried_far_is_less_certain_and_what_is_recent_is_not() -> None:
     graph, _, _ = two_robots(900)
-    rows = graph.pairs[0, 1].ranges
-    recent = rows[rows[:, 0] > 10 * (900 - RECENT_S)]
+    table = graph.pairs[0, 1].ranges
+    recent = table.chosen(table.a_n > 10 * (900 - RECENT_S))
     assert len(recent) >= 280
-    assert (recent[2:, 7] == recent[-1, 7]).all()
-    old = rows[(rows[:, 0] < 1000) & (np.hypot(rows[:, 2], rows[:, 3]) > 0.02)]
-    way = np.hypot(old[:, 2], old[:, 3])
-    assert len(old) > 3
+    plain = recent.sigma_m[-1]
+    assert (recent.sigma_m[2:] == plain).all()
+    way = np.hypot(*table.q_a.T)
+    is_old = (table.a_n < 1000) & (way > 0.02)
+    assert np.count_nonzero(is_old) > 3
     # at least the random translation of the way that it was carried
-    assert (old[:, 7] ** 2 >= recent[-1, 7] ** 2 + NOISE.translation_per_sqrt_m**2 * way).all()
+    least = plain**2 + NOISE.translation_per_sqrt_m**2 * way
+    assert (table.sigma_m**2 >= least)[is_old].all()
 
 
 def test_sums_between_keyframes_that_stay_do_not_shrink_to_the_chords() -> None:
@@ -127,7 +137,7 @@ def test_sums_between_keyframes_that_stay_do_not_shrink_to_the_chords() -> None:
         thinning.after(A.robot)
     sums = graph.chains[0].sums
     per_second = 2 * math.sin(0.1)
-    seconds = (graph.chains[0].n[-1] - graph.chains[0].n[0]) / 10
+    seconds = (graph.chains[0].keyframes.n[-1] - graph.chains[0].keyframes.n[0]) / 10
     assert sums[-1, 0] - sums[0, 0] == pytest.approx(per_second * seconds, rel=1e-3)
 
 
@@ -139,7 +149,7 @@ def test_the_first_keyframe_of_every_piece_stays_because_frames_begin_there() ->
         graph.insert(A, GraphEntry(k, keyframes=frame))
         thinning.after(A.robot)
     for segment in range(10):
-        assert graph.segment_rows(Segment(0, 1, segment))[0, 0] == 1000 * segment
+        assert graph.segment(Segment(0, 1, segment)).n[0] == 1000 * segment
 
 
 # ---- where we were -----------------------------------------------------------------------------

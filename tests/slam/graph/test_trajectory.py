@@ -13,7 +13,7 @@ from slam_scenes import Array, product, same_pose, wander
 from drslamd.conventions import Chain
 from drslamd.slam.graph.estimate import Trajectory
 from drslamd.slam.graph.trajectory import deform_track
-from drslamd.slam.odometry.track import STEPS, Track
+from drslamd.slam.odometry.track import RESOLUTION, Track
 
 CHAIN = Chain(0, 1)
 
@@ -21,7 +21,7 @@ CHAIN = Chain(0, 1)
 def track_of(path: Array, n: Array) -> Track:
     track = Track(1000)
     for k, pose in zip(n, path, strict=True):
-        track.append(int(k), np.round(pose / STEPS))
+        track.append(int(k), np.round(pose / RESOLUTION))
     return track
 
 

@@ -9,7 +9,8 @@ import pytest
 
 from drslamd.conventions import GRID_US
 from drslamd.sensors.samples import Motion
-from drslamd.slam.odometry.track import STEPS, DeadReckoning
+from drslamd.slam.odometry.dead_reckoning import DeadReckoning
+from drslamd.slam.odometry.track import RESOLUTION
 
 START = 5_000_000
 
@@ -141,4 +142,4 @@ def test_a_motion_from_the_past_is_left_out() -> None:
 def test_the_path_counts_both_directions() -> None:
     reckoning = driven([start(), Motion(START + 1, 0.3, 0.1), Motion(START + 2, -0.2, 0.0)])
     assert reckoning.path_m == pytest.approx(0.5)
-    assert np.array_equal(STEPS, [1e-4, 1e-4, 1e-4])
+    assert np.array_equal(RESOLUTION, [1e-4, 1e-4, 1e-4])

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from slam_scenes import NOISE, Array, config, wander
 
-from drslamd.slam import se2
-from drslamd.slam.odometry.track import OdometryNoise, covariance_between, growth, link_covariance
+from drslamd.slam import se2, settings
+from drslamd.slam.odometry.noise import OdometryNoise, covariance_between, growth, link_covariance
 
 QUIET = OdometryNoise(1e-12, 1e-12, 1e-12, 1e-12)
 PARTS = {
@@ -135,7 +135,7 @@ def test_the_configuration_speaks_degrees_and_the_code_radians() -> None:
         "[odometry]\nscale_sigma = 0.02\nyaw_sigma_deg_per_m = 1.8\n"
         "random_translation_per_sqrt_m = 0.03\nrandom_yaw_deg_per_sqrt_m = 3.6\n"
     )
-    noise = OdometryNoise.from_config(config(extra=text).odometry)
+    noise = settings.odometry_noise(config(extra=text).odometry)
     expected = (0.02, math.pi / 100, 0.03, math.pi / 50)
     assert (noise.scale, noise.yaw_rad_per_m, noise.translation_per_sqrt_m,
             noise.yaw_rad_per_sqrt_m) == pytest.approx(expected)  # fmt: skip

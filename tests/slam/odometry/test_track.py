@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drslamd.slam.odometry.track import STEPS, Track
+from drslamd.slam.odometry.track import RESOLUTION, Track
 
 
 def track_of(*samples: int, capacity: int = 100) -> Track:
@@ -17,7 +17,7 @@ def track_of(*samples: int, capacity: int = 100) -> Track:
 
 
 def expected(n: float) -> np.ndarray:
-    return np.asarray(np.array([n, 2 * n, -n]) * STEPS)
+    return np.asarray(np.array([n, 2 * n, -n]) * RESOLUTION)
 
 
 def test_an_empty_track_has_no_length() -> None:
@@ -116,4 +116,4 @@ def test_segments_that_are_trimmed_leave_a_consistent_track() -> None:
         assert track.segment_start == last_start
         held = np.isfinite(track.poses[:, 0])
         numbers = np.arange(track.n0, track.end)[held]
-        assert np.allclose(track.poses[held], numbers[:, None] * [1, 2, -1] * STEPS)
+        assert np.allclose(track.poses[held], numbers[:, None] * [1, 2, -1] * RESOLUTION)

@@ -21,10 +21,12 @@ from slam_scenes import (
 
 from drslamd.conventions import GRID_US, Chain, Segment
 from drslamd.slam import se2
+from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
-from drslamd.slam.graph.pose_graph import ChainData, PoseGraph
+from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.factors import Numbering, chain_links, clock_shifts, numbering, sensible
+from drslamd.slam.robot_model import RobotModel
 
 A, B, C = Chain(0, 5), Chain(1, 6), Chain(2, 7)
 
@@ -133,7 +135,9 @@ def test_the_covariance_of_a_link_is_that_of_noisy_drives(calibrated: bool) -> N
     """One link of 0.8 m in 40 steps; scale and yaw rate are drawn when nobody estimates them."""
     rng, drives, steps = np.random.default_rng(4), 20_000, 40
     path = np.array([[0.0, 0, 0.3], [0.8 * math.cos(0.5), 0.8 * math.sin(0.5), 0.7]])
-    edges = chain_links(chain_of(path, [0, 10]), calibrated)
+    driven = chain_of(path, [0, 10])
+    driven.model = RobotModel(NOISE)
+    edges = chain_links(driven, calibrated)
     way = np.array([math.cos(0.2), math.sin(0.2)]) * 0.8 / steps  # seen from the first pose
     length = 0.8 / steps
     scale = 1 + rng.normal(0, NOISE.scale, drives) * (not calibrated)
@@ -156,7 +160,7 @@ def test_the_covariance_of_a_link_is_that_of_noisy_drives(calibrated: bool) -> N
 def test_links_of_a_team_carry_robot_and_path() -> None:
     team = small_team(1, robots=2, count=5)
     numbers = numbering(team.graph, members(*team.chains.values()), {0: 0, 1: 1000 * GRID_US})
-    links = factors.links(team.graph, numbers, [0, 1])
+    links = factors.odometry(team.graph, numbers, [0, 1])
     assert links.robot.tolist() == [0] * 4 + [1] * 4
     assert (numbers.robot[links.i] == links.robot).all()
     assert (numbers.robot[links.j] == links.robot).all()
@@ -193,7 +197,7 @@ def test_ranges_end_at_their_keyframes_with_their_antennas() -> None:
 def test_items_wait_for_their_keyframes() -> None:
     graph = two_robots()
     one = GraphEntry(
-        1, (), (), (range_item(33, B, 1035, 4.5),), (closure(0, 33, B, 1035, (1, 0, 0)),)
+        1, None, (), (range_item(33, B, 1035, 4.5),), (closure(0, 33, B, 1035, (1, 0, 0)),)
     )
     graph.insert(A, one)
     assert len(factors.ranges(graph, numbered(graph))[0]) == 0
@@ -223,13 +227,13 @@ def test_withdrawn_closures_and_those_of_other_groups_are_no_edges() -> None:
         closure(0, 20, B, 1025, (1, 0, 0), kept=False),
         closure(1, 20, C, 7, (1, 0, 0)),
     )
-    graph.insert(A, GraphEntry(1, (), (), (range_item(20, C, 7, 1.0),), entries))
+    graph.insert(A, GraphEntry(1, None, (), (range_item(20, C, 7, 1.0),), entries))
     assert len(factors.closures(graph, numbered(graph))) == 0
     assert factors.ranges(graph, numbered(graph))[1] == []
 
 
 def test_no_items_are_no_edges() -> None:
-    assert factors.pose_edges([]).covariance.shape == (0, 3, 3)
+    assert factors.between_factors([]).covariance.shape == (0, 3, 3)
 
 
 # ---- edges that reach far ----

@@ -10,10 +10,11 @@ from scipy.linalg import eigvalsh
 from scipy.optimize import least_squares
 from slam_scenes import NOISE, Array, matrix, same_pose, wander, window_of
 
+from drslamd.slam.range_model import RangeNoise
 from drslamd.slam.relative_pose.gls import middle, refine
 from drslamd.slam.relative_pose.range_fit import RangeFit
 from drslamd.slam.relative_pose.window import Window
-from drslamd.slam.relative_pose.window_noise import RangeNoise, WindowNoise
+from drslamd.slam.relative_pose.window_noise import WindowNoise
 
 RANGES = RangeNoise(0.1, 0.3)
 
@@ -62,7 +63,7 @@ def test_the_pose_and_its_covariance_are_those_of_generalised_least_squares(seed
 
 @pytest.mark.parametrize("scatter", [0.5, 1.5])
 def test_claims_follow_what_ranges_scatter_and_weights_do_not(scatter: float) -> None:
-    """PairNoise drawn as it is claimed, through the weights that were kept: a sandwich."""
+    """Noise drawn as it is claimed, through the weights that were kept: a sandwich."""
     window, true = noisy(7)
     fit, noise = parts(window)
     start = fit.centred(true[None])

@@ -9,9 +9,10 @@ import pytest
 from scipy.linalg import eigvalsh
 from slam_scenes import Array, matrix, same_pose, wander, window_of
 
+from drslamd.slam.range_model import RangeNoise
 from drslamd.slam.relative_pose import range_fit
-from drslamd.slam.relative_pose.range_fit import STEPS, Descent, Minima, RangeFit, stepped
-from drslamd.slam.relative_pose.window_noise import RangeNoise
+from drslamd.slam.relative_pose.descent import ITERATIONS, Descent
+from drslamd.slam.relative_pose.range_fit import Minima, RangeFit, stepped
 
 NOISE = RangeNoise(0.1, 0.3)
 
@@ -116,7 +117,7 @@ def test_a_valley_is_followed_around_its_arc() -> None:
     fit = RangeFit(window.a_points, window.b_points, window.ranges)
     seeds = np.array([true + [0.5, -0.4, 0.0], true + [0.5, -0.4, 2.0]])
     descent = Descent(fit, fit.centred(seeds), NOISE)
-    descent.run(STEPS)
+    descent.run(ITERATIONS)
     refined = fit.poses(descent.minima().centred)
     assert len(refined) == 2
     assert np.hypot(*(refined[:, :2] - true[:2]).T).max() < 0.05
@@ -170,9 +171,9 @@ def test_a_descent_that_is_settled_does_nothing_more() -> None:
     window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [6.0, 0, 0])
     fit = RangeFit(window.a_points, window.b_points, window.ranges)
     once, twice = (Descent(fit, fit.centred(true[None]), NOISE) for _ in range(2))
-    once.run(STEPS)
-    twice.run(STEPS)
-    twice.run(STEPS)
+    once.run(ITERATIONS)
+    twice.run(ITERATIONS)
+    twice.run(ITERATIONS)
     assert np.array_equal(once.minima().centred, twice.minima().centred)
 
 

@@ -10,18 +10,14 @@ import pytest
 from slam_scenes import NOISE, Array, seen_from_last, wander
 
 from drslamd.slam import se2
-from drslamd.slam.odometry.track import OdometryNoise
+from drslamd.slam.odometry.noise import OdometryNoise
+from drslamd.slam.range_model import LINKTRACK, RangeNoise
 from drslamd.slam.relative_pose.window import Window
 from drslamd.slam.relative_pose.window_noise import (
-    SLOW_SHARE,
-    SLOW_TIME_S,
-    RangeNoise,
     WindowNoise,
     moments,
-    near_bias,
     odometry_covariance,
-    range_covariance,
-    twists,
+    way_twists,
 )
 
 QUIET = OdometryNoise(1e-12, 1e-12, 1e-12, 1e-12)
@@ -33,9 +29,6 @@ PARTS = {
     "everything": NOISE,
 }
 
-FAR = np.full(4, 50.0)
-"""Where the bias of short ranges is none."""
-
 
 def from_lower(lower: Array) -> Array:
     """The whole of a symmetric matrix."""
@@ -46,7 +39,7 @@ def of_one_robot(
     points: Array, path: Array, directions: Array, noise: OdometryNoise, before: int
 ) -> Array:
     moment = moments(points @ [1, 1j], directions @ [1, 1j])
-    twist = twists(path[None], [noise], before)
+    twist = way_twists(path[None], [noise], before)
     return from_lower(odometry_covariance(twist, moment[None, None], before)[0])
 
 
@@ -107,22 +100,6 @@ def test_one_measurement_has_no_odometry_in_it() -> None:
     assert of_one_robot(one, one, np.array([[1.0, 0.0]]), NOISE, 1).tolist() == [[0.0]]
 
 
-def test_ranges_share_a_bias_and_a_slow_part() -> None:
-    noise = RangeNoise(0.1, 0.3)
-    t = np.array([-9.0, -8.0, -3.0, 0.0])
-    rng, count = np.random.default_rng(13), 200_000
-    slow = np.empty((count, 4))
-    slow[:, 0] = rng.normal(size=count)
-    for k, gap in enumerate(np.diff(t)):
-        keep = math.exp(-gap / SLOW_TIME_S)
-        slow[:, k + 1] = keep * slow[:, k] + math.sqrt(1 - keep**2) * rng.normal(size=count)
-    white = math.sqrt(1 - SLOW_SHARE**2)
-    errors = 0.1 * (SLOW_SHARE * slow + white * rng.normal(size=(count, 4)))
-    errors += 0.3 * rng.normal(size=(count, 1))
-    seen = errors.T @ errors / count
-    assert np.allclose(range_covariance(t, FAR, noise), seen, atol=1e-3)
-
-
 def drive(reference: int) -> tuple[Window, Array, Array]:
     """A window of 40 measurements, and the antennas of both robots (complex)."""
     rng = np.random.default_rng(14)
@@ -147,7 +124,7 @@ def test_the_noise_of_a_window_is_that_of_its_ranges_and_both_robots(reference: 
         in_a = np.stack([u[k].real, u[k].imag], axis=-1)
         in_b = se2.rotate(-heading[k], in_a)
         expected = (
-            range_covariance(window.t, window.ranges, ranges)
+            LINKTRACK.covariance(window.t, window.ranges, ranges)
             + of_one_robot(a, window.a_poses[:, :2], in_a, NOISE, reference + 1)
             + of_one_robot(b, window.b_poses[:, :2], in_b, of_b, reference + 1)
         )
@@ -164,18 +141,6 @@ def test_an_outlier_that_weighs_a_quarter_is_twice_as_uncertain() -> None:
     assert plain[7, 7] == pytest.approx(0.1**2 + 0.3**2)
     assert thinned[7, 7] == pytest.approx(0.2**2 + 0.3**2)
     assert np.count_nonzero(np.tril(thinned - plain)) == 1
-
-
-def test_short_ranges_share_a_bias_of_their_own() -> None:
-    """As LinkTrack modules were measured: 0.13 m more at 0.5 m, 0.07 m at 1.5 m, none beyond."""
-    assert near_bias(np.array([0.5, 1.5, 8.0])) == pytest.approx([0.14, 0.07, 0.0], abs=0.01)
-    assert near_bias(-0.3) == near_bias(0.0)
-    t, noise = np.array([-100.0, 0.0]), RangeNoise(0.1, 0.3)
-    near = range_covariance(t, np.array([0.5, 1.5]), noise)
-    far = range_covariance(t, FAR[:2], noise)
-    # at one short range as at the other, so their errors add to each other's covariance
-    assert near[0, 1] - far[0, 1] == pytest.approx(0.143 * 0.074, abs=1e-3)
-    assert near[1, 1] - far[1, 1] == pytest.approx(0.074**2, abs=1e-3)
 
 
 @pytest.mark.parametrize("scatter", [0.6, 1.5])

@@ -11,8 +11,8 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
-from lab.accuracy.ablation import PIECES, Piece, without
-from lab.accuracy.accuracy_rows import ROWS, Figure
+from lab.accuracy.ablation import PIECES, Piece
+from lab.accuracy.accuracy_rows import ROWS, Figure, Setup
 from lab.recordings.recording import BadRecording
 
 NOT_REACHED, NO_INPUT = 1, 66
@@ -36,8 +36,8 @@ def main(arguments: list[str] | None = None) -> int:
     if piece.section and f"[{piece.section}]" in extra:
         parser.error(f"--without {options.without} needs [{piece.section}], as does --config")
     try:
-        with without(piece):
-            figures = _measured(options.data, options.only or list(ROWS), extra + piece.toml)
+        setup = Setup(extra + piece.toml, piece.tuning)
+        figures = _measured(options.data, options.only or list(ROWS), setup)
     except BadRecording as error:
         print(error, file=sys.stderr)
         return NO_INPUT
@@ -52,7 +52,7 @@ def main(arguments: list[str] | None = None) -> int:
     return 0 if all(figure.is_reached for figure in figures) else NOT_REACHED
 
 
-def _measured(data: Path, names: list[str], extra: str) -> list[Figure]:
+def _measured(data: Path, names: list[str], setup: Setup) -> list[Figure]:
     """The figures of these rows; what is not there is named.
 
     Raises:
@@ -65,7 +65,7 @@ def _measured(data: Path, names: list[str], extra: str) -> list[Figure]:
             print(f"{name}: no {data / row.needs}", file=sys.stderr)
             continue
         print(f"{name} ...", file=sys.stderr, flush=True)
-        figures += row.measure(data, extra)
+        figures += row.measure(data, setup)
     return figures
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from drslamd.slam.tuning import DEFAULTS, Tuning
 from lab.play import edge_run, virtual_team
 from lab.recordings import injection, murp, pyfg, range_only_cl, swust, vub
 from lab.recordings.recording import EdgeRecording, Recording
@@ -43,11 +44,19 @@ class Figure:
 
 
 @dataclass(frozen=True)
+class Setup:
+    """Of every robot: sections of TOML that it gets, and constants of its estimator."""
+
+    extra: str = ""
+    tuning: Tuning = DEFAULTS
+
+
+@dataclass(frozen=True)
 class Row:
-    """Some figures of one kind of recording; `measure` gets the data folder and extra TOML."""
+    """Some figures of one kind of recording; `measure` gets the data folder and the set-up."""
 
     needs: str
-    measure: Callable[[Path, str], list[Figure]]
+    measure: Callable[[Path, Setup], list[Figure]]
 
 
 def _median(figures: Iterable[list[Figure]]) -> list[Figure]:
@@ -65,9 +74,11 @@ def _median(figures: Iterable[list[Figure]]) -> list[Figure]:
 TIERS = "tiers_turtlebots/tiers_4robots_cora.pyfg"
 
 
-def _tiers(data: Path, extra: str) -> list[Figure]:
+def _tiers(data: Path, setup: Setup) -> list[Figure]:
     recording = pyfg.read(data / TIERS)
-    team = outcome.score(recording, virtual_team.run(recording, extra=extra))["team"]
+    team = outcome.score(
+        recording, virtual_team.run(recording, extra=setup.extra, tuning=setup.tuning)
+    )["team"]
     return [
         Figure("TIERS", "joint ATE RMSE", team["ate_rmse_m"], 0.035, "m"),
         Figure("TIERS", "rotation, mean", team["rot_mean_deg"], 1.8, "deg"),
@@ -75,12 +86,12 @@ def _tiers(data: Path, extra: str) -> list[Figure]:
     ]
 
 
-def _tiers_wronged(data: Path, extra: str) -> list[Figure]:
+def _tiers_wronged(data: Path, setup: Setup) -> list[Figure]:
     recording = pyfg.read(data / TIERS)
 
     def once(seed: int) -> list[Figure]:
         played = injection.wronged(recording, 0.10, seed)
-        result = virtual_team.run(played, seed=seed, extra=extra)
+        result = virtual_team.run(played, seed=seed, extra=setup.extra, tuning=setup.tuning)
         team = outcome.score(played, result)["team"]
         ate = team["ate_rmse_m"] if team else float("inf")
         name = "TIERS, 10 % in bursts, biases, seeds 0-9"
@@ -106,8 +117,8 @@ def _pair_figures(
     return out
 
 
-def _played(recording: Recording, extra: str) -> tuple[Outcome, RelativeErrors, RelativeErrors]:
-    result = virtual_team.run(recording, extra=extra)
+def _played(recording: Recording, setup: Setup) -> tuple[Outcome, RelativeErrors, RelativeErrors]:
+    result = virtual_team.run(recording, extra=setup.extra, tuning=setup.tuning)
     return (
         result,
         relative_errors.of_windows(recording, result),
@@ -115,20 +126,20 @@ def _played(recording: Recording, extra: str) -> tuple[Outcome, RelativeErrors, 
     )
 
 
-def _vub(data: Path, extra: str) -> list[Figure]:
+def _vub(data: Path, setup: Setup) -> list[Figure]:
     """Of windows that had 40 s to look back on, as the figure wanted has it."""
     recording = vub.read(data / "vub_two_turtlebots" / "exp4_los.csv")
-    _, windows, live = _played(recording, extra)
+    _, windows, live = _played(recording, setup)
     full = [errors.chosen(errors.t >= MEMORY_S) for errors in (windows, live)]
     return _pair_figures(f"VUB exp4, after {MEMORY_S:.0f} s", full[0], full[1], 0.15, 3.0)
 
 
-def _vub_broken(data: Path, extra: str) -> list[Figure]:
+def _vub_broken(data: Path, setup: Setup) -> list[Figure]:
     """Accepted are windows with one pose that module 2 kept."""
     found: list[float] = []
     for number in (1, 2, 3):
         recording = vub.read(data / "vub_two_turtlebots" / f"exp{number}_los.csv")
-        result = virtual_team.run(recording, extra=extra)
+        result = virtual_team.run(recording, extra=setup.extra, tuning=setup.tuning)
         accepted = [c for c in result.closures if c.kept and c.verdict == "unique"]
         when = np.array([c.t for c in accepted])
         touched = _while_broken(recording, when)
@@ -162,9 +173,9 @@ def _while_broken(recording: Recording, when: NDArray[np.float64]) -> NDArray[np
     return touched
 
 
-def _range_only(data: Path, extra: str) -> list[Figure]:
+def _range_only(data: Path, setup: Setup) -> list[Figure]:
     recording = range_only_cl.read(data / "range_only_cl" / "data190313.mat")
-    result, windows, live = _played(recording, extra)
+    result, windows, live = _played(recording, setup)
     a, b = sorted(recording.trails)
 
     def both(errors: RelativeErrors) -> RelativeErrors:
@@ -185,13 +196,13 @@ def true_bias(recording: Recording, a: int, b: int) -> float:
     return float(np.median(rows[:, 3] - np.hypot(ends[:, 0], ends[:, 1])))
 
 
-def _murp(data: Path, extra: str) -> list[Figure]:
+def _murp(data: Path, setup: Setup) -> list[Figure]:
     figures = []
     for trial in ("16", "17"):
         path = data / "murp_linktrack" / f"{trial}_base-2_targ-3_win-1_step-1.csv"
 
         def once(seed: int, path: Path = path, trial: str = trial) -> list[Figure]:
-            _, windows, live = _played(murp.read(path, seed), extra)
+            _, windows, live = _played(murp.read(path, seed), setup)
             return _pair_figures(f"MURP {trial}, seeds 0-9", windows, live, 0.15, 3.0)
 
         figures += _median(map(once, SEEDS))
@@ -206,17 +217,17 @@ MISLED = 20
 """False edges that agree, and all that a pair has."""
 
 
-def _swust(data: Path, extra: str) -> list[Figure]:
+def _swust(data: Path, setup: Setup) -> list[Figure]:
     """Worst of the seeds."""
     recording = swust.read(data / "swust_three_robots")
-    clean = edge_run.run(recording, extra)[0]
+    clean = edge_run.run(recording, setup.extra, tuning=setup.tuning)[0]
     clean_ate = _ate(recording, clean)
     figures = []
     for share, precision in PRECISION.items():
         kept_true, kept_share, ratios = [], [], []
         for seed in EDGE_SEEDS:
             played, is_true = injection.with_false_edges(recording, share, seed)
-            result, kept = edge_run.run(played, extra)
+            result, kept = edge_run.run(played, setup.extra, tuning=setup.tuning)
             kept_true.append(float(is_true[kept].mean()))
             kept_share.append(float(kept[is_true].mean()))
             ratios.append(_ate(played, result) / clean_ate)
@@ -229,7 +240,7 @@ def _swust(data: Path, extra: str) -> list[Figure]:
     return figures
 
 
-def _swust_misled(data: Path, extra: str) -> list[Figure]:
+def _swust_misled(data: Path, setup: Setup) -> list[Figure]:
     """One pair at a time is wrong as a whole, and module 2 cannot see it; against a run without
     that pair, of which nothing better is known then."""
     recording = swust.read(data / "swust_three_robots")
@@ -238,7 +249,10 @@ def _swust_misled(data: Path, extra: str) -> list[Figure]:
         others = (recording.edges[:, 1:3] != pair).any(axis=1)
         without = replace(recording, edges=recording.edges[others])
         played = injection.misled(recording, pair, MISLED, seed)
-        both = [edge_run.run(r, extra, optimizer="closures")[0] for r in (played, without)]
+        both = [
+            edge_run.run(r, setup.extra, optimizer="closures", tuning=setup.tuning)[0]
+            for r in (played, without)
+        ]
         ratios.append(_ate(played, both[0]) / _ate(without, both[1]))
     name = f"SWUST, one pair has {MISLED} false edges that agree, worst of three pairs"
     return [Figure(name, "ATE over that without the pair, `closures`", max(ratios), RATIO)]

@@ -8,7 +8,7 @@ import numpy as np
 
 from drslamd.slam import se2
 from drslamd.slam.consistency.pcm import Candidate
-from drslamd.slam.odometry.track import OdometryNoise, growth
+from drslamd.slam.odometry.noise import OdometryNoise, growth
 
 NOISE = OdometryNoise(1e-3, 1e-3, 0.04, 0.016)
 """Steps of a quarter of a metre with sigmas of 0.02 m and 0.008 rad, as in the team graphs."""

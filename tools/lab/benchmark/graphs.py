@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
+from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from lab.recordings import g2o
 from lab.recordings.recording import Array
 
@@ -87,10 +87,10 @@ class Graph:
         return place
 
     @cached_property
-    def edges(self) -> ComplexEdges:
+    def edges(self) -> ComplexFactors:
         """Between poses by their places."""
         x, y, theta = self.read.measured.T
-        return ComplexEdges(
+        return ComplexFactors(
             self.place[self.read.i], self.place[self.read.j],
             np.exp(1j * theta), x + 1j * y, self.kappa, self.tau,
         )  # fmt: skip

@@ -74,7 +74,7 @@ def _driven(marks: dict[str, int]) -> dict[str, tuple[float, int]]:
         taken = _update(back)
         for name in reached:
             at_marks[name].append(taken)
-            held[name] = sum(len(items.rows) for items in back.graph.chains.values())
+            held[name] = sum(len(items.keyframes.rows) for items in back.graph.chains.values())
     return {name: (float(np.median(ms)), held[name]) for name, ms in at_marks.items()}
 
 
@@ -82,9 +82,9 @@ def _update(back: BackEnd) -> float:
     """ms of CPU for all that a robot does each second with the graph that it holds."""
     started = timing.now_ms()
     back.digest()
-    job = back.job(set(range(ROBOTS)), {}, {})
+    job = back.begin(set(range(ROBOTS)), {}, {})
     if job is not None:
-        back.solved(job())
+        back.on_solution(job())
     return timing.now_ms() - started
 
 
@@ -113,7 +113,7 @@ def _entry(
                             (float(a_T_b[0]), float(a_T_b[1]), float(a_T_b[2])),
                             (0.01, 0.0, 0.0, 0.01, 0.0, 0.01))
             )  # fmt: skip
-    return GraphEntry(second, (), (frame,), tuple(ranges), tuple(closures))
+    return GraphEntry(second, None, (frame,), tuple(ranges), tuple(closures))
 
 
 def _wander(rng: np.random.Generator, seconds: int) -> Array:

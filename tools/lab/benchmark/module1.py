@@ -8,9 +8,11 @@ from itertools import cycle
 import numpy as np
 from scipy.optimize import least_squares
 
+from drslamd.slam.closure_method import POINTS
 from drslamd.slam.relative_pose import coarse_search, solver
-from drslamd.slam.relative_pose.pair_window import POINTS
-from drslamd.slam.relative_pose.range_fit import STEPS, Descent, RangeFit
+from drslamd.slam.relative_pose.descent import ITERATIONS, Descent
+from drslamd.slam.relative_pose.estimate import RelativePoseEstimate
+from drslamd.slam.relative_pose.range_fit import RangeFit
 from drslamd.slam.relative_pose.window import Window, binned
 from lab.benchmark import timing, windows
 from lab.benchmark.rows import Peer, Row
@@ -60,7 +62,7 @@ def one_seed(window: Window) -> Array:
     return refined(window, 1)
 
 
-def full(window: Window) -> solver.RelativePoseEstimate:
+def full(window: Window) -> RelativePoseEstimate:
     """What the daemon does with every window: into bins, solved with a verdict."""
     width = max(1.0 / windows.HZ, np.ptp(window.t) / POINTS)
     t, ranges, _ = binned(window.t, window.ranges, float(width))
@@ -79,7 +81,7 @@ def refined(window: Window, seeds: int) -> Array:
     found = coarse_search.seeds(a, b, window.ranges, rho, DELTA, seeds)
     fit = RangeFit(a, b, window.ranges)
     descent = Descent(fit, fit.centred(found), windows.NOISE.ranges)
-    descent.run(STEPS)
+    descent.run(ITERATIONS)
     return fit.poses(descent.minima().centred)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
+from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.optimizer.rbcd import block_descent
 from lab.benchmark import distributed, graphs, timing
 from lab.benchmark.graphs import Graph
@@ -181,10 +182,10 @@ def _descended(graph: Graph, lifted: Array, robot: Array, number: int) -> Array:
     place[mine] = np.arange(len(mine))
     inside_i, inside_j = robot[edges.i] == number, robot[edges.j] == number
 
-    def numbered(which: Array, own_i: bool, own_j: bool) -> block_descent.ComplexEdges:
+    def numbered(which: Array, own_i: bool, own_j: bool) -> ComplexFactors:
         e = edges.chosen(which)
         i, j = place[e.i] if own_i else e.i, place[e.j] if own_j else e.j
-        return block_descent.ComplexEdges(i, j, e.turn, e.shift, e.kappa, e.tau)
+        return ComplexFactors(i, j, e.turn, e.shift, e.kappa, e.tau)
 
     block = block_descent.block(
         numbered(inside_i & inside_j, True, True),

@@ -9,7 +9,7 @@ import numpy as np
 from drslamd.slam import se2
 from drslamd.slam.consistency.pcm import PairConsistency
 from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
-from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
+from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.relative_pose import solver
 from lab.benchmark import closures, module1, timing, windows
 from lab.benchmark.rows import Peer, Row
@@ -54,7 +54,7 @@ class Update:
             PoseGraphSolver(self._edges, ROBOTS * SECONDS).solve(self._solved)
 
 
-def _team_edges(rng: np.random.Generator) -> ComplexEdges:
+def _team_edges(rng: np.random.Generator) -> ComplexFactors:
     """Three wandering robots; pose k of robot r is number 3 k + r."""
     truth = np.zeros((SECONDS * ROBOTS, 3))
     truth[:ROBOTS] = rng.uniform(-5, 5, (ROBOTS, 3))
@@ -70,7 +70,7 @@ def _team_edges(rng: np.random.Generator) -> ComplexEdges:
     measured = se2.between(truth[start], truth[end])
     measured += sigmas[:, [0, 0, 1]] * rng.normal(size=measured.shape)
     x, y, theta = measured.T
-    return ComplexEdges(
+    return ComplexFactors(
         start, end, np.exp(1j * theta), x + 1j * y,
         sigmas[:, 1] ** -2.0, sigmas[:, 0] ** -2.0,
     )  # fmt: skip

@@ -15,9 +15,8 @@ from drslamd.conventions import MAX_ROBOT_ID, Chain
 from drslamd.slam.graph.measurements import RelativePoses
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
-from drslamd.slam.optimizer.problem import Index
-from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
-from drslamd.slam.se2 import Array
+from drslamd.slam.optimizer.complex_factors import ComplexFactors
+from drslamd.slam.se2 import Array, Index
 
 ROBOTS = MAX_ROBOT_ID + 1
 
@@ -53,7 +52,7 @@ def solve(graph: PoseGraph, own: Chain) -> SolvedPoses | None:
     ]
     if not parts:
         return None
-    edges = ComplexEdges.joined(parts)
+    edges = ComplexFactors.joined(parts)
     keys, ends = np.unique(np.concatenate([edges.i, edges.j]), return_inverse=True)
     i, j = np.split(ends, 2)
     label = components(i, j, len(keys))
@@ -69,10 +68,10 @@ def solve(graph: PoseGraph, own: Chain) -> SolvedPoses | None:
     return SolvedPoses(keys % ROBOTS, keys // ROBOTS, answer.poses, answer.cost, answer.converged)
 
 
-def _keyed(origin: Chain, batch: RelativePoses) -> ComplexEdges:
+def _keyed(origin: Chain, batch: RelativePoses) -> ComplexFactors:
     """Ends are named by one number for each keyframe; these sort by n, then by robot."""
     a, b = np.array(batch.a_n, dtype=np.int64), np.array(batch.b_n, dtype=np.int64)
-    return ComplexEdges.relative(a * ROBOTS + origin.robot, b * ROBOTS + batch.chain.robot, batch)
+    return ComplexFactors.relative(a * ROBOTS + origin.robot, b * ROBOTS + batch.chain.robot, batch)
 
 
 def components(i: Index, j: Index, count: int) -> Index:

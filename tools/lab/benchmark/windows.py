@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from drslamd.slam import se2
-from drslamd.slam.odometry.track import OdometryNoise
-from drslamd.slam.relative_pose.solver import PairNoise
+from drslamd.slam.odometry.noise import OdometryNoise
+from drslamd.slam.range_model import RangeNoise
+from drslamd.slam.relative_pose.estimate import PairNoise
 from drslamd.slam.relative_pose.window import Window
-from drslamd.slam.relative_pose.window_noise import RangeNoise
 from lab.recordings.recording import Array
 
 SPEED_M_S, HZ, SIGMA_M = 0.5, 10, 0.1

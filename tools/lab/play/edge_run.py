@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 
 from drslamd.config import Config, parse
 from drslamd.conventions import GRID_HZ, ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain
-from drslamd.slam import se2
+from drslamd.slam import se2, settings
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.consistency.pcm import Candidate, PairConsistency
 from drslamd.slam.graph.measurements import ClosureMeasurement, GraphEntry, Keyframe, PublicPoses
-from drslamd.slam.odometry.track import OdometryNoise, growth
+from drslamd.slam.odometry.noise import OdometryNoise, growth
+from drslamd.slam.robot_model import RobotModel
+from drslamd.slam.tuning import DEFAULTS, Tuning
 from lab.recordings.recording import Array, EdgeRecording, Trail
 from lab.score import metrics
 from lab.score.outcome import Closure, Outcome, Path
@@ -44,6 +46,7 @@ def run(
     extra: str = "",
     progress: Callable[[float], None] | None = None,
     optimizer: str = "rbcd",
+    tuning: Tuning = DEFAULTS,
 ) -> tuple[Outcome, NDArray[np.bool_]]:
     """What the team makes of the edges, and which of them it kept (k,).
 
@@ -51,12 +54,15 @@ def run(
         extra: TOML sections for every robot.
         progress: told how many rounds are done.
         optimizer: `optimizer.algorithm` of every robot.
+        tuning: of its estimator.
     """
     configs = {robot: _config(robot, optimizer, extra) for robot in recording.trails}
-    noise = OdometryNoise.from_config(next(iter(configs.values())).odometry)
+    noise = settings.odometry_noise(next(iter(configs.values())).odometry)
     chains = {robot: _chain(recording, trail) for robot, trail in recording.trails.items()}
     kept = consistent(recording, chains, noise, configs[min(configs)].consistency.epsilon)
-    backs = {robot: BackEnd(config, Chain(robot, EPOCH)) for robot, config in configs.items()}
+    backs = {
+        robot: BackEnd(config, Chain(robot, EPOCH), tuning) for robot, config in configs.items()
+    }
     for robot, entries in _logs(recording, chains, kept, noise).items():
         for entry in entries:
             for back in backs.values():
@@ -96,7 +102,10 @@ def consistent(
         rows = np.flatnonzero((recording.edges[:, 1] == a) & (recording.edges[:, 2] == b))
         for row in rows.tolist():
             n = round(recording.edges[row, 0] * GRID_HZ)
-            i, j = np.searchsorted(chains[a].n, n), np.searchsorted(chains[b].n, n)
+            i, j = (
+                np.searchsorted(chains[a].n, n),
+                np.searchsorted(chains[b].n, n),
+            )
             pair.add(
                 Candidate(
                     row,
@@ -122,8 +131,6 @@ def _logs(
     noise: OdometryNoise,
 ) -> dict[int, list[GraphEntry]]:  # fmt: skip
     """What each robot would have told the others."""
-    traits = (noise.scale, noise.yaw_rad_per_m, noise.translation_per_sqrt_m,
-              noise.yaw_rad_per_sqrt_m, 0.0, 0.0, 0.0)  # fmt: skip
     covariance = se2.packed(_covariance(recording))
     logs = {}
     for robot, chain in chains.items():
@@ -140,7 +147,7 @@ def _logs(
             n = round(t * GRID_HZ) + EARLIER
             peer = Chain(int(b), EPOCH)
             closures.append(ClosureMeasurement(row, True, n, peer, n, (x, y, yaw), covariance))
-        logs[robot] = [GraphEntry(0, traits, tuple(keyframes), (), tuple(closures))]
+        logs[robot] = [GraphEntry(0, RobotModel(noise), tuple(keyframes), (), tuple(closures))]
     return logs
 
 
@@ -152,12 +159,12 @@ def _optimise(backs: dict[int, BackEnd], progress: Callable[[float], None] | Non
         jobs = 0
         for robot, back in backs.items():
             others = {k: p for k, p in public.items() if k != robot}
-            job = back.job(robots, dict.fromkeys(robots, 0), others)
+            job = back.begin(robots, dict.fromkeys(robots, 0), others)
             if job is None:
                 continue
             jobs += 1
             result = job()
-            back.solved(result)
+            back.on_solution(result)
             poses = back.public_poses()
             if poses is not None and (robot not in public or not result.converged):
                 public[robot] = poses

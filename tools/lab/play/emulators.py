@@ -12,7 +12,7 @@ from typing import Protocol
 
 U32 = 0xFFFFFFFF
 
-Block = tuple[int, float, bytes]
+BlockProblem = tuple[int, float, bytes]
 """Peer, range in metres, the two bytes of its powers."""
 
 
@@ -51,7 +51,7 @@ class LinkTrackEmulator:
         """Powers of the first path and of all, half a decibel each; the latter is -78 dB."""
         return bytes([156 + round(2 * gap_db), 156])
 
-    def _node2(self, system: int, local: int, blocks: Sequence[Block]) -> bytes:
+    def _node2(self, system: int, local: int, blocks: Sequence[BlockProblem]) -> bytes:
         head = struct.pack("<BBH BB I", 0x55, 4, 120 + 13 * len(blocks), 0, self.uwb_id, system)
         head += bytes(92) + struct.pack("<I", local) + bytes(10)
         head += struct.pack("<HB", 4900, len(blocks))
@@ -60,7 +60,7 @@ class LinkTrackEmulator:
             head += struct.pack("<I", system) + bytes(2)
         return _summed(head)
 
-    def _node3(self, system: int, local: int, blocks: Sequence[Block]) -> bytes:
+    def _node3(self, system: int, local: int, blocks: Sequence[BlockProblem]) -> bytes:
         length = 22 + 7 * len(blocks)
         head = struct.pack("<BBH BB II", 0x55, 5, length, 0, self.uwb_id, local, system)
         head += bytes(4) + struct.pack("<HB", 4900, len(blocks))
@@ -68,7 +68,7 @@ class LinkTrackEmulator:
             head += struct.pack("<BB", 0, peer) + _int24(round(metres * 1000)) + signal
         return _summed(head)
 
-    def _node5(self, system: int, local: int, blocks: Sequence[Block]) -> bytes:
+    def _node5(self, system: int, local: int, blocks: Sequence[BlockProblem]) -> bytes:
         length = 25 + 10 * len(blocks)
         head = struct.pack("<BBH BI II", 0x55, 8, length, 0, self.uwb_id, local, 0)
         head += bytes(4) + struct.pack("<HB", 4900, len(blocks))

@@ -36,7 +36,8 @@ from drslamd.events import (
 from drslamd.gossip import lc02
 from drslamd.gossip.seal import team_key
 from drslamd.robot import Robot
-from drslamd.slam.calibration.calibration_store import UNLEARNED, SensorCalibration
+from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
+from drslamd.slam.tuning import DEFAULTS, Tuning
 from lab.play.playback import Chunk, Hardware
 
 
@@ -105,7 +106,11 @@ class Simulator:
     """A team in virtual time."""
 
     def __init__(
-        self, seed: int = 0, network: Network | None = None, solve_us: int | None = 20_000
+        self,
+        seed: int = 0,
+        network: Network | None = None,
+        solve_us: int | None = 20_000,
+        tuning: Tuning = DEFAULTS,
     ) -> None:
         self.now = 0
         self.network = network or Network()
@@ -114,6 +119,7 @@ class Simulator:
         self._everyone: list[Member] = []
         self._rng = np.random.default_rng(seed)
         self._solve_us = solve_us
+        self._tuning = tuning
         self._heap: list[tuple[int, int, Callable[[], None]]] = []
         self._order = itertools.count()
         self._sequence = itertools.count()
@@ -131,7 +137,9 @@ class Simulator:
         """Switch a robot on, now."""
 
         def renew(fresh: int) -> Robot:
-            return Robot(config, team_key(secret), fresh, dict(epochs or {}), kept)
+            return Robot(
+                config, team_key(secret), fresh, dict(epochs or {}), kept, tuning=self._tuning
+            )
 
         member = Member(renew(epoch), renew, clock or Clock(), hardware, Traces())
         self.members[config.robot.id] = member

@@ -9,6 +9,7 @@ import numpy as np
 
 from drslamd import report
 from drslamd.gossip import messages
+from drslamd.slam.tuning import DEFAULTS, Tuning
 from lab.play.playback import Hardware, equip, robot_config
 from lab.play.simulator import Clock, Member, Network, Simulator
 from lab.recordings.recording import Recording
@@ -30,9 +31,10 @@ def run(
     extra: str = "",
     hardware: dict[int, Hardware] | None = None,
     progress: Callable[[float], None] | None = None,
+    tuning: Tuning = DEFAULTS,
 ) -> Outcome:
     """Play the whole recording and ask the team what it found; arguments as in `play`."""
-    return outcome(play(recording, seed, network, extra, hardware, progress))
+    return outcome(play(recording, seed, network, extra, hardware, progress, tuning=tuning))
 
 
 def play(
@@ -43,6 +45,7 @@ def play(
     hardware: dict[int, Hardware] | None = None,
     progress: Callable[[float], None] | None = None,
     solve_us: int | None = 20_000,
+    tuning: Tuning = DEFAULTS,
 ) -> Simulator:
     """Play the whole recording.
 
@@ -50,9 +53,10 @@ def play(
         extra: TOML sections that every robot's configuration gets.
         progress: told the seconds that have passed.
         solve_us: how long a computation takes there; None as long as it takes here.
+        tuning: of every robot's estimator.
     """
     rng = np.random.default_rng(seed)
-    simulator = Simulator(seed, network, solve_us)
+    simulator = Simulator(seed, network, solve_us, tuning)
     for device in (hardware or equip(recording)).values():
         member = simulator.add(robot_config(device, extra), skewed_clock(rng), device)
         simulator.play(member, device.chunks())

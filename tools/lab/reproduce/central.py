@@ -15,7 +15,7 @@ from scipy.sparse.linalg import spsolve
 
 from drslamd.slam import se2
 from drslamd.slam.optimizer.factors import chain_links
-from drslamd.slam.optimizer.problem import PoseEdges, pose_errors
+from drslamd.slam.optimizer.problem import BetweenFactors, pose_errors
 from lab.recordings.recording import Array
 from lab.reproduce.dpgo import chain
 from lab.reproduce.experiment import GRID_S, POSE_TIMES, Trial
@@ -67,7 +67,7 @@ class Measured:
     """
 
     start: tuple[Array, Array]
-    odometry: PoseEdges
+    odometry: BetweenFactors
     whiten: Array
     i: Array
     j: Array
@@ -102,7 +102,7 @@ def measured(trial: Trial) -> Measured:
     """A trial's odometry between pose times, and the ranges at them."""
     size, robots = len(POSE_TIMES), sorted(trial.odometry)
     links = [chain_links(chain(trial.odometry[r], r), calibrated=False) for r in robots]
-    odometry = PoseEdges(
+    odometry = BetweenFactors(
         np.concatenate([size * r + e.i for r, e in zip(robots, links, strict=True)]),
         np.concatenate([size * r + e.j for r, e in zip(robots, links, strict=True)]),
         np.concatenate([e.measured for e in links]),
@@ -138,7 +138,7 @@ def _linearised(data: Measured, poses: Array) -> tuple[Array, csc_array]:
     return rows.together(poses.size)
 
 
-def _link_slopes(poses: Array, edges: PoseEdges) -> tuple[Array, Array]:
+def _link_slopes(poses: Array, edges: BetweenFactors) -> tuple[Array, Array]:
     """(m, 3, 3) of the errors of relative poses by pose i and by pose j."""
     theta = poses[edges.i, 2]
     cos, sin = np.cos(theta), np.sin(theta)

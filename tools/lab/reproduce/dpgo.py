@@ -2,7 +2,7 @@
 
     min  sum kappa |z_j - z_i z_ij|^2 + tau |p_j - p_i - z_i t_ij|^2,   |z_k| = 1
 
-with weights and notation of `drslamd.slam.rbcd`. Block coordinate descent needs hundreds of rounds
+with weights and notation of `block_descent`. Block coordinate descent needs hundreds of rounds
 to get there, and how far it came is no property of the method; so the tables show the minimum
 itself: chordal initialisation as in DPGO, then Levenberg-Marquardt.
 """
@@ -16,11 +16,12 @@ from scipy.sparse import coo_array, csc_array, diags_array
 from scipy.sparse.linalg import spsolve
 
 from drslamd.conventions import ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain
+from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import Keyframe
-from drslamd.slam.graph.pose_graph import ChainData
+from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.optimizer.factors import chain_links
-from drslamd.slam.optimizer.problem import PoseEdges
-from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
+from drslamd.slam.optimizer.problem import BetweenFactors
+from drslamd.slam.robot_model import RobotModel
 from lab.recordings.recording import Array
 from lab.reproduce.paper_column import NOISE, Closures
 
@@ -35,13 +36,13 @@ class Graph:
 
     robots: int
     size: int
-    edges: ComplexEdges
+    edges: ComplexFactors
 
 
 def chain(odometry: Array, robot: int) -> ChainData:
     """Dead-reckoned poses (n, 3) as keyframes."""
     items = ChainData(Chain(robot, 1))
-    items.noise = NOISE
+    items.model = RobotModel(NOISE)
     steps = np.array([TRANSLATION_STEP_M, TRANSLATION_STEP_M, ROTATION_STEP_RAD])
     for n, (x, y, theta) in enumerate(np.round(odometry / steps).astype(int).tolist()):
         items.add(Keyframe(n, 0, x, y, theta))
@@ -52,16 +53,16 @@ def graph(odometry: dict[int, Array], kept: dict[tuple[int, int], Closures]) -> 
     """Of robots 0, 1 ...; every one has to have a closure."""
     count = len(odometry)
     parts = [
-        PoseEdges(count * e.i + r, count * e.j + r, e.measured, e.covariance)
+        BetweenFactors(count * e.i + r, count * e.j + r, e.measured, e.covariance)
         for r, e in ((r, chain_links(chain(o, r), calibrated=False)) for r, o in odometry.items())
     ]
     parts += [
-        PoseEdges(count * c.k + a, count * c.k + b, c.poses, c.covariances)
+        BetweenFactors(count * c.k + a, count * c.k + b, c.poses, c.covariances)
         for (a, b), c in kept.items()
     ]
     columns = zip(*((e.i, e.j, e.measured, e.covariance) for e in parts), strict=True)
-    edges = PoseEdges(*(np.concatenate(column) for column in columns))
-    return Graph(count, count * len(odometry[0]), ComplexEdges.of(edges))
+    edges = BetweenFactors(*(np.concatenate(column) for column in columns))
+    return Graph(count, count * len(odometry[0]), ComplexFactors.of(edges))
 
 
 def solve(problem: Graph) -> dict[int, Array]:

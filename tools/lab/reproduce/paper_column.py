@@ -14,11 +14,13 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from drslamd.config import ConsistencySection, OdometrySection, RelativePoseSection
+from drslamd.slam import settings
 from drslamd.slam.chi_squared import quantile3
 from drslamd.slam.consistency.clique import IncrementalClique, bits
 from drslamd.slam.consistency.pcm import Candidate, PairConsistency
-from drslamd.slam.odometry.track import OdometryNoise, growth
-from drslamd.slam.relative_pose import solver
+from drslamd.slam.odometry.noise import growth
+from drslamd.slam.relative_pose import algorithm_1
+from drslamd.slam.relative_pose.estimate import Hypothesis
 from drslamd.slam.relative_pose.window import Window
 from lab.recordings.recording import Array
 from lab.reproduce.experiment import WHEELS, Trial
@@ -26,7 +28,7 @@ from lab.reproduce.experiment import WHEELS, Trial
 SIGMA_R = RelativePoseSection().range_sigma_m
 DELTA = RelativePoseSection().delta
 EPSILON = ConsistencySection().epsilon
-NOISE = OdometryNoise.from_config(OdometrySection(
+NOISE = settings.odometry_noise(OdometrySection(
     scale_sigma=WHEELS.scale,
     yaw_sigma_deg_per_m=WHEELS.yaw_deg_per_m,
     random_translation_per_sqrt_m=WHEELS.translation_per_sqrt_m,
@@ -63,28 +65,28 @@ def nls(window: Window, seed: int) -> Array:
     a, b = window.a_points, window.b_points
 
     def error(pose: Array) -> Array:
-        return np.asarray(solver.residuals(pose[None], a, b, window.ranges)[0][0])
+        return np.asarray(algorithm_1.linear(pose[None], a, b, window.ranges)[0][0])
 
     def slope(pose: Array) -> Array:
-        return np.asarray(solver.residuals(pose[None], a, b, window.ranges)[2][0])
+        return np.asarray(algorithm_1.linear(pose[None], a, b, window.ranges)[1][0])
 
     return np.asarray(least_squares(error, guess, slope, method="lm").x)
 
 
 def coarse(window: Window, delta: float) -> Array:
     """Algorithm 1 alone."""
-    return solver.coarse_paper(window.a_points, window.b_points, window.ranges, delta)
+    return algorithm_1.coarse_search(window.a_points, window.b_points, window.ranges, delta)
 
 
 def closures(trial: Trial, pair: tuple[int, int], tau: int, ms: list[float]) -> Closures:
     """Coarse search and optimisation at every pose time; its times are added to `ms`."""
-    found: list[tuple[int, solver.Hypothesis]] = []
+    found: list[tuple[int, Hypothesis]] = []
     for k in range(len(trial.truth[pair[0]])):
         window = trial.window(pair, k, tau)
         if window is None:
             continue
         start = time.perf_counter()
-        estimate = solver.solve_paper(window, SIGMA_R, DELTA)
+        estimate = algorithm_1.solve(window, SIGMA_R, DELTA)
         ms.append((time.perf_counter() - start) * 1e3)
         found += [(k, hypothesis) for hypothesis in estimate.hypotheses]
     return Closures(

@@ -12,7 +12,7 @@ matplotlib.use("Agg")
 import numpy as np
 from matplotlib import pyplot as plt
 
-from drslamd.slam.relative_pose import solver
+from drslamd.slam.relative_pose import algorithm_1
 from drslamd.slam.relative_pose.window import Window
 from lab.recordings.recording import Array
 from lab.reproduce import dpgo, paper_column
@@ -45,7 +45,7 @@ def mean_residuals(window: Window) -> tuple[Array, Array]:
     phi, theta = (x.ravel() for x in np.meshgrid(angles, angles, indexing="ij"))
     r = window.ranges[-1]
     poses = np.stack([r * np.cos(phi), r * np.sin(phi), theta], axis=-1)
-    found = solver.residuals(poses, window.a_points, window.b_points, window.ranges)[0]
+    found = algorithm_1.window_residuals(poses, window.a_points, window.b_points, window.ranges)
     return angles, np.abs(found).mean(axis=1).reshape(len(angles), len(angles))
 
 

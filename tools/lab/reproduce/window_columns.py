@@ -10,12 +10,12 @@ import numpy as np
 
 from drslamd.config import OdometrySection, RelativePoseSection
 from drslamd.conventions import GRID_HZ
-from drslamd.slam.odometry.track import OdometryNoise
-from drslamd.slam.relative_pose import solver
-from drslamd.slam.relative_pose.pair_window import POINTS
-from drslamd.slam.relative_pose.solver import PairNoise, RelativePoseEstimate, Verdict
+from drslamd.slam import settings
+from drslamd.slam.closure_method import POINTS
+from drslamd.slam.range_model import RangeNoise
+from drslamd.slam.relative_pose import algorithm_1, solver
+from drslamd.slam.relative_pose.estimate import PairNoise, RelativePoseEstimate, Verdict
 from drslamd.slam.relative_pose.window import Window
-from drslamd.slam.relative_pose.window_noise import RangeNoise
 from lab.recordings.recording import Array
 from lab.reproduce import paper_column
 from lab.reproduce.experiment import PAIRS, Trial, pose_errors
@@ -39,7 +39,7 @@ ODOMETRY_NOISE = ((0.0, 0.0), (0.01, 0.5), (0.02, 1.0), (0.05, 2.0), (0.1, 4.0))
 def default_noise() -> PairNoise:
     """What the daemon tells `solve` by default."""
     section = RelativePoseSection()
-    wheels = OdometryNoise.from_config(OdometrySection())
+    wheels = settings.odometry_noise(OdometrySection())
     ranges = RangeNoise(section.range_sigma_m, section.range_bias_sigma_m)
     return PairNoise(ranges, wheels, wheels)
 
@@ -85,7 +85,7 @@ def _paper_ways(tally: Tally, name: str, window: Window, case: Case, seed: int) 
     ways = {
         "nls": lambda: paper_column.nls(window, arbitrary),
         "coarse": lambda: paper_column.coarse(window, DELTA),
-        "both": lambda: solver.solve_paper(window, SIGMA_R, DELTA).hypotheses[0].a_T_b,
+        "both": lambda: algorithm_1.solve(window, SIGMA_R, DELTA).hypotheses[0].a_T_b,
     }
     for way, run in ways.items():
         pose, ms = paper_column.timed(run)
@@ -136,7 +136,7 @@ def _by_delta(tally: Tally, trial: Trial, every: int, delta: float) -> None:
         start = time.perf_counter()
         coarse = paper_column.coarse(window, delta)
         searched = time.perf_counter()
-        paper = solver.solve_paper(window, SIGMA_R, delta)
+        paper = algorithm_1.solve(window, SIGMA_R, delta)
         refined = time.perf_counter()
         answer = solver.solve(own, default_noise(), delta)
         tally.add(f"{name}/coarse/ms", (searched - start) * 1e3)
@@ -153,7 +153,7 @@ def _both(tally: Tally, name: str, trial: Trial, every: int, farthest: float = n
         window = trial.window(case.pair, case.k, SWEPT_TAU, farthest)
         own = trial.window(case.pair, case.k, OWN_TAU, farthest, POINTS)
         if window is not None and own is not None:
-            paper = solver.solve_paper(window, SIGMA_R, DELTA)
+            paper = algorithm_1.solve(window, SIGMA_R, DELTA)
             _answer(tally, f"{name}/paper", paper, case)
             _answer(tally, f"{name}/drslamd", solver.solve(own, default_noise(), DELTA), case)
 

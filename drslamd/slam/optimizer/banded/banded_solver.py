@@ -18,7 +18,8 @@ from scipy.linalg import cholesky_banded
 from scipy.linalg.lapack import dtbtrs
 
 from drslamd.slam import se2
-from drslamd.slam.optimizer.banded.normal_equations import Equations, Layout, System
+from drslamd.slam.optimizer.banded.layout import BandLayout
+from drslamd.slam.optimizer.banded.normal_equations import Equations, System
 from drslamd.slam.optimizer.problem import Calibration, Problem, Solution
 from drslamd.slam.se2 import Array
 
@@ -156,7 +157,7 @@ def _marginals(factors: _Factors | None, wanted: Array) -> Array:
     return out if np.isfinite(out).all() else nothing
 
 
-def _spread(factors: _Factors | None, layout: Layout) -> Calibration:
+def _spread(factors: _Factors | None, layout: BandLayout) -> Calibration:
     """Sigmas of the sensors' constants, all else being unknown too."""
     variances = np.full(layout.band + layout.border, UNKNOWN)
     border = None if factors is None else _inverse(factors.schur)

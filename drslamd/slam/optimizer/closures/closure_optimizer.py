@@ -1,9 +1,7 @@
 """`optimizer.algorithm = "closures"`: the paper's pose graph, solved exactly on every robot.
 
-Odometry and kept closures alone, with the weights and the cost of `rbcd`, and with every iterate of
-it left out: the graph is replicated anyway. ClosureOptimizer that the whole of it contradicts count for
-nothing (`graduated`). Robots that measured relative poses in full precision
-(`items.RelativePoses`) add those, which are believed.
+Odometry and kept closures alone, with the weights and the cost of `rbcd` and without its iterates:
+the graph is replicated anyway. Closures that the whole of it contradicts count for nothing (`gnc`).
 """
 
 from __future__ import annotations
@@ -15,10 +13,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from drslamd.config import Config
 from drslamd.conventions import Chain
 from drslamd.slam import se2
-from drslamd.slam.graph import team_frame
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import PublicPoses
 from drslamd.slam.graph.pose_graph import PoseGraph
@@ -26,18 +22,22 @@ from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.closures import gnc
 from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
+from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.factors import Numbering, chain_links
-from drslamd.slam.optimizer.problem import PoseEdges
-from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
+from drslamd.slam.optimizer.problem import BetweenFactors
 from drslamd.slam.se2 import Array
 
 
+@dataclass(frozen=True)
 class ClosureOptimizer:
-    """Odometry and closures of the whole group, one exact solve."""
+    """Odometry and closures of the whole group, one exact solve.
 
-    def __init__(self, config: Config, own: Chain) -> None:
-        """Nothing of either matters here."""
+    Attributes:
+        believable: see `gnc.BELIEVABLE`.
+    """
+
+    believable: float = gnc.BELIEVABLE
 
     def job(
         self,
@@ -47,18 +47,20 @@ class ClosureOptimizer:
         public: Mapping[int, PublicPoses],
     ) -> Job | None:
         """See `Optimizer.job`; public poses are not needed."""
-        numbers = factors.numbering(graph, group.members, group.shift_us)
+        places = factors.numbering(graph, group.members, group.shift_us)
         chains = [graph.chains[robot].chain for robot in sorted({s.robot for s in group.members})]
-        first = graph.segment_rows(group.frame)[0]
-        gauge = int(numbers.of(graph.chains[group.frame.robot], first[:1])[0])
-        start = None
-        if previous and {c.robot for c in chains} <= set(previous.trajectories):
-            start = np.zeros((len(numbers.n), 3))
-            for segment, poses in team_frame.placed(graph, group, previous).items():
-                rows = graph.chains[segment.robot].rows_of(segment.segment)
-                start[numbers.place[segment.robot][rows]] = poses
-        stated = _ClosureProblem(numbers, *_edges(graph, numbers), chains, gauge, first[2:], start)
-        return partial(_solve, stated, group)
+        is_known = previous and {c.robot for c in chains} <= set(previous.trajectories)
+        edges, is_closure = _edges(graph, places)
+        problem = _ClosureProblem(
+            places=places,
+            edges=edges,
+            is_closure=is_closure,
+            chains=chains,
+            gauge=factors.gauge_place(graph, group, places),
+            origin=graph.segment(group.frame).poses[0],
+            start=factors.initial_poses(graph, group, previous, places) if is_known else None,
+        )
+        return partial(_solve, problem, group, self.believable)
 
 
 @dataclass(frozen=True)
@@ -71,8 +73,8 @@ class _ClosureProblem:
         start: (k, 3), None to start from the chordal relaxation.
     """
 
-    numbers: Numbering
-    edges: ComplexEdges
+    places: Numbering
+    edges: ComplexFactors
     is_closure: NDArray[np.bool_]
     chains: list[Chain]
     gauge: int
@@ -80,47 +82,41 @@ class _ClosureProblem:
     start: Array | None
 
 
-def _edges(graph: PoseGraph, numbers: Numbering) -> tuple[ComplexEdges, NDArray[np.bool_]]:
+def _edges(graph: PoseGraph, places: Numbering) -> tuple[ComplexFactors, NDArray[np.bool_]]:
     """All edges, and which of them are closures."""
-    parts = [ComplexEdges.of(factors.closures(graph, numbers))]
-    for robot, place in numbers.place.items():
-        items = graph.chains[robot]
-        links = chain_links(items, calibrated=False)
-        numbered = PoseEdges(place[links.i], place[links.j], links.measured, links.covariance)
-        parts.append(ComplexEdges.of(numbered))
-        for batch in (batch for part in items.relative.values() for batch in part):
-            other = graph.chains.get(batch.chain.robot)
-            if other is not None and other.chain == batch.chain:
-                i = numbers.of(items, np.array(batch.a_n, dtype=float))
-                j = numbers.of(other, np.array(batch.b_n, dtype=float))
-                parts.append(ComplexEdges.relative(i, j, batch))
-    edges = ComplexEdges.joined(parts)
+    parts = [ComplexFactors.of(factors.closures(graph, places))]
+    for robot, place in places.place.items():
+        links = chain_links(graph.chains[robot], calibrated=False)
+        numbered = BetweenFactors(place[links.i], place[links.j], links.measured, links.covariance)
+        parts.append(ComplexFactors.of(numbered))
+    edges = ComplexFactors.joined(parts)
     # a pose relative to itself says nothing
     used = (edges.i >= 0) & (edges.j >= 0) & (edges.i != edges.j)
     return edges.chosen(used), (np.arange(len(edges)) < len(parts[0]))[used]
 
 
-def _solve(stated: _ClosureProblem, group: Group) -> TeamEstimate:
+def _solve(problem: _ClosureProblem, group: Group, believable: float) -> TeamEstimate:
     """Solve, carry the answer into the frame of the team, and sort it by robot."""
-    numbers, count = stated.numbers, len(stated.numbers.n)
-    answer, edges = gnc.solve(stated.edges, count, stated.is_closure, stated.start)
-    w_T_any = se2.compose(stated.origin, se2.inverse(answer.poses[stated.gauge]))
+    places, count = problem.places, len(problem.places.n)
+    answer, edges = gnc.solve(problem.edges, count, problem.is_closure, problem.start, believable)
+    w_T_any = se2.compose(problem.origin, se2.inverse(answer.poses[problem.gauge]))
     poses = se2.compose(w_T_any[None], answer.poses)
     poses[:, 2] = se2.wrap(poses[:, 2])
-    mine = {chain.robot: np.flatnonzero(numbers.robot == chain.robot) for chain in stated.chains}
-    mine = {robot: at[np.argsort(numbers.n[at], kind="stable")] for robot, at in mine.items()}
+    mine = {chain.robot: places.of_robot(chain.robot) for chain in problem.chains}
     last = {robot: int(at[-1]) for robot, at in mine.items()}
-    # the cost counts an angle twice (`ComplexEdges.of`), which for a covariance it must not
+    # the cost counts an angle twice (`ComplexFactors.of`), which for a covariance it must not
     weighed = replace(edges, kappa=edges.kappa / 2)
-    covariances = PoseGraphSolver(weighed, count, stated.gauge).marginals(
+    covariances = PoseGraphSolver(weighed, count, problem.gauge).marginals(
         poses, list(last.values())
     )
     return TeamEstimate(
-        group.frame,
-        {c.robot: Trajectory(c, numbers.n[mine[c.robot]], poses[mine[c.robot]])
-         for c in stated.chains},
-        dict(zip(last, covariances, strict=True)),
+        frame=group.frame,
+        trajectories={
+            c.robot: Trajectory(c, places.n[mine[c.robot]], poses[mine[c.robot]])
+            for c in problem.chains
+        },
+        covariances=dict(zip(last, covariances, strict=True)),
         cost=answer.cost,
         iterations=answer.steps,
         converged=answer.converged,
-    )  # fmt: skip
+    )

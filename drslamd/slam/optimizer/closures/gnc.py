@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from drslamd.slam.chi_squared import quantile3
 from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolution, PoseGraphSolver
-from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
+from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.se2 import Array
 
 BELIEVABLE = quantile3(0.99)
@@ -42,21 +42,26 @@ LEAST_WEIGHT = 1e-6
 
 
 def solve(
-    edges: ComplexEdges, count: int, doubted: NDArray[np.bool_], start: Array | None
-) -> tuple[PoseGraphSolution, ComplexEdges]:
+    edges: ComplexFactors,
+    count: int,
+    doubted: NDArray[np.bool_],
+    start: Array | None,
+    believable: float = BELIEVABLE,
+) -> tuple[PoseGraphSolution, ComplexFactors]:
     """The least truncated cost that a start leads to, and the edges as they were weighed for it.
 
     Args:
         edges: between `count` poses that are all connected.
         doubted: (m,) which of them may be wrong as a whole.
         start: (count, 3), or None for the chordal relaxation.
+        believable: see `BELIEVABLE`.
     """
     answer = PoseGraphSolver(edges, count).solve(start)
     squares = squared_errors(edges, answer.poses)[doubted]
     worst = float(squares.max(initial=0.0))
-    if worst <= BELIEVABLE:
+    if worst <= believable:
         return answer, edges
-    schedule = _Schedule(worst)
+    schedule = _Schedule(worst, believable)
     steps, weighed = answer.steps, edges
     while (weight := schedule.next(squares)) is not None:
         held = np.ones(len(edges))
@@ -71,33 +76,34 @@ def solve(
 class _Schedule:
     """Weights of one solution after the other."""
 
-    def __init__(self, worst: float) -> None:
+    def __init__(self, worst: float, believable: float) -> None:
         """Begins with the cost that is just convex at the worst squared error."""
-        mu = BELIEVABLE / (2 * worst - BELIEVABLE)
+        self._believable = believable
+        mu = believable / (2 * worst - believable)
         self._mu = [mu * GROWTH**k for k in range(MOST_ROUNDS)]
-        self._gates = [SECOND_CHANCE * BELIEVABLE, BELIEVABLE]
+        self._gates = [SECOND_CHANCE * believable, believable]
 
     def next(self, squares: Array) -> Array | None:
         """(k,) for squared errors (k,); None at the end."""
         if self._mu:
-            weight = weights(squares, self._mu.pop(0))
+            weight = weights(squares, self._mu.pop(0), self._believable)
             if np.isin(weight, (0.0, 1.0)).all():
                 self._mu = []
             return weight
         return (squares <= self._gates.pop(0)).astype(float) if self._gates else None
 
 
-def weights(squares: Array, mu: float) -> Array:
+def weights(squares: Array, mu: float, believable: float = BELIEVABLE) -> Array:
     """(k,) in [0, 1], of squared errors in sigmas."""
     return np.asarray(
-        np.clip(np.sqrt(BELIEVABLE * mu * (mu + 1) / np.maximum(squares, 1e-12)) - mu, 0.0, 1.0)
+        np.clip(np.sqrt(believable * mu * (mu + 1) / np.maximum(squares, 1e-12)) - mu, 0.0, 1.0)
     )
 
 
-def squared_errors(edges: ComplexEdges, poses: Array) -> Array:
+def squared_errors(edges: ComplexFactors, poses: Array) -> Array:
     """(m,) squared errors in sigmas, of x, y and angle together."""
     place, turned = poses[:, 0] + 1j * poses[:, 1], np.exp(1j * poses[:, 2])
     off = place[edges.j] - place[edges.i] - turned[edges.i] * edges.shift
     turn = np.angle(turned[edges.j] / (turned[edges.i] * edges.turn))
-    # kappa is twice the information of an angle (`ComplexEdges.of`)
+    # kappa is twice the information of an angle (`ComplexFactors.of`)
     return np.asarray(edges.tau * np.abs(off) ** 2 + edges.kappa / 2 * turn**2)

@@ -16,7 +16,7 @@ import numpy as np
 
 from drslamd.slam import se2
 from drslamd.slam.optimizer.closures.symmetric import Factor, Symmetric, elimination_order
-from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
+from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.se2 import Array
 
 NEWTON_BELOW = 0.3
@@ -63,7 +63,7 @@ class _Point:
 class PoseGraphSolver:
     """Edges between `count` poses that are all connected."""
 
-    def __init__(self, edges: ComplexEdges, count: int, gauge: int = 0) -> None:
+    def __init__(self, edges: ComplexFactors, count: int, gauge: int = 0) -> None:
         """
         Args:
             gauge: the pose that is held, which only `marginals` shows.

@@ -12,8 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.linalg import get_lapack_funcs
 
-from drslamd.slam.optimizer.problem import Index
-from drslamd.slam.se2 import Array
+from drslamd.slam.se2 import Array, Index
 
 NARROW = 96
 """Diagonals up to which a band is worth it: 30 robots in the order of time."""

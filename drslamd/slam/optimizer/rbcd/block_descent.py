@@ -18,8 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from drslamd.slam.graph.measurements import RelativePoses
-from drslamd.slam.optimizer.problem import Index, PoseEdges
+from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.se2 import Array
 
 STEPS_PER_ROUND = 3
@@ -34,58 +33,7 @@ HOLD = 1e10
 
 
 @dataclass(frozen=True)
-class ComplexEdges:
-    """m relative poses with isotropic weights.
-
-    Attributes:
-        turn: (m,) z_ij; shift: (m,) t_ij; both complex.
-        kappa, tau: (m,) weights of rotation and translation.
-    """
-
-    i: Index
-    j: Index
-    turn: Array
-    shift: Array
-    kappa: Array
-    tau: Array
-
-    @staticmethod
-    def of(edges: PoseEdges) -> ComplexEdges:
-        """DPGO's weights: tau = 2 / trace of the positional covariance, kappa = 2 / var(theta).
-
-        The 2 of kappa is because DPGO measures rotations by the Frobenius norm of matrices, whose
-        square is twice that of the complex difference.
-        """
-        x, y, theta = edges.measured.T
-        spread = edges.covariance[:, 0, 0] + edges.covariance[:, 1, 1]
-        return ComplexEdges(
-            edges.i, edges.j, np.exp(1j * theta), x + 1j * y,
-            2 / edges.covariance[:, 2, 2], 2 / spread,
-        )  # fmt: skip
-
-    @staticmethod
-    def relative(i: Index, j: Index, batch: RelativePoses) -> ComplexEdges:
-        """Between poses i and j (m,), with the weights that their owner gave them."""
-        x, y, theta = (np.array(column) for column in (batch.x, batch.y, batch.theta))
-        kappa, tau = np.array(batch.kappa), np.array(batch.tau)
-        return ComplexEdges(i, j, np.exp(1j * theta), x + 1j * y, kappa, tau)
-
-    @staticmethod
-    def joined(parts: list[ComplexEdges]) -> ComplexEdges:
-        """All edges of all parts."""
-        columns = ((e.i, e.j, e.turn, e.shift, e.kappa, e.tau) for e in parts)
-        return ComplexEdges(*(np.concatenate(column) for column in zip(*columns, strict=True)))
-
-    def __len__(self) -> int:
-        return len(self.i)
-
-    def chosen(self, which: Array) -> ComplexEdges:
-        return ComplexEdges(self.i[which], self.j[which], self.turn[which], self.shift[which],
-                            self.kappa[which], self.tau[which])  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Block:
+class BlockProblem:
     """One robot's share: f(X) = Re tr(X^H Q X) + 2 Re tr(X^H G) + constant.
 
     Rows 2k and 2k + 1 of X (2n, r) are rotation and position of the robot's pose k.
@@ -118,9 +66,9 @@ class Block:
 
 
 def block(
-    own: ComplexEdges, leaving: ComplexEdges, arriving: ComplexEdges,
+    own: ComplexFactors, leaving: ComplexFactors, arriving: ComplexFactors,
     neighbours: Array, size: int,
-) -> Block:  # fmt: skip
+) -> BlockProblem:  # fmt: skip
     """Collect one robot's block.
 
     Args:
@@ -149,10 +97,10 @@ def block(
                     value = (weight * factor[k].conj() * factor[m])[lower]
                     np.add.at(q, (row - column, column), value)
             constant += float(np.sum(weight * np.sum(np.abs(pull) ** 2, axis=-1)))
-    return Block(q, g, constant)
+    return BlockProblem(q, g, constant)
 
 
-def _residuals(edges: ComplexEdges) -> list[tuple[Array, Array]]:
+def _residuals(edges: ComplexFactors) -> list[tuple[Array, Array]]:
     """Both terms of the cost, each as its weight (m,) and its factors (4, m) of the rows
     z_i, p_i, z_j, p_j."""
     one, none = np.ones_like(edges.turn), np.zeros_like(edges.turn)
@@ -162,7 +110,7 @@ def _residuals(edges: ComplexEdges) -> list[tuple[Array, Array]]:
     ]
 
 
-def descend(problem: Block, x: Array, steps: int = STEPS_PER_ROUND) -> Array:
+def descend(problem: BlockProblem, x: Array, steps: int = STEPS_PER_ROUND) -> Array:
     """Some steps of preconditioned Riemannian gradient descent from X (2n, r); the new X."""
     factor = _factor(problem.q)
     cost = problem.cost(x)
@@ -184,7 +132,7 @@ def descend(problem: Block, x: Array, steps: int = STEPS_PER_ROUND) -> Array:
     return x
 
 
-def conditional_covariance(problem: Block, pose: int, held: int | None) -> Array:
+def conditional_covariance(problem: BlockProblem, pose: int, held: int | None) -> Array:
     """(3, 3) of x, y, theta of one pose while the neighbours' poses are taken as exact.
 
     Too small by what the neighbours do not know; the relaxation offers no better.

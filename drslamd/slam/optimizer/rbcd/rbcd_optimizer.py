@@ -13,16 +13,17 @@ from functools import partial
 
 import numpy as np
 
-from drslamd.config import Config
 from drslamd.conventions import Chain
 from drslamd.slam import se2
+from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.estimate import Lifted, TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import PublicPoses
-from drslamd.slam.graph.pose_graph import ChainData, PoseGraph
+from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
+from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.optimizer.contract import Job
-from drslamd.slam.optimizer.factors import chain_links, pose_edges
-from drslamd.slam.optimizer.problem import PoseEdges
+from drslamd.slam.optimizer.factors import between_factors, chain_links
+from drslamd.slam.optimizer.problem import BetweenFactors
 from drslamd.slam.optimizer.rbcd import block_descent
 from drslamd.slam.se2 import Array
 
@@ -45,8 +46,8 @@ class LiftedNeighbours:
     chains: tuple[Chain, ...]
     n: Array
     rows: Array
-    leaving: PoseEdges
-    arriving: PoseEdges
+    leaving: BetweenFactors
+    arriving: BetweenFactors
     carriers: Array
 
 
@@ -56,15 +57,18 @@ class Start:
 
     n: Array
     lifted: Array
-    own: PoseEdges
+    own: BetweenFactors
 
 
 class RbcdOptimizer:
     """One round of block coordinate descent at a time."""
 
-    def __init__(self, config: Config, own: Chain) -> None:
-        self._rank = config.optimizer.rank
-        self._own = own
+    def __init__(self, own: Chain, rank: int) -> None:
+        """
+        Args:
+            rank: of the relaxation.
+        """
+        self._own, self._rank = own, rank
 
     def job(
         self,
@@ -77,12 +81,12 @@ class RbcdOptimizer:
         items = graph.chains[self._own.robot]
         used = _in_group(items, group)
         fitting = {k: p for k, p in sorted(public.items()) if p.rank == self._rank}
-        around = neighbours(graph, items, used, fitting, self._rank)
+        around = lifted_neighbours(graph, items, used, fitting, self._rank)
         anchor = _anchor(fitting, group)
         lifted = self._start(items, used, group, previous, around)
         if lifted is None or (anchor is None and group.frame.chain != self._own):
             return None
-        start = Start(items.n[used], lifted, _links(items, used))
+        start = Start(items.keyframes.n[used], lifted, _links(items, used))
         return partial(_round, start, around, anchor, group, self._own)
 
     def _start(
@@ -94,7 +98,7 @@ class RbcdOptimizer:
         around: LiftedNeighbours,
     ) -> Array | None:
         """(k, 2 r) our keyframes: as they were, else by odometry from the nearest that is known."""
-        n, poses = items.n[used], items.poses[used]
+        n, poses = items.keyframes.n[used], items.keyframes.poses[used]
         known = previous.lifted if previous and previous.frame == group.frame else None
         if known is not None and np.isin(n, known.n).any():
             at = np.flatnonzero(np.isin(n, known.n))
@@ -119,17 +123,17 @@ class RbcdOptimizer:
 def _in_group(items: ChainData, group: Group) -> Array:
     """Which of our rows lie in segments of the group."""
     segments = [s.segment for s in group.members if s.chain == items.chain]
-    return np.flatnonzero(np.isin(items.rows[:, 1], segments))
+    return np.flatnonzero(np.isin(items.keyframes.segment, segments))
 
 
-def _links(items: ChainData, used: Array) -> PoseEdges:
+def _links(items: ChainData, used: Array) -> BetweenFactors:
     """Our odometry between the rows `used`, numbered as they are."""
     links = chain_links(items, calibrated=False)
-    place = np.full(len(items.rows), -1)
+    place = np.full(len(items.keyframes), -1)
     place[used] = np.arange(len(used))
     i, j = place[links.i], place[links.j]
     inside = (i >= 0) & (j >= 0)
-    return PoseEdges(i[inside], j[inside], links.measured[inside], links.covariance[inside])
+    return BetweenFactors(i[inside], j[inside], links.measured[inside], links.covariance[inside])
 
 
 def _anchor(public: Mapping[int, PublicPoses], group: Group) -> Array | None:
@@ -145,7 +149,7 @@ def _on_sphere(rows: Array) -> Array:
     return np.asarray(np.abs(length - 1) < OFF_SPHERE)
 
 
-def neighbours(
+def lifted_neighbours(
     graph: PoseGraph,
     items: ChainData,
     used: Array,
@@ -165,14 +169,14 @@ def neighbours(
     keyframes: list[int] = []
     rows: list[Array] = []
     carriers: set[int] = set()
-    number = {int(n): k for k, n in enumerate(items.n[used])}
+    number = {int(n): k for k, n in enumerate(items.keyframes.n[used])}
     for pair in graph.usable():
         if own not in (pair.a, pair.b):
             continue
         outward = pair.a == own
         other = pair.b if outward else pair.a
         table = public[other.robot].table() if other.robot in public else {}
-        for closure in pair.kept():
+        for closure in pair.kept_closures():
             mine, far = (closure.a_n, closure.b_n) if outward else (closure.b_n, closure.a_n)
             if mine not in number:
                 continue
@@ -189,7 +193,7 @@ def neighbours(
             rows.append(table[far])
     return LiftedNeighbours(
         tuple(chains), np.array(keyframes), np.array(rows, dtype=complex).reshape(-1, 2 * rank),
-        pose_edges(leaving), pose_edges(arriving), np.array(sorted(carriers)),
+        between_factors(leaving), between_factors(arriving), np.array(sorted(carriers)),
     )  # fmt: skip
 
 
@@ -197,7 +201,7 @@ def _round(
     start: Start, around: LiftedNeighbours, anchor: Array | None, group: Group, chain: Chain
 ) -> TeamEstimate:
     """One round on our block, and what it means in the frame of the team."""
-    edges = [block_descent.ComplexEdges.of(e) for e in (start.own, around.leaving, around.arriving)]
+    edges = [ComplexFactors.of(e) for e in (start.own, around.leaving, around.arriving)]
     block = block_descent.block(edges[0], edges[1], edges[2], around.rows, len(start.n))
     before = block_descent.stacked(start.lifted)
     after = block_descent.descend(block, before)

@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from slam_scenes import (
+    BANDED,
     CLOCKS,
     NOISE,
     Array,
     closure,
-    config,
     group_of,
     inverted,
     keyframes,
@@ -27,18 +27,16 @@ from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
-from drslamd.slam.optimizer.banded import banded_optimizer
 from drslamd.slam.optimizer.banded.banded_optimizer import (
-    NEAR_BIAS_SIGMA_M,
     YAW_PRIOR_FLOOR,
-    BandedOptimizer,
     build_problem,
 )
-from drslamd.slam.optimizer.problem import NEAR_RANGE_M
+from drslamd.slam.range_model import LINKTRACK
+from drslamd.slam.robot_model import RobotModel
 
 
 def solved(graph: PoseGraph, group: Group, previous: TeamEstimate | None = None) -> TeamEstimate:
-    return BandedOptimizer(config(), group.frame.chain).job(graph, group, previous, {})()
+    return BANDED.job(graph, group, previous, {})()
 
 
 def errors(estimate: TeamEstimate, truth: dict[int, Array]) -> float:
@@ -82,41 +80,43 @@ def test_biases_are_named_by_their_pairs_and_scales_by_their_robots() -> None:
     assert set(estimate.scale) == set(estimate.yaw) == {0, 1, 2}
 
 
-def test_what_strong_signals_do_is_one_constant_of_the_team(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_strong_signals_do_is_one_constant_of_the_team() -> None:
     """Found where it may be large; its sigma is that of what was measured, without the prior."""
     team = small_team(2, count=150, range_sigma=0.01)
-    for items in team.graph.pairs.values():
-        items.ranges[:, 6] -= 0.6 * np.exp(-items.ranges[:, 6] / NEAR_RANGE_M)
+    for pair in team.graph.pairs.values():
+        table = pair.ranges.copy()
+        table.range_m[:] -= 0.6 * np.exp(-table.range_m / LINKTRACK.near_reach_m)
+        pair.replace_ranges(table)
     group = group_of(team.graph, CLOCKS)
     held = solved(team.graph, group).near_bias_m
-    monkeypatch.setattr(banded_optimizer, "NEAR_BIAS_SIGMA_M", 1.0)
-    free = solved(team.graph, group).near_bias_m
+    loose = replace(BANDED, model=replace(LINKTRACK, near_bias_sigma_m=1.0))
+    free = loose.job(team.graph, group, None, {})().near_bias_m
     assert abs(free.value + 0.6) < 3 * free.sigma
     assert free.value < held.value < 0
     assert held.sigma == pytest.approx(free.sigma, rel=0.3)
-    assert abs(held.value) < 2 * NEAR_BIAS_SIGMA_M
+    assert abs(held.value) < 2 * LINKTRACK.near_bias_sigma_m
 
 
 def test_priors_are_those_of_the_robots_and_of_the_configuration() -> None:
     team = small_team(3)
     still = replace(NOISE, yaw_rad_per_m=1e-6, scale=0.07)
-    team.graph.chains[1].noise = still
-    problem = build_problem(team.graph, group_of(team.graph), None, 0.25).problem
+    team.graph.chains[1].model = RobotModel(still)
+    problem = build_problem(
+        team.graph, group_of(team.graph), None, replace(BANDED, bias_sigma=0.25)
+    ).problem
     assert problem.priors.bias == pytest.approx(0.25 / 3)
     assert problem.priors.scale == pytest.approx([0.01, 0.07 / 3, 0.01])
     assert problem.priors.yaw == pytest.approx(
         [NOISE.yaw_rad_per_m, YAW_PRIOR_FLOOR, NOISE.yaw_rad_per_m]
     )
-    assert problem.priors.near_bias == pytest.approx([NEAR_BIAS_SIGMA_M])
+    assert problem.priors.near_bias == pytest.approx([LINKTRACK.near_bias_sigma_m])
 
 
 def test_the_next_solution_goes_on_from_the_last_one() -> None:
     team = small_team(4, count=60)
     group = group_of(team.graph, CLOCKS)
     first = solved(team.graph, group)
-    problem_and_start = build_problem(team.graph, group, first, 0.3)
+    problem_and_start = build_problem(team.graph, group, first, BANDED)
     assert problem_and_start.start.scale.tolist() == [first.scale[r].value for r in range(3)]
     assert problem_and_start.start.near_bias.tolist() == [first.near_bias_m.value] != [0.0]
     again = solved(team.graph, group, first)
@@ -139,8 +139,8 @@ def test_two_robots_with_the_same_items_agree_whatever_their_clocks_and_history(
 def test_without_knowing_any_clock_the_result_is_the_same() -> None:
     team = small_team(6, count=60)
     known = solved(team.graph, group_of(team.graph, CLOCKS))
-    problem = build_problem(team.graph, group_of(team.graph), None, 0.3).problem
-    reach = max(int(np.abs(e.i - e.j).max()) for e in (problem.links, problem.ranges))
+    problem = build_problem(team.graph, group_of(team.graph), None, BANDED).problem
+    reach = max(int(np.abs(e.i - e.j).max()) for e in (problem.odometry, problem.ranges))
     assert reach < 30
     unknown = solved(team.graph, group_of(team.graph))
     for robot, trajectory in known.trajectories.items():
@@ -204,7 +204,7 @@ def test_a_robot_that_waited_while_the_others_drove_costs_little() -> None:
         ranges.append(range_item(10, team.chains[0], int(team.n[0][k]), float(np.hypot(*apart))))
     item = closure(0, 10, team.chains[0], int(team.n[0][1]),
                    product(inverted(place + [0.3, 0, 0]), team.truth[0][1]))  # fmt: skip
-    team.graph.insert(waits, GraphEntry(0, (), frames, tuple(ranges), (item,)))
+    team.graph.insert(waits, GraphEntry(0, None, frames, tuple(ranges), (item,)))
     members = {Segment(*c, 0) for c in (*team.chains.values(), waits)}
     group = Group(members, Segment(*team.chains[0], 0), {0: 0, 1: 1000 * GRID_US, 2: 0})
     began = time.process_time()

@@ -23,7 +23,13 @@ from slam_scenes import Array, matrix, same_pose, wander
 
 from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.banded.banded_solver import solve
-from drslamd.slam.optimizer.problem import Calibration, Links, PoseEdges, Priors, Problem
+from drslamd.slam.optimizer.problem import (
+    BetweenFactors,
+    Calibration,
+    OdometryFactors,
+    Priors,
+    Problem,
+)
 
 gtsam = pytest.importorskip("gtsam", reason="gtsam has no wheel for this Python")
 
@@ -76,10 +82,11 @@ def test_the_pose_graph_of_gtsam_has_the_same_minimum_and_marginals() -> None:
     joined = [(0, 1), (10, 11), (24, 27), (40, 41), (40, 41), (48, 47)]
     links = pose_edges(rng, truth, chain, (0.05, 0.05, 0.02), 0.01)
     closures = pose_edges(rng, truth, joined, (0.1, 0.1, 0.05), 0.01)
-    odometry = Links(links.i, links.j, links.measured, links.covariance,
+    odometry = OdometryFactors(links.i, links.j, links.measured, links.covariance,
                      np.zeros(len(links), dtype=int), np.zeros(len(links)))  # fmt: skip
     # calibration that is known to be nothing
-    priors = Priors(np.zeros(0), *(np.array([1e-9]) for _ in range(3)))
+    known = np.array([1e-9])
+    priors = Priors(bias=np.zeros(0), scale=known, yaw=known, near_bias=known)
     start = truth + rng.normal(0, 0.02, truth.shape)
     start[0] = truth[0]
     problem = Problem(np.zeros(50, dtype=int), np.arange(50), start, 0, odometry, closures,
@@ -191,7 +198,8 @@ def test_bias_scale_and_yaw_rate_are_found() -> None:
     assert solution.calibration.scale == pytest.approx([0.03, -0.02, 0.05], abs=0.006)
     assert solution.calibration.yaw == pytest.approx([0.01, -0.008, 0.0], abs=0.002)
     assert np.hypot(*(solution.poses - truth)[:, :2].T).max() < 0.3
-    known = Priors(*(np.full(k, 1e-9) for k in (3, 3, 3, 1)))
+    three = np.full(3, 1e-9)
+    known = Priors(bias=three, scale=three, yaw=three, near_bias=three[:1])
     fixed = replace(problem, priors=known)
     wrong = solve(replace(fixed, initial=start))
     assert np.hypot(*(wrong.poses - truth)[:, :2].T).max() > 0.9
@@ -310,7 +318,7 @@ def test_covariances_that_rounding_has_broken_are_inverted_all_the_same() -> Non
     """One direction a billion times better known than the others, and correlated with them."""
     lever = np.array([[1.0, 0, -1e4], [0, 1, 1e4], [0, 0, 1]])
     bad = lever @ np.diag([1e-8, 1e-8, 1.0]) @ lever.T
-    edges = PoseEdges(np.array([0]), np.array([1]), np.zeros((1, 3)), bad[None])
+    edges = BetweenFactors(np.array([0]), np.array([1]), np.zeros((1, 3)), bad[None])
     information = edges.information[0]
     assert np.array_equal(information, information.T)
     scale = np.sqrt(np.diag(bad))

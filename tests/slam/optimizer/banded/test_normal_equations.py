@@ -18,13 +18,10 @@ from slam_problems import (
 )
 from slam_scenes import Array
 
-from drslamd.slam.optimizer.banded.normal_equations import (
-    Equations,
-    Layout,
-    border_poses,
-    vertex_cover,
-)
+from drslamd.slam.optimizer.banded.layout import BandLayout, border_poses
+from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.problem import Calibration, Problem
+from drslamd.slam.optimizer.vertex_cover import vertex_cover
 
 
 def somewhere(problem: Problem, seed: int) -> tuple[Array, Calibration]:
@@ -64,7 +61,7 @@ def test_it_is_the_same_with_poses_at_the_border() -> None:
     far = [(0, k) for k in range(30, 80, 7)] + [(9, 78)]
     edges = pose_edges(np.random.default_rng(4), problem.initial, far, (0.05, 0.05, 0.03))
     problem = replace(problem, closures=edges)
-    layout = Layout.of(problem)
+    layout = BandLayout.of(problem)
     assert layout.band == 3 * 78
     assert layout.width < 3 * 20
     poses, calibration = somewhere(problem, 5)
@@ -80,7 +77,7 @@ def test_it_is_the_same_with_poses_at_the_border() -> None:
 
 def test_every_unknown_stands_somewhere_and_only_once() -> None:
     problem, _ = team_problem(6, robots=3, count=30)
-    layout = Layout.of(problem)
+    layout = BandLayout.of(problem)
     parts = [layout.poses.ravel(), layout.bias, layout.scale, layout.yaw, layout.near_bias]
     numbers = np.sort(np.concatenate(parts))
     assert np.array_equal(numbers, np.arange(layout.band + layout.border))
@@ -93,7 +90,7 @@ def test_every_unknown_stands_somewhere_and_only_once() -> None:
 def test_a_group_of_one_pose_has_a_layout() -> None:
     problem, _ = team_problem(7, robots=1, count=1, closures=0)
     problem = replace(problem, ranges=no_ranges())
-    layout = Layout.of(problem)
+    layout = BandLayout.of(problem)
     assert (layout.band, layout.width) == (3, 3)
 
 

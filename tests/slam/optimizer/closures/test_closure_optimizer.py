@@ -10,20 +10,19 @@ from slam_scenes import (
     NOISE,
     Array,
     closure,
-    config,
     driven,
     inverted,
     keyframes,
+    model_of,
     product,
     small_team,
-    traits_of,
     wander,
 )
 
 from drslamd.conventions import GRID_US, Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate
-from drslamd.slam.graph.measurements import GraphEntry, RelativePoses
+from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer.closures.closure_optimizer import ClosureOptimizer
@@ -55,7 +54,7 @@ class Team:
         graph: PoseGraph = self.team.graph
         members = {Segment(*items.chain, 0) for items in graph.chains.values()}
         group = Group(members, min(members), CLOCKS)
-        job = ClosureOptimizer(config(), group.frame.chain).job(graph, group, previous, {})
+        job = ClosureOptimizer().job(graph, group, previous, {})
         assert job is not None
         return job()
 
@@ -110,11 +109,11 @@ def test_beside_a_single_closure_a_heading_is_as_uncertain_as_its_odometry() -> 
     one, other = Chain(0, 1), Chain(1, 1)
     for chain in (one, other):
         odometry = driven(rng, wander(rng, COUNT, 0.4), NOISE)
-        graph.insert(chain, GraphEntry(0, traits_of(NOISE), keyframes(n, odometry)))
+        graph.insert(chain, GraphEntry(0, model_of(NOISE), keyframes(n, odometry)))
     only = closure(0, 100, other, 100, np.array([1.0, 2.0, 0.5]))
     graph.insert(one, GraphEntry(1, closures=(only,)))
     members = {Segment(*one, 0), Segment(*other, 0)}
-    job = ClosureOptimizer(config(), one).job(graph, Group(members, min(members), {}), None, {})
+    job = ClosureOptimizer().job(graph, Group(members, min(members), {}), None, {})
     assert job is not None
     links = chain_links(graph.chains[0], calibrated=False).covariance[:, 2, 2].sum()
     assert job().covariances[0][2, 2] == pytest.approx(links, rel=1e-4)
@@ -157,20 +156,3 @@ def test_what_closures_are_worth_shows_in_the_covariances() -> None:
     for robot in (1, 2):
         assert 0.01 < spreads[0][robot] < 0.9 * spreads[1][robot] < 0.9
     assert spreads[0][0] < spreads[1][0] < 1.0
-
-
-def test_relative_poses_in_full_precision_pull_with_their_weight() -> None:
-    team = Team(5, sigma=0.3)
-    n, chains = team.team.n, team.team.chains
-    at = np.arange(0, COUNT, 2)
-    x, y, theta = (tuple(c) for c in np.array([team.true(1, k) for k in at.tolist()]).T.tolist())
-    weights = (1e6,) * len(at)
-    stiff = RelativePoses(
-        chains[1], tuple(n[0][at].astype(int).tolist()), tuple(n[1][at].astype(int).tolist()),
-        x, y, theta, weights, weights,
-    )  # fmt: skip
-    team.team.graph.insert(chains[0], GraphEntry(5000, relative=(stiff,)))
-    poses = {r: t.poses for r, t in team.solved().trajectories.items()}
-    between = se2.between(poses[0][at], poses[1][at])
-    expected = np.array([team.true(1, k) for k in at.tolist()])
-    np.testing.assert_allclose(between[:, :2], expected[:, :2], atol=0.005)

@@ -12,8 +12,8 @@ from slam_scenes import Array, product, same_pose, wander
 
 from drslamd.slam.optimizer.closures import gnc
 from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
-from drslamd.slam.optimizer.problem import PoseEdges
-from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
+from drslamd.slam.optimizer.complex_factors import ComplexFactors
+from drslamd.slam.optimizer.problem import BetweenFactors
 
 KEYFRAMES, ROBOTS = 30, 3
 SIGMA = (0.05, 0.05, 0.02)
@@ -34,18 +34,18 @@ class Ring:
         parts = [pose_edges(rng, self.truth, chain, (0.01, 0.01, 0.005)),
                  pose_edges(rng, self.truth, right, SIGMA),
                  self._misled(wrong, shift)]  # fmt: skip
-        self.good = ComplexEdges.joined([ComplexEdges.of(p) for p in parts[:2]])
-        self.edges = ComplexEdges.joined([ComplexEdges.of(p) for p in parts])
+        self.good = ComplexFactors.joined([ComplexFactors.of(p) for p in parts[:2]])
+        self.edges = ComplexFactors.joined([ComplexFactors.of(p) for p in parts])
         self.doubted = np.arange(len(self.edges)) >= len(chain)
         self.wrong = np.arange(len(self.edges)) >= len(chain) + len(right)
 
-    def _misled(self, ends: list[tuple[int, int]], shift: float) -> PoseEdges:
+    def _misled(self, ends: list[tuple[int, int]], shift: float) -> BetweenFactors:
         """As if robot 2 stood elsewhere all the time: they agree with its odometry."""
         origin = np.array([shift, -shift / 2, 0.3 * shift])
         moved = np.array([product(origin, pose) for pose in self.truth])
         exact = pose_edges(np.random.default_rng(0), self.truth, ends, SIGMA, 0.0)
         seen = [product(_inverse(self.truth[i]), moved[j]) for i, j in ends]
-        return PoseEdges(exact.i, exact.j, np.reshape(seen, (-1, 3)), exact.covariance)
+        return BetweenFactors(exact.i, exact.j, np.reshape(seen, (-1, 3)), exact.covariance)
 
     def off(self, poses: Array) -> float:
         """Largest distance from the truth, the first poses laid on each other, m."""

@@ -10,17 +10,17 @@ from scipy.optimize import least_squares
 
 from drslamd.slam import se2
 from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
-from drslamd.slam.optimizer.rbcd.block_descent import ComplexEdges
+from drslamd.slam.optimizer.complex_factors import ComplexFactors
 
 Array = np.ndarray
 
 
-def edges_of(i: Array, j: Array, measured: Array, kappa: Array, tau: Array) -> ComplexEdges:
+def edges_of(i: Array, j: Array, measured: Array, kappa: Array, tau: Array) -> ComplexFactors:
     shift = measured[:, 0] + 1j * measured[:, 1]
-    return ComplexEdges(i, j, np.exp(1j * measured[:, 2]), shift, kappa, tau)
+    return ComplexFactors(i, j, np.exp(1j * measured[:, 2]), shift, kappa, tau)
 
 
-def graph(count: int, loops: int, noise: float, seed: int, reach: int = 6) -> ComplexEdges:
+def graph(count: int, loops: int, noise: float, seed: int, reach: int = 6) -> ComplexFactors:
     """A chain that winds about, with loops, measured with some noise (m and rad)."""
     rng = np.random.default_rng(seed)
     steps = np.column_stack([np.ones(count), np.zeros(count), rng.normal(0, 0.5, count)])
@@ -37,7 +37,7 @@ def graph(count: int, loops: int, noise: float, seed: int, reach: int = 6) -> Co
     return edges_of(i, j, measured, weights[0] * 100, weights[1] * 50)
 
 
-def by_scipy(edges: ComplexEdges, start: Array) -> float:
+def by_scipy(edges: ComplexFactors, start: Array) -> float:
     """Least cost by scipy, the cost written down once more."""
 
     def residuals(x: Array) -> Array:
@@ -128,7 +128,7 @@ def test_the_order_of_the_poses_does_not_change_the_cost() -> None:
     edges = graph(200, 150, 0.05, 2)
     narrow = PoseGraphSolver(edges, 200).solve()
     order = np.random.default_rng(0).permutation(200)
-    mixed = ComplexEdges(
+    mixed = ComplexFactors(
         order[edges.i], order[edges.j], edges.turn, edges.shift, edges.kappa, edges.tau
     )
     wide = PoseGraphSolver(mixed, 200).solve()

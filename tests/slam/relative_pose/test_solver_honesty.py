@@ -11,9 +11,10 @@ from lab.recordings import world
 from lab.score import metrics
 from slam_scenes import NOISE, Array, angle_between, seen_from_last
 
-from drslamd.slam.relative_pose.solver import Hypothesis, PairNoise, Verdict, solve
+from drslamd.slam.range_model import RangeNoise
+from drslamd.slam.relative_pose.estimate import Hypothesis, PairNoise, Verdict
+from drslamd.slam.relative_pose.solver import solve
 from drslamd.slam.relative_pose.window import Window, binned
-from drslamd.slam.relative_pose.window_noise import RangeNoise
 
 SENSORS = PairNoise(RangeNoise(0.10, 0.30), NOISE, NOISE)
 """What a robot assumes by default; `world` draws a bias of 0.1 m, slow errors of 0.06 m, bursts."""

@@ -11,17 +11,14 @@ from scipy.optimize import least_squares, minimize_scalar
 from slam_scenes import EXACT, NOISE, Array, matrix, same_pose, straight, wander, window_of
 
 from drslamd.slam import se2
-from drslamd.slam.relative_pose import coarse_search, range_fit, solver
-from drslamd.slam.relative_pose.range_fit import STEPS, Descent, RangeFit
-from drslamd.slam.relative_pose.solver import (
-    PairNoise,
-    RelativePoseEstimate,
-    Verdict,
-    residuals,
-    solve,
-)
+from drslamd.slam.range_model import LINKTRACK, RangeNoise
+from drslamd.slam.relative_pose import algorithm_1, coarse_search, solver
+from drslamd.slam.relative_pose.algorithm_1 import linear, window_residuals
+from drslamd.slam.relative_pose.descent import ITERATIONS, Descent
+from drslamd.slam.relative_pose.estimate import PairNoise, RelativePoseEstimate, Verdict
+from drslamd.slam.relative_pose.range_fit import RangeFit
+from drslamd.slam.relative_pose.solver import solve
 from drslamd.slam.relative_pose.window import Window
-from drslamd.slam.relative_pose.window_noise import RangeNoise
 
 SENSORS = PairNoise(RangeNoise(0.10, 0.30), NOISE, NOISE)
 DELTA = 0.1
@@ -257,15 +254,14 @@ def test_the_jacobian_of_the_residuals_is_that_of_finite_differences() -> None:
     window, true = curved(1)
     a, b = window.a_points, window.b_points
     poses = np.array([true + [0.3, -0.2, 0.1], true + [-2.0, 1.0, 1.5]])
-    e, u, jacobian = residuals(poses, a, b, window.ranges)
+    e, jacobian = linear(poses, a, b, window.ranges)
     for k, pose in enumerate(poses):
         moved = np.array([(matrix(pose) @ [*q, 1.0])[:2] for q in b]) - a
         assert np.allclose(e[k], np.hypot(*moved.T) - window.ranges)
-        assert np.allclose(u[k], moved / np.hypot(*moved.T)[:, None])
     h = 1e-6
     for column in range(3):
         step = np.eye(3)[column] * h
-        ahead, behind = (residuals(poses + s, a, b, window.ranges)[0] for s in (step, -step))
+        ahead, behind = (window_residuals(poses + s, a, b, window.ranges) for s in (step, -step))
         assert np.allclose(jacobian[..., column], (ahead - behind) / (2 * h), atol=1e-7)
 
 
@@ -279,7 +275,7 @@ def huber(window: Window, x: Array) -> Array:
 
 def cost_of(window: Window, x: Array) -> float:
     size = np.abs(huber(window, x))
-    limit = range_fit.ROBUST_SIGMAS
+    limit = LINKTRACK.huber_sigmas
     return float(np.sum(np.where(size < limit, size**2, limit * (2 * size - limit))))
 
 
@@ -291,7 +287,7 @@ def minpack(window: Window, seeds: Array) -> Array:
     """The best pose and bias that scipy finds from the same seeds."""
     results = [
         least_squares(lambda x: huber(window, x), np.append(seed, 0.0), loss="huber",
-                      f_scale=range_fit.ROBUST_SIGMAS)
+                      f_scale=LINKTRACK.huber_sigmas)
         for seed in seeds
     ]  # fmt: skip
     best = min(results, key=lambda result: float(result.cost))
@@ -302,7 +298,7 @@ def minpack(window: Window, seeds: Array) -> Array:
 def refined(window: Window, seeds: Array) -> Array:
     fit = RangeFit(window.a_points, window.b_points, window.ranges)
     descent = Descent(fit, fit.centred(seeds), SENSORS.ranges)
-    descent.run(STEPS)
+    descent.run(ITERATIONS)
     return fit.poses(descent.minima().centred)
 
 
@@ -341,7 +337,7 @@ def test_absurd_odometry_of_a_peer_raises_nothing() -> None:
             noisy = PairNoise(SENSORS.ranges, NOISE, replace(NOISE, scale=0.5, yaw_rad_per_m=0.35))
             estimate = solve(strange, noisy, DELTA)
             assert estimate.verdict is not Verdict.UNIQUE
-            solver.solve_paper(strange, 0.1, DELTA)
+            algorithm_1.solve(strange, 0.1, DELTA)
     assert se2.wrap(0.0) == 0
 
 

@@ -9,7 +9,8 @@ import pytest
 from scipy.optimize import least_squares
 from slam_scenes import Array, matrix, same_pose, wander, window_of
 
-from drslamd.slam.relative_pose.solver import Verdict, coarse_paper, solve_paper
+from drslamd.slam.relative_pose.algorithm_1 import coarse_search, solve
+from drslamd.slam.relative_pose.estimate import Verdict
 from drslamd.slam.relative_pose.window import Window
 
 
@@ -50,7 +51,7 @@ def test_the_coarse_search_finds_the_point_that_the_loops_find(tau: int, delta: 
     for seed in range(2):
         window = noisy_window(seed, tau)
         best, _ = algorithm_1(window, delta)
-        ours = coarse_paper(window.a_points, window.b_points, window.ranges, delta)
+        ours = coarse_search(window.a_points, window.b_points, window.ranges, delta)
         assert np.allclose(ours, best, atol=1e-12)
 
 
@@ -60,7 +61,7 @@ def test_of_points_that_cost_the_same_the_first_one_counts() -> None:
     a = wander(rng, 40, 0.05)
     window, _ = window_of(a, np.tile([3.0, 1.0, 0.0], (40, 1)))
     best, _ = algorithm_1(window, 0.3)
-    ours = coarse_paper(window.a_points, window.b_points, window.ranges, 0.3)
+    ours = coarse_search(window.a_points, window.b_points, window.ranges, 0.3)
     assert best[2] == pytest.approx(-11 * 0.3)
     assert np.allclose(ours, best, atol=1e-12)
 
@@ -76,7 +77,7 @@ def test_the_grid_is_inclusive_on_both_sides() -> None:
         seen = np.array([(matrix(pose) @ [*q, 1.0])[:2] for q in window.b_points])
         ranges = np.hypot(*(seen - window.a_points).T)
         assert ranges[-1] == pytest.approx(5)
-        found = coarse_paper(window.a_points, window.b_points, ranges, 0.8)
+        found = coarse_search(window.a_points, window.b_points, ranges, 0.8)
         assert np.allclose(found[:2], pose[:2])
         assert found[2] == pytest.approx(theta)
 
@@ -91,7 +92,7 @@ def test_the_refinement_is_levenberg_and_marquardt_on_equation_1(seed: int) -> N
         return np.asarray(np.hypot(*(moved - window.a_points).T) - window.ranges)
 
     theirs = least_squares(error, start, method="lm", xtol=1e-12, ftol=1e-12)
-    estimate = solve_paper(window, 0.1, 0.2)
+    estimate = solve(window, 0.1, 0.2)
     ours = estimate.hypotheses[0]
     assert estimate.verdict is Verdict.UNIQUE
     assert same_pose(ours.a_T_b, theirs.x, 1e-4)
@@ -102,13 +103,13 @@ def test_the_refinement_is_levenberg_and_marquardt_on_equation_1(seed: int) -> N
 
 @pytest.mark.parametrize(("count", "verdict"), [(3, Verdict.TOO_FEW), (4, Verdict.UNIQUE)])
 def test_four_measurements_are_the_fewest(count: int, verdict: Verdict) -> None:
-    assert solve_paper(noisy_window(0, count), 0.1, 0.3).verdict is verdict
+    assert solve(noisy_window(0, count), 0.1, 0.3).verdict is verdict
 
 
 def test_a_window_that_says_nothing_has_a_covariance_that_can_be_sent() -> None:
     nothing = np.zeros((10, 3))
     window = Window(np.arange(-9.0, 1.0), np.full(10, 3.0), nothing, nothing,
                     np.zeros(2), np.zeros(2))  # fmt: skip
-    (hypothesis,) = solve_paper(window, 0.1, 0.3).hypotheses
+    (hypothesis,) = solve(window, 0.1, 0.3).hypotheses
     assert np.isfinite(hypothesis.a_T_b).all()
     assert np.linalg.eigvalsh(hypothesis.covariance)[-1] <= 100.0**2 * 1.0001

@@ -1,0 +1,77 @@
+"""Computations under way, and how much of a core the three modules may take.
+
+A module rests several times as long as it computed, so no team is so large that one of the three
+takes more than a fifth of a core. What it then says comes later and is the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from drslamd.events import JobDone, Solve
+from drslamd.slam.consistency.pair import PairTracker
+from drslamd.slam.relative_pose.window_request import WindowRequest
+
+RELATIVE_POSE = "relative_pose"
+CONSISTENCY = "consistency"
+OPTIMIZER = "optimizer"
+
+REST = 4
+"""How many times as long as it computed a module rests."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A computation: its module, the pair that it is about, and the window that it looks at."""
+
+    module: str
+    pair: PairTracker | None = None
+    request: WindowRequest | None = None
+
+
+class DutyCycle(NamedTuple):
+    """When a module last began to compute, and until when it rests, us."""
+
+    since: int = 0
+    until: int = 0
+
+
+class Jobs:
+    """Of one robot.
+
+    Attributes:
+        cycles: by module.
+    """
+
+    def __init__(self) -> None:
+        self.cycles: dict[str, DutyCycle] = {}
+        self._under_way: dict[int, Job] = {}
+        self._begun = 0
+
+    def begin(self, job: Job, run: Callable[[], object]) -> Solve:
+        """Let it be computed."""
+        self._begun += 1
+        self._under_way[self._begun] = job
+        return Solve(self._begun, job.module, run)
+
+    def finish(self, event: JobDone) -> Job:
+        """Which job has ended; its module rests now."""
+        job = self._under_way.pop(event.job_id)
+        began = event.utime - event.elapsed_us
+        since, until = self.cycles.get(job.module, DutyCycle(began, began))
+        if until <= began:
+            since, until = began, event.utime
+        rested = max(until, event.utime) + REST * event.elapsed_us
+        self.cycles[job.module] = DutyCycle(since, rested)
+        return job
+
+    def is_busy(self, module: str, pair: PairTracker | None = None) -> bool:
+        """Does the module compute, for this pair or for any?"""
+        return any(
+            job.module == module and pair in (None, job.pair) for job in self._under_way.values()
+        )
+
+    def is_resting(self, module: str, utime: int) -> bool:
+        return utime < self.cycles.get(module, DutyCycle()).until

@@ -1,0 +1,91 @@
+"""Where each unknown of the team's problem stands: a band in the order of time, and a border.
+
+Closures and ranges join poses of the same time and odometry joins neighbouring times, so with all
+poses of all robots in the order of time J' W J is banded. The border takes the unknowns that touch
+everything: the bias of each pair, the near-range bias, scale and yaw rate of each robot, and the
+few poses that reach far (a robot that stands still while others drive about has one pose for all
+that time).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drslamd.slam.optimizer.problem import Calibration, Problem
+from drslamd.slam.optimizer.vertex_cover import vertex_cover
+from drslamd.slam.se2 import Array, Index
+
+
+@dataclass(frozen=True)
+class BandLayout:
+    """Numbers of the unknowns: the band first, then the border.
+
+    Attributes:
+        poses: (k, 3) of each pose.
+        bias, scale, yaw: of each pair and robot; near_bias: of the team.
+        band, border: how many unknowns are in each.
+        width: diagonals of the band, the main one included.
+    """
+
+    poses: Index
+    bias: Index
+    scale: Index
+    yaw: Index
+    near_bias: Index
+    band: int
+    border: int
+    width: int
+
+    @staticmethod
+    def of(problem: Problem) -> BandLayout:
+        count, priors = len(problem.initial), problem.priors
+        factors = (problem.odometry, problem.closures, problem.ranges)
+        i = np.concatenate([f.i for f in factors])
+        j = np.concatenate([f.j for f in factors])
+        apart = border_poses(i, j, narrow=8 + 4 * len(priors.scale))
+        inside = np.ones(count, dtype=bool)
+        inside[apart] = False
+        place = np.where(inside, np.cumsum(inside) - 1, 0)
+        place[apart] = count - len(apart) + np.arange(len(apart))
+        both = inside[i] & inside[j]
+        reach = int(np.abs(place[i] - place[j])[both].max(initial=0))
+        sizes = [len(p) for p in (priors.bias, priors.scale, priors.yaw, priors.near_bias)]
+        numbers = 3 * count + np.arange(sum(sizes))
+        bias, scale, yaw, near_bias = np.split(numbers, np.cumsum(sizes)[:-1])
+        return BandLayout(
+            poses=3 * place[:, None] + np.arange(3),
+            bias=bias,
+            scale=scale,
+            yaw=yaw,
+            near_bias=near_bias,
+            band=3 * (count - len(apart)),
+            border=3 * len(apart) + sum(sizes),
+            width=3 * reach + 3,
+        )
+
+    def calibration(self, unknowns: Array) -> Calibration:
+        """The part of a vector over all unknowns that belongs to the sensors."""
+        parts = (self.bias, self.scale, self.yaw, self.near_bias)
+        return Calibration(*(unknowns[numbers] for numbers in parts))
+
+
+def border_poses(i: Index, j: Index, narrow: int) -> Index:
+    """The poses that are taken out of the band.
+
+    Every pose that is taken out costs three columns of the border, every pose that the longest
+    edge spans costs three diagonals of the band; the smallest number is chosen that is enough
+    for both.
+
+    Args:
+        i, j: (m,) the two poses of each edge.
+        narrow: a reach that needs no attention.
+    """
+    reach = np.abs(i - j)
+    while True:
+        far = reach > narrow
+        apart = vertex_cover(i[far], j[far], narrow + 1)
+        if len(apart) <= narrow:
+            return apart
+        narrow *= 2

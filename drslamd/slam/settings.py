@@ -1,0 +1,60 @@
+"""Where the configuration ends: its sections become the numbers that the rooms work with."""
+
+from __future__ import annotations
+
+import math
+
+from drslamd.config import Config, OdometrySection, RelativePoseSection
+from drslamd.conventions import SECOND_US, Chain
+from drslamd.slam.closure_method import ClosureMethod, drslamd_method, paper_method
+from drslamd.slam.odometry.noise import OdometryNoise
+from drslamd.slam.optimizer.banded.banded_optimizer import BandedOptimizer
+from drslamd.slam.optimizer.closures.closure_optimizer import ClosureOptimizer
+from drslamd.slam.optimizer.contract import Optimizer
+from drslamd.slam.optimizer.rbcd.rbcd_optimizer import RbcdOptimizer
+from drslamd.slam.robot_model import RobotModel
+from drslamd.slam.tuning import DEFAULTS, Tuning
+
+
+def odometry_noise(section: OdometrySection) -> OdometryNoise:
+    """Sigmas in radians."""
+    return OdometryNoise(
+        section.scale_sigma,
+        math.radians(section.yaw_sigma_deg_per_m),
+        section.random_translation_per_sqrt_m,
+        math.radians(section.random_yaw_deg_per_sqrt_m),
+    )
+
+
+def robot_model(config: Config, noise: OdometryNoise) -> RobotModel:
+    """
+    Args:
+        noise: of our odometry, as much of it as is not known.
+    """
+    uwb = config.uwb
+    return RobotModel(noise, uwb.antenna_x_m, uwb.antenna_y_m, uwb.antenna_z_m)
+
+
+def closure_method(section: RelativePoseSection, tuning: Tuning = DEFAULTS) -> ClosureMethod:
+    """Of `relative_pose.algorithm`."""
+    if section.algorithm == "paper":
+        return paper_method(section.tau, section.range_sigma_m, section.delta)
+    longest_us = int(section.window_max_s * SECOND_US)
+    return drslamd_method(longest_us, section.delta, section.self_calibration, tuning.confirm_us)
+
+
+def optimizer(config: Config, own: Chain, tuning: Tuning = DEFAULTS) -> Optimizer:
+    """Of `optimizer.algorithm`."""
+    section, ranges = config.optimizer, config.relative_pose
+    if section.algorithm == "rbcd":
+        return RbcdOptimizer(own, section.rank)
+    if section.algorithm == "closures":
+        return ClosureOptimizer(tuning.believable)
+    return BandedOptimizer(
+        bias_sigma=ranges.range_bias_sigma_m,
+        range_sigma=ranges.range_sigma_m,
+        model=tuning.ranges,
+        scale_tails=tuning.scale_tails,
+        has_cauchy_priors=tuning.has_cauchy_priors,
+        learns_scatter=tuning.learns_scatter,
+    )
