@@ -75,23 +75,23 @@ class Broadcast:
         if quiet and utime - self._status_said < QUIET_US - SOONER_US:
             return []
         self._news, self._status_said = news, utime
-        return [team.send(self.status(neighbours, uwb_clock, utime), utime)]
+        return [team.send(self.make_status(neighbours, uwb_clock, utime), utime)]
 
     def _ranged(self, utime: int) -> Set[int]:
         """Robots that we measure ranges to."""
         robots = (self._team.robot_of_uwb(uwb_id) for uwb_id in self._front.ranged(utime))
         return {robot for robot in robots if robot is not None}
 
-    def status(
+    def make_status(
         self,
         neighbours: list[PeerInRange],
         uwb_clock: int | None,
         utime: int,
         leaving: bool = False,
     ) -> Status:
-        """What we are, whom we hear, what we hold; made to be sent, because names take turns."""
+        """What we are, whom we hear, what we hold: the next one to be sent, as names take turns."""
         estimate = self._back.estimate
-        heard = self._team.heard_peers(utime, self._front.needed(neighbours, utime))
+        heard = self._team.next_heard(utime, self._front.needed(neighbours, utime))
         return Status(
             state=int(estimate is not None),
             frame=estimate.frame.robot if estimate else self._team.own.robot,
@@ -101,7 +101,7 @@ class Broadcast:
             graph_hash=self._back.digest(),
             heard=heard,
             ranged=tuple(sorted(self._ranged(utime) & {h.id for h in heard})),
-            logs=self._team.logs.states(),
+            logs=self._team.logs.next_states(),
         )
 
     # ---- odometry ----

@@ -14,14 +14,19 @@ from drslamd.jobs import OPTIMIZER, RELATIVE_POSE, DutyCycle, Jobs
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.wheels.wheel_input import WheelInput
 from drslamd.slam.back_end import BackEnd
+from drslamd.slam.consistency.pair import PairTracker
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.peer_in_range import PeerInRange
+from drslamd.slam.relative_pose.estimate import Verdict
 
 PATIENCE_US = 3 * SECOND_US
 """How long an open port may be silent before that is worth a word."""
 
 LATE = 2
 """A module that runs half as often as it should is worth a word."""
+
+ANSWERS = {Verdict.UNIQUE.value, Verdict.AMBIGUOUS.value}
+"""Verdicts of windows that named a pose."""
 
 Condition = tuple[str, "str | None"]
 """A key, and a sentence when something is wrong."""
@@ -113,8 +118,20 @@ def why_not_localised(robot: Stages, utime: int) -> str | None:
             f"not localised: closures with this robot are made by robots "
             f"{_listed(peer.chain.robot for peer in near)}; ask them"
         )
-    reasons = [f"{pair.last_verdict or 'nothing yet'} (with robot {k})" for k, pair in owned]
+    reasons = [f"{_why_not_connected(pair)} (with robot {k})" for k, pair in owned]
     return f"not localised: {', '.join(reasons)}; drive curves, and not side by side"
+
+
+def _why_not_connected(pair: PairTracker) -> str:
+    """What keeps a pair from being believed: its windows, or closures that do not agree yet."""
+    if not pair.closures_seen or pair.last_verdict not in ANSWERS:
+        return pair.last_verdict or "nothing measured yet"
+    if pair.connected:
+        return "connected, the graph is about to be solved"
+    return (
+        f"{len(pair.kept)} of {pair.closures_seen} closures agree, "
+        f"{pair.agreement.least} must and outnumber all others"
+    )
 
 
 def _listed(robots: object) -> str:

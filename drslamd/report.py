@@ -106,7 +106,7 @@ def _network(robot: Robot, utime: int) -> dict[str, Any]:
         "log_entries_heard_again": team.repeats_heard,
         "refused": dict(team.refused),
         "own_echo_age_s": age_s(utime, team.last_echo),
-        "log_entries_repeated": team.logs.repeated,
+        "log_entries_repeated": team.logs.repeats.repeated,
     }
 
 

@@ -318,6 +318,6 @@ class Robot:
         return [Save(self.state())]
 
     def _on_stop(self, event: Stop) -> list[Effect]:
-        goodbye = self.broadcast.status([], None, event.utime, leaving=True)
+        goodbye = self.broadcast.make_status([], None, event.utime, leaving=True)
         sends = [self.team.send(goodbye, event.utime) for _ in range(GOODBYES)]
         return [*sends, Save(self.state())]

@@ -30,10 +30,10 @@ from drslamd.slam.graph.measurements import (
     ClosureMeasurement,
     GraphEntry,
     Keyframe,
-    PublicPoses,
     RangeMeasurement,
     RelativePoses,
 )
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.robot_model import RobotModel
 
 MILLIMETRE_M = 1e-3

@@ -8,7 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Union
 
-from drslamd.slam.graph.measurements import GraphEntry, PublicPoses
+from drslamd.slam.graph.measurements import GraphEntry
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.se2 import Array
 
 UNKNOWN_CLOCK = -(2**63)

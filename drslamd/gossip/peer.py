@@ -17,7 +17,7 @@ from drslamd.gossip.message_types import (
     Status,
 )
 from drslamd.gossip.peer_clock import PeerClock
-from drslamd.slam.graph.measurements import PublicPoses
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.odometry.track import PEER_TRACK_SAMPLES, Track
 from drslamd.slam.peer_in_range import PeerInRange
 

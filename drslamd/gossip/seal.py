@@ -20,6 +20,7 @@ from hashlib import blake2b
 
 from drslamd.conventions import MAX_ROBOT_ID
 from drslamd.gossip.lc02 import MAX_PAYLOAD
+from drslamd.gossip.replay_window import ReplayWindow
 
 VERSION = 1
 KEY_BYTES = 32
@@ -30,10 +31,7 @@ _HEADER = struct.Struct(f">8sbhqiq{TAG_BYTES}s")
 _TAG_AT = _HEADER.size - TAG_BYTES
 _PUBLIC_KEY = b"drslamd without a team key      "
 
-WINDOW = 1_024
-"""Counters that a replay window remembers: a minute at 16 messages a second."""
 FIRST_EPOCH = 0
-FIRST_COUNTER = 1
 
 
 class SealFault(Enum):
@@ -57,30 +55,6 @@ class Header:
     epoch: int
     counter: int
     utime: int
-
-
-class ReplayWindow:
-    """Which of the last `WINDOW` counters were seen; asking changes nothing."""
-
-    def __init__(self) -> None:
-        self._newest = 0
-        self._seen = 0
-        """Bit k stands for the counter `_newest` - k."""
-
-    def is_new(self, counter: int) -> bool:
-        if counter > self._newest:
-            return True
-        age = self._newest - counter
-        return counter >= FIRST_COUNTER and age < WINDOW and not self._seen >> age & 1
-
-    def commit(self, counter: int) -> None:
-        """Remember a counter that `is_new`."""
-        if counter > self._newest:
-            shift = min(counter - self._newest, WINDOW)
-            self._seen = (self._seen << shift | 1) & ((1 << WINDOW) - 1)
-            self._newest = counter
-        else:
-            self._seen |= 1 << (self._newest - counter)
 
 
 def team_key(secret: bytes | None) -> bytes:

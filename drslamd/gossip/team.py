@@ -18,9 +18,9 @@ from drslamd.slam.graph.measurements import (
     ClosureMeasurement,
     GraphEntry,
     Keyframe,
-    PublicPoses,
     RangeMeasurement,
 )
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.robot_model import RobotModel
 
 FORGET_US = 600 * SECOND_US
@@ -136,13 +136,15 @@ class Team:
 
     def repeats(self, utime: int) -> list[Send]:
         """Log entries that somebody lacks; ask several times a second."""
-        return [self.send_sealed(owner, sealed) for owner, sealed in self.logs.due(utime)]
+        return [
+            self.send_sealed(owner, sealed) for owner, sealed in self.logs.repeats.take_due(utime)
+        ]
 
     def audible(self, utime: int) -> Set[Chain]:
         """Whom we hear."""
         return {peer.chain for peer in self.peers.values() if peer.is_alive(utime)}
 
-    def heard_peers(self, utime: int, needed: Container[int] = ()) -> tuple[Heard, ...]:
+    def next_heard(self, utime: int, needed: Container[int] = ()) -> tuple[Heard, ...]:
         """For our next status: whom we hear, in turn when they are too many.
 
         Args:
@@ -224,7 +226,7 @@ class Team:
     def _status(self, peer: Peer, status: Status, counter: int, utime: int) -> None:
         if not peer.take_status(status, counter, self.own, utime):
             return
-        self.logs.peer_holds(status.logs, peer.chain.robot, utime)
+        self.logs.on_states(status.logs, peer.chain.robot, utime)
         starts = [(s.id, s.epoch) for s in status.heard] + [(s.id, s.epoch) for s in status.logs]
         for robot, epoch in starts:
             if robot == self.own.robot and epoch > self.own.epoch:

@@ -13,8 +13,9 @@ from drslamd.slam import settings
 from drslamd.slam.graph import team_frame
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.history import History
-from drslamd.slam.graph.measurements import GraphEntry, PublicPoses
+from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.graph.thinning import Thinning
 from drslamd.slam.optimizer.contract import Job

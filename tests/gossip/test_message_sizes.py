@@ -12,12 +12,8 @@ from drslamd.events import ChannelMessage, Send
 from drslamd.gossip import lc02, messages
 from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose
 from drslamd.gossip.team import ITEMS_PER_ENTRY, Team
-from drslamd.slam.graph.measurements import (
-    ClosureMeasurement,
-    Keyframe,
-    PublicPoses,
-    RangeMeasurement,
-)
+from drslamd.slam.graph.measurements import ClosureMeasurement, Keyframe, RangeMeasurement
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.robot_model import UNTOLD
 
 
@@ -37,7 +33,7 @@ def test_the_status_of_a_robot_that_hears_254_others_fits() -> None:
     team = Team(a_seal(0))
     for robot in range(1, 255):
         team.receive(ChannelMessage(0, *sealed(a_seal(robot), a_status())))
-    heard, logs = team.heard_peers(0), team.logs.states()
+    heard, logs = team.next_heard(0), team.logs.next_states()
     assert len(heard) == len(logs) == 28
     assert fits(team.send(a_status(heard, logs, ranged=tuple(range(28))), 0))
 

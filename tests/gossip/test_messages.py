@@ -20,9 +20,9 @@ from drslamd.slam.graph.measurements import (
     ClosureMeasurement,
     GraphEntry,
     Keyframe,
-    PublicPoses,
     RangeMeasurement,
 )
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.robot_model import RobotModel
 

@@ -8,7 +8,8 @@ import pytest
 from message_builders import OTHER_SECRET, SECRET, a_seal, a_status, forged, kinds, resealed, sealed
 
 from drslamd.gossip import messages
-from drslamd.gossip.seal import Header, ReplayWindow, Seal, SealFault, team_key
+from drslamd.gossip.replay_window import ReplayWindow
+from drslamd.gossip.seal import Header, Seal, SealFault, team_key
 
 STATUS = frozenset([messages.FINGERPRINTS["STATUS"]])
 HUGE, LAST_COUNTER = 2**63 - 1, 2**31 - 1

@@ -21,7 +21,7 @@ from drslamd.gossip import lc02
 from drslamd.gossip.message_types import Heard, LogState, Message, OdometryBatch, Status
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
-from drslamd.slam.graph.measurements import PublicPoses
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.robot_model import UNTOLD, RobotModel
 
@@ -89,7 +89,7 @@ def test_a_log_entry_says_nothing_of_whether_its_origin_lives() -> None:
     team = a_team()
     assert tell(team, a_seal(3), an_entry(0, 1))
     assert team.peers == {}
-    assert team.logs.states() == (LogState(3, 1, 0, 1, 1),)
+    assert team.logs.next_states() == (LogState(3, 1, 0, 1, 1),)
 
 
 def test_a_log_entry_is_handed_out_once_whoever_sends_it() -> None:
@@ -106,7 +106,7 @@ def test_a_robot_that_starts_again_is_a_new_peer() -> None:
     assert tell(team, a_seal(3, epoch=6), a_status())
     assert team.peers[3].chain == Chain(3, 6)
     assert len(team.peers[3].track) == 0
-    assert team.logs.states() == (LogState(3, 6, 0, 0, 0),)
+    assert team.logs.next_states() == (LogState(3, 6, 0, 0, 0),)
     assert not tell(team, a_seal(3, epoch=5), a_status())
     assert team.peers[3].chain == Chain(3, 6)
 
@@ -201,14 +201,14 @@ def test_we_vouch_for_those_whom_we_heard_of_late() -> None:
     tell(team, a_seal(3), a_status())
     tell(team, a_seal(4), a_status(leaving=True))
     for utime, heard in ((T0 + 5 * SECOND - 1, [3]), (T0 + 5 * SECOND, [])):
-        assert [h.id for h in team.heard_peers(utime)] == heard
+        assert [h.id for h in team.next_heard(utime)] == heard
 
 
 def test_we_name_those_whom_we_hear_and_what_their_messages_took() -> None:
     team = a_team()
     for robot, arrived in ((5, 40 * MS), (3, 30 * MS), (4, 50 * MS)):
         team.receive(ChannelMessage(T0 + arrived, *sealed(a_seal(robot), a_status(), T0)))
-    assert team.heard_peers(T0 + 60 * MS) == (
+    assert team.next_heard(T0 + 60 * MS) == (
         Heard(3, 1, 30 * MS), Heard(4, 1, 50 * MS), Heard(5, 1, 40 * MS),
     )  # fmt: skip
 
@@ -221,7 +221,7 @@ def test_peers_that_do_not_fit_one_status_take_turns(others: int, statuses: int)
     named: list[int] = []
     for _ in range(statuses):
         assert len(set(named)) < others
-        ids = [h.id for h in team.heard_peers(T0)]
+        ids = [h.id for h in team.next_heard(T0)]
         assert len(set(ids)) == len(ids) == min(28, others)
         named += ids
     assert set(named) == set(range(1, others + 1))
@@ -233,8 +233,8 @@ def test_a_robot_that_falls_silent_costs_nobody_else_its_turn() -> None:
     team = Team(a_seal(0))
     for robot in range(1, 41):
         tell(team, a_seal(robot), a_status(), T0 if robot == 28 else T0 + SECOND)
-    assert [h.id for h in team.heard_peers(T0 + SECOND)] == list(range(1, 29))
-    assert [h.id for h in team.heard_peers(T0 + 5 * SECOND)] == [*range(29, 41), *range(1, 17)]
+    assert [h.id for h in team.next_heard(T0 + SECOND)] == list(range(1, 29))
+    assert [h.id for h in team.next_heard(T0 + 5 * SECOND)] == [*range(29, 41), *range(1, 17)]
 
 
 def test_a_peer_is_forgotten_after_ten_silent_minutes_and_its_log_is_not() -> None:
@@ -346,7 +346,7 @@ def test_a_robot_that_lost_its_memory_learns_its_last_epoch_after_any_silence() 
     peer = Team(a_seal(3))
     tell(peer, a_seal(1, epoch=12), a_status(), T0)
     team = a_team()
-    status = a_status(peer.heard_peers(T0 + 60 * SECOND), peer.logs.states())
+    status = a_status(peer.next_heard(T0 + 60 * SECOND), peer.logs.next_states())
     tell(team, a_seal(3), status, T0 + 60 * SECOND)
     assert team.superseded_by == 12
 

@@ -80,7 +80,7 @@ class Air:
             for send in team.repeats(self.utime):
                 self.carry(robot, send)
             if self.utime // STEP % self._steps == self._phase[robot]:
-                status = a_status(team.heard_peers(self.utime), team.logs.states())
+                status = a_status(team.next_heard(self.utime), team.logs.next_states())
                 self.carry(robot, team.send(status, self.utime))
 
     def seconds(self, count: int, speakers: Iterable[int] = (), *, aloud: bool = True) -> None:

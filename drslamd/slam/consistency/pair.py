@@ -85,7 +85,8 @@ class PairTracker:
         verdicts: how many windows came to which verdict; last_verdict: of the latest.
         history: answers of module 1, oldest first.
         kept: closures of the consistent set, as module 2 last left it.
-        connected: do so many agree that they are believed?
+        agreement: when they are believed.
+        connected: are they?
     """
 
     def __init__(
@@ -103,7 +104,7 @@ class PairTracker:
         self.peer = peer
         self.ranges = ranges
         self.sampler = sampler
-        self._epsilon, self._agreement = epsilon, agreement
+        self._epsilon, self.agreement = epsilon, agreement
         self.verdicts: Counter[str] = Counter()
         self.last_verdict = ""
         self.history: deque[WindowAnswer] = deque(maxlen=HISTORY)
@@ -211,12 +212,12 @@ class PairTracker:
         """Module 2 has answered: is the pair connected now?"""
         self._is_busy = False
         self._checked, self.kept = checked, checked.kept()
-        enough = len(self.kept) >= self._agreement.least
+        enough = len(self.kept) >= self.agreement.least
         if self.connected and enough:
             return
         # the rivals are searched last: that takes a while
-        rivals = self._agreement.outnumber and checked.consistency.rivals()
-        self.connected = enough and len(self.kept) >= self._agreement.outnumber * rivals
+        rivals = self.agreement.outnumber and checked.consistency.rivals()
+        self.connected = enough and len(self.kept) >= self.agreement.outnumber * rivals
 
     def accepted(self) -> set[int]:
         """Numbers of all closures that are kept, of earlier segments too, back to `history`."""

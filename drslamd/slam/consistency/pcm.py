@@ -19,7 +19,7 @@ import numpy as np
 from drslamd.slam import se2
 from drslamd.slam.chi_squared import quantile3
 from drslamd.slam.consistency import loops
-from drslamd.slam.consistency.clique import IncrementalClique, bits
+from drslamd.slam.consistency.incremental_clique import IncrementalClique, bits
 from drslamd.slam.consistency.loops import Places, columns
 from drslamd.slam.odometry.noise import OdometryNoise, twist_covariance
 from drslamd.slam.se2 import Array

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from drslamd.slam.graph.estimate import TeamEstimate
-from drslamd.slam.graph.measurements import PublicPoses
 from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 
 Job = Callable[[], TeamEstimate]

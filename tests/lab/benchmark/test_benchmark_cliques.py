@@ -7,7 +7,7 @@ import importlib.util
 import pytest
 from lab.benchmark import module2
 
-from drslamd.slam.consistency.clique import IncrementalClique
+from drslamd.slam.consistency.incremental_clique import IncrementalClique
 
 PLANTED = [(a, b) for a in range(2, 8) for b in range(a + 1, 8)]
 """Six that all agree, among ten."""

@@ -10,7 +10,7 @@ from lab.reproduce.experiment import PAIRS
 from lab.reproduce.paper_column import Closures
 from lab.score import metrics
 
-from drslamd.slam.optimizer.rbcd import block_descent
+from drslamd.slam.optimizer.rbcd import riemannian_descent
 
 POSES = 40
 
@@ -60,15 +60,17 @@ def test_riemannian_descent_finds_nothing_below_the_minimum() -> None:
     problem = dpgo.graph(odometry, closures(rng, truth, 0.1))
     poses = dpgo.minimum(problem, dpgo.chordal(problem))
     nothing = problem.edges.chosen(np.zeros(0, dtype=np.int64))
-    block = block_descent.block(
+    block = riemannian_descent.block(
         problem.edges, nothing, nothing, np.zeros((0, 10), dtype=complex), problem.size
     )
-    reached = block_descent.stacked(block_descent.lift(poses, 5))
-    start = block_descent.stacked(block_descent.lift(dpgo.chordal(problem), 5))
+    reached = riemannian_descent.stacked(riemannian_descent.lift(poses, 5))
+    start = riemannian_descent.stacked(riemannian_descent.lift(dpgo.chordal(problem), 5))
     assert block.cost(reached) < block.cost(start)
     # from another rank too: the relaxation has no lower point nearby
-    shaken = block_descent.retract(reached + 0.01 * rng.normal(size=reached.shape))
-    assert block.cost(block_descent.descend(block, shaken, 300)) > block.cost(reached) * (1 - 1e-6)
+    shaken = riemannian_descent.retract(reached + 0.01 * rng.normal(size=reached.shape))
+    assert block.cost(riemannian_descent.descend(block, shaken, 300)) > block.cost(reached) * (
+        1 - 1e-6
+    )
 
 
 def test_dpgos_slope_is_that_of_its_error() -> None:

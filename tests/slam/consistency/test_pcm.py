@@ -9,7 +9,7 @@ from slam_scenes import NOISE, Array, inverted, matrix, pose_of, product, wander
 from drslamd.slam import se2
 from drslamd.slam.chi_squared import quantile3
 from drslamd.slam.consistency import pcm
-from drslamd.slam.consistency.clique import IncrementalClique
+from drslamd.slam.consistency.incremental_clique import IncrementalClique
 from drslamd.slam.consistency.pcm import Candidate, PairConsistency
 from drslamd.slam.odometry.noise import growth
 

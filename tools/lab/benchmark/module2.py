@@ -10,7 +10,7 @@ from itertools import product
 import networkx as nx
 import numpy as np
 
-from drslamd.slam.consistency.clique import IncrementalClique, bits
+from drslamd.slam.consistency.incremental_clique import IncrementalClique, bits
 from drslamd.slam.consistency.pcm import PairConsistency
 from lab.benchmark import closures, timing
 from lab.benchmark.rows import Peer, Row

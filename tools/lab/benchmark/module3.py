@@ -10,7 +10,7 @@ import numpy as np
 
 from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
-from drslamd.slam.optimizer.rbcd import block_descent
+from drslamd.slam.optimizer.rbcd import riemannian_descent
 from lab.benchmark import distributed, graphs, timing
 from lab.benchmark.graphs import Graph
 from lab.benchmark.rows import Peer, Row
@@ -154,7 +154,7 @@ def plain_block_descent(graph: Graph, rounds: int) -> Iterator[Row]:
     """The paper's module 3 in rounds: every robot descends on its block, then all tell."""
     judge = PoseGraphSolver(graph.edges, graph.count)
     rank = 5
-    lifted = block_descent.lift(judge.chordal_start(), rank)
+    lifted = riemannian_descent.lift(judge.chordal_start(), rank)
     robot = graph.robot[np.argsort(graph.place)]
     began = timing.now_ms()
     for _ in range(rounds):
@@ -168,7 +168,7 @@ def plain_block_descent(graph: Graph, rounds: int) -> Iterator[Row]:
             - len(np.unique(robot)) * lifted
         )
     taken = timing.now_ms() - began
-    gap = graph.gap(judge.cost(block_descent.rounded(lifted, lifted[0])))
+    gap = graph.gap(judge.cost(riemannian_descent.rounded(lifted, lifted[0])))
     name = f"{graph.name}, plain block descent (rbcd)"
     yield Row(3, f"{name}, gap after {rounds} rounds", gap, "gap")
     yield Row(3, f"{name}, one round of all robots", taken / rounds, "ms")
@@ -187,14 +187,14 @@ def _descended(graph: Graph, lifted: Array, robot: Array, number: int) -> Array:
         i, j = place[e.i] if own_i else e.i, place[e.j] if own_j else e.j
         return ComplexFactors(i, j, e.turn, e.shift, e.kappa, e.tau)
 
-    block = block_descent.block(
+    block = riemannian_descent.block(
         numbered(inside_i & inside_j, True, True),
         numbered(inside_i & ~inside_j, True, False),
         numbered(~inside_i & inside_j, False, True),
         lifted, len(mine),
     )  # fmt: skip
     out = lifted.copy()
-    out[mine] = block_descent.rows(
-        block_descent.descend(block, block_descent.stacked(lifted[mine]))
+    out[mine] = riemannian_descent.rows(
+        riemannian_descent.descend(block, riemannian_descent.stacked(lifted[mine]))
     )
     return np.asarray(out)

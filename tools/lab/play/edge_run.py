@@ -18,7 +18,8 @@ from drslamd.conventions import GRID_HZ, ROTATION_STEP_RAD, TRANSLATION_STEP_M, 
 from drslamd.slam import se2, settings
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.consistency.pcm import Candidate, PairConsistency
-from drslamd.slam.graph.measurements import ClosureMeasurement, GraphEntry, Keyframe, PublicPoses
+from drslamd.slam.graph.measurements import ClosureMeasurement, GraphEntry, Keyframe
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.odometry.noise import OdometryNoise, growth
 from drslamd.slam.robot_model import RobotModel
 from drslamd.slam.tuning import DEFAULTS, Tuning

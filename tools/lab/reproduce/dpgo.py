@@ -2,7 +2,7 @@
 
     min  sum kappa |z_j - z_i z_ij|^2 + tau |p_j - p_i - z_i t_ij|^2,   |z_k| = 1
 
-with weights and notation of `block_descent`. Block coordinate descent needs hundreds of rounds
+with weights and notation of `riemannian_descent`. Block coordinate descent needs hundreds of rounds
 to get there, and how far it came is no property of the method; so the tables show the minimum
 itself: chordal initialisation as in DPGO, then Levenberg-Marquardt.
 """

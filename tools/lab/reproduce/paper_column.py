@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 from drslamd.config import ConsistencySection, OdometrySection, RelativePoseSection
 from drslamd.slam import settings
 from drslamd.slam.chi_squared import quantile3
-from drslamd.slam.consistency.clique import IncrementalClique, bits
+from drslamd.slam.consistency.incremental_clique import IncrementalClique, bits
 from drslamd.slam.consistency.pcm import Candidate, PairConsistency
 from drslamd.slam.odometry.noise import growth
 from drslamd.slam.relative_pose import algorithm_1

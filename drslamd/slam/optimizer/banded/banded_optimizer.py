@@ -17,8 +17,8 @@ import numpy as np
 from drslamd.conventions import Chain
 from drslamd.slam.calibration.range_scatter import scatter_ratios
 from drslamd.slam.graph.estimate import Learned, TeamEstimate, Trajectory
-from drslamd.slam.graph.measurements import PublicPoses
 from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.banded import banded_solver

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from drslamd.conventions import Chain
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
-from drslamd.slam.graph.measurements import PublicPoses
 from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.closures import gnc

@@ -17,14 +17,14 @@ from drslamd.conventions import Chain
 from drslamd.slam import se2
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.estimate import Lifted, TeamEstimate, Trajectory
-from drslamd.slam.graph.measurements import PublicPoses
 from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.factors import between_factors, chain_links
 from drslamd.slam.optimizer.problem import BetweenFactors
-from drslamd.slam.optimizer.rbcd import block_descent
+from drslamd.slam.optimizer.rbcd import riemannian_descent
 from drslamd.slam.se2 import Array
 
 SETTLED = 1e-7
@@ -104,20 +104,20 @@ class RbcdOptimizer:
             at = np.flatnonzero(np.isin(n, known.n))
             rows = known.rows[np.searchsorted(known.n, n[at])]
         elif group.frame.chain == self._own:
-            at, rows = np.zeros(1, dtype=np.int64), block_descent.lift(poses[:1], self._rank)
+            at, rows = np.zeros(1, dtype=np.int64), riemannian_descent.lift(poses[:1], self._rank)
         else:
             out, back = around.leaving, around.arriving
             at = np.concatenate([out.i, back.j])
             rows = np.concatenate([
-                block_descent.moved(around.rows[out.j], se2.inverse(out.measured)),
-                block_descent.moved(around.rows[back.i], back.measured),
+                riemannian_descent.moved(around.rows[out.j], se2.inverse(out.measured)),
+                riemannian_descent.moved(around.rows[back.i], back.measured),
             ])  # fmt: skip
             if not len(at):
                 return None
             order = np.argsort(at, kind="stable")
             at, rows = at[order], rows[order]
         nearest = np.searchsorted((n[at][1:] + n[at][:-1]) / 2, n)
-        return block_descent.moved(rows[nearest], se2.between(poses[at][nearest], poses))
+        return riemannian_descent.moved(rows[nearest], se2.between(poses[at][nearest], poses))
 
 
 def _in_group(items: ChainData, group: Group) -> Array:
@@ -202,26 +202,28 @@ def _round(
 ) -> TeamEstimate:
     """One round on our block, and what it means in the frame of the team."""
     edges = [ComplexFactors.of(e) for e in (start.own, around.leaving, around.arriving)]
-    block = block_descent.block(edges[0], edges[1], edges[2], around.rows, len(start.n))
-    before = block_descent.stacked(start.lifted)
-    after = block_descent.descend(block, before)
+    block = riemannian_descent.block(edges[0], edges[1], edges[2], around.rows, len(start.n))
+    before = riemannian_descent.stacked(start.lifted)
+    after = riemannian_descent.descend(block, before)
     gain, cost = block.cost(before) - block.cost(after), block.cost(after)
-    lifted = block_descent.rows(after)
+    lifted = riemannian_descent.rows(after)
     ours = group.frame.chain == chain
     origin = lifted[0] if anchor is None or ours else anchor
-    trajectories = {chain.robot: Trajectory(chain, start.n, block_descent.rounded(lifted, origin))}
+    trajectories = {
+        chain.robot: Trajectory(chain, start.n, riemannian_descent.rounded(lifted, origin))
+    }
     for other in dict.fromkeys(around.chains):
         mine = [k for k, c in enumerate(around.chains) if c == other]
         keyframes, first = np.unique(around.n[mine], return_index=True)
-        poses = block_descent.rounded(around.rows[mine][first], origin)
+        poses = riemannian_descent.rounded(around.rows[mine][first], origin)
         trajectories[other.robot] = Trajectory(other, keyframes, poses)
     last = len(start.n) - 1
     return TeamEstimate(
         group.frame,
         trajectories,
-        {chain.robot: block_descent.conditional_covariance(block, last, 0 if ours else None)},
+        {chain.robot: riemannian_descent.conditional_covariance(block, last, 0 if ours else None)},
         cost=cost,
-        iterations=block_descent.STEPS_PER_ROUND,
+        iterations=riemannian_descent.STEPS_PER_ROUND,
         converged=gain <= SETTLED * (1 + cost),
         lifted=Lifted(start.n, lifted, origin, around.carriers),
     )

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drslamd.slam.consistency import clique as clique_module
-from drslamd.slam.consistency.clique import IncrementalClique, bits
+from drslamd.slam.consistency import incremental_clique as clique_module
+from drslamd.slam.consistency.incremental_clique import IncrementalClique, bits
 
 
 def random_graph(seed: int, n: int, density: float) -> nx.Graph:
