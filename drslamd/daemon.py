@@ -88,7 +88,7 @@ class Daemon:
                 "trajectory": lambda: report.trajectories(self.robot),
                 "closures": lambda: report.closures(self.robot),
             },
-        )  # fmt: skip
+        )
         self._notifier = Notifier()
         self._worker = Worker()
         self._jobs_waiting = 0

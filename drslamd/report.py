@@ -189,10 +189,15 @@ def closures(robot: Robot) -> dict[str, Any]:
         kept = pair.accepted()
         for answer in pair.history:
             poses = [h.a_T_b.tolist() for h in answer.estimate.hypotheses]
-            out.append({
-                "a": robot.own.robot, "b": peer, "utime": answer.utime,
-                "verdict": answer.estimate.verdict.value, "poses": poses,
-                "covariances": [h.covariance.tolist() for h in answer.estimate.hypotheses],
-                "kept": bool(poses) and answer.number in kept,
-            })  # fmt: skip
+            out.append(
+                {
+                    "a": robot.own.robot,
+                    "b": peer,
+                    "utime": answer.utime,
+                    "verdict": answer.estimate.verdict.value,
+                    "poses": poses,
+                    "covariances": [h.covariance.tolist() for h in answer.estimate.hypotheses],
+                    "kept": bool(poses) and answer.number in kept,
+                }
+            )
     return {"closures": out}

@@ -143,12 +143,12 @@ def _read_graph(raw: Any) -> GraphEntry:
     relative = tuple(_read_relative(r, peers) for r in raw.relative)
     entry = GraphEntry(raw.seq, model, keyframes, ranges, closures, relative)
     if peers != _peers(entry):
-        raise ValueError("peers that are not those of the items")
+        raise ValueError("peers that are not those of the measurements")
     return entry
 
 
 def _peers(entry: GraphEntry) -> list[Chain]:
-    """Whom the items of an entry refer to, each named once."""
+    """Whom the measurements of an entry refer to, each named once."""
     measured = {*(r.peer for r in entry.ranges), *(c.peer for c in entry.closures)}
     return sorted(measured | {item.chain for item in entry.relative})
 

@@ -1,6 +1,6 @@
 """The messages as the rest of drslamd sees them, and how much of each fits one datagram.
 
-Those that belong to the pose graph (`GraphEntry`, `PublicPoses`) are in `drslamd.slam.items`.
+Those that belong to the pose graph (`GraphEntry`, `PublicPoses`) are in `drslamd.slam.graph`.
 """
 
 from __future__ import annotations

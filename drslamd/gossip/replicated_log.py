@@ -1,4 +1,4 @@
-"""One robot's log as another holds it: which entries are here, and which are known to be missing."""
+"""One robot's log as another holds it: which entries are here, and which are known to lack."""
 
 from __future__ import annotations
 

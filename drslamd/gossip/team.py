@@ -27,7 +27,7 @@ FORGET_US = 600 * SECOND_US
 """A peer that was silent for ten minutes is no longer listed."""
 MODEL_EVERY = 64
 """Log entries between two that say what our sensors are like."""
-ITEMS_PER_ENTRY = 20
+MEASUREMENTS_PER_ENTRY = 20
 """Keyframes, ranges and closures in one log entry; 20 closures with 20 peers are 1,282 bytes."""
 PUBLIC_ENVELOPE_BYTES = 57
 """What a public_poses_t needs besides its poses."""
@@ -118,10 +118,10 @@ class Team:
         closures: Sequence[ClosureMeasurement],
     ) -> Iterator[GraphEntry]:
         """The next entries of our log, each small enough for one datagram."""
-        items = [*keyframes, *ranges, *closures]
-        starts = range(0, len(items), ITEMS_PER_ENTRY)
+        measurements = [*keyframes, *ranges, *closures]
+        starts = range(0, len(measurements), MEASUREMENTS_PER_ENTRY)
         for seq, first in enumerate(starts, start=self._next_seq):
-            part = items[first : first + ITEMS_PER_ENTRY]
+            part = measurements[first : first + MEASUREMENTS_PER_ENTRY]
             yield GraphEntry(
                 seq,
                 model if seq % MODEL_EVERY == 0 else None,

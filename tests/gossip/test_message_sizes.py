@@ -11,7 +11,7 @@ from drslamd.conventions import Chain
 from drslamd.events import ChannelMessage, Send
 from drslamd.gossip import lc02, messages
 from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose
-from drslamd.gossip.team import ITEMS_PER_ENTRY, Team
+from drslamd.gossip.team import MEASUREMENTS_PER_ENTRY, Team
 from drslamd.slam.graph.measurements import ClosureMeasurement, Keyframe, RangeMeasurement
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.robot_model import UNTOLD
@@ -80,7 +80,7 @@ def test_items_of_every_kind_are_said_completely_in_entries_that_fit(
 
 def test_twenty_closures_with_twenty_peers_and_the_traits_have_1282_bytes() -> None:
     team = Team(a_seal(3))
-    (entry,) = team.entries(UNTOLD, (), (), CLOSURES[:ITEMS_PER_ENTRY])
+    (entry,) = team.entries(UNTOLD, (), (), CLOSURES[:MEASUREMENTS_PER_ENTRY])
     assert len(messages.encode(HEADER, entry)) == 54 + 28 + 20 * (10 + 50) == 1282
 
 

@@ -58,8 +58,17 @@ def one_of_each_kind() -> list[Message]:
     steps = np.array([[100, -200, 30], [105, -190, 31], [111, -181, 33]], dtype=float)
     lifted = (np.arange(12) + 1j * np.arange(12, 24)).reshape(3, 4)
     return [
-        Status(1, 3, True, 70_000, -5, -6, (Heard(4, 12, -700),), (4, 9),
-               (LogState(3, 11, 0, 5, 6), LogState(4, 12, 2, 2, 2))),
+        Status(
+            1,
+            3,
+            True,
+            70_000,
+            -5,
+            -6,
+            (Heard(4, 12, -700),),
+            (4, 9),
+            (LogState(3, 11, 0, 5, 6), LogState(4, 12, 2, 2, 2)),
+        ),
         OdometryBatch(40, 40, steps),
         GraphEntry(
             2,
@@ -70,7 +79,7 @@ def one_of_each_kind() -> list[Message]:
         ),
         Pose(1, 3, 11, 4_000_000, (1.25, -2.5, 3.0), COVARIANCE),
         PublicPoses(3, 11, 2, (40, 50), lifted),
-    ]  # fmt: skip
+    ]
 
 
 def kinds() -> dict[str, Message]:

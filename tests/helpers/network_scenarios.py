@@ -252,9 +252,12 @@ async def lcm_logger_records_what_we_say(folder: str) -> None:
     transport, ear = native(where)
     # the program itself, which the console script of the same name would only start
     logger = await asyncio.create_subprocess_exec(
-        Path(lcm.LCM_BIN_DIR) / "lcm-logger", "--quiet", "--flush-interval=50",
-        f"--lcm-url=udpm://{GROUP}:{where.port}?ttl=0", log,
-    )  # fmt: skip
+        Path(lcm.LCM_BIN_DIR) / "lcm-logger",
+        "--quiet",
+        "--flush-interval=50",
+        f"--lcm-url=udpm://{GROUP}:{where.port}?ttl=0",
+        log,
+    )
     try:
         async with running(transport):
             await spoken_until(transport, ear.is_up)

@@ -103,20 +103,29 @@ def team_problem(
             rows.append((i, j, *q[a], *q[b], measured_m, number))
     table = np.reshape(rows, (-1, 8))
     ranges = RangeFactors(
-        table[:, 0].astype(int), table[:, 1].astype(int), table[:, 2:4], table[:, 4:6],
-        table[:, 6] + range_error * rng.normal(size=len(table)), np.full(len(table), 0.05),
+        table[:, 0].astype(int),
+        table[:, 1].astype(int),
+        table[:, 2:4],
+        table[:, 4:6],
+        table[:, 6] + range_error * rng.normal(size=len(table)),
+        np.full(len(table), 0.05),
         table[:, 7].astype(int),
-    )  # fmt: skip
+    )
     joined = [(robots * k, robots * k + 1) for k in np.linspace(1, count - 2, closures).astype(int)]
     priors = Priors(
         np.full(len(names), 0.3), np.full(robots, 0.03), np.full(robots, 0.01), np.full(1, 0.1)
     )
     start = truth + rng.normal(0, 0.03, truth.shape)
     problem = Problem(
-        np.arange(len(truth)) % robots, np.arange(len(truth)) // robots, start, 0, odometry,
+        np.arange(len(truth)) % robots,
+        np.arange(len(truth)) // robots,
+        start,
+        0,
+        odometry,
         pose_edges(rng, truth, [(int(i), int(j)) for i, j in joined], (0.05, 0.05, 0.03)),
-        ranges, priors,
-    )  # fmt: skip
+        ranges,
+        priors,
+    )
     return problem, truth
 
 
@@ -176,8 +185,9 @@ def whitened(
     i: Array, j: Array, measured: Array | tuple[float, ...], covariance: Array
 ) -> list[float]:
     seen = product(inverted(i), j)
-    error = np.array([*(seen[:2] - np.array(measured[:2])),
-                      math.remainder(seen[2] - measured[2], 2 * math.pi)])  # fmt: skip
+    error = np.array(
+        [*(seen[:2] - np.array(measured[:2])), math.remainder(seen[2] - measured[2], 2 * math.pi)]
+    )
     return list(np.linalg.solve(np.linalg.cholesky(covariance), error))
 
 

@@ -253,8 +253,9 @@ def driven(rng: np.random.Generator, truth: Array, noise: OdometryNoise) -> Arra
         length = math.hypot(step[0], step[1])
         turn = bend * length + rng.normal(0, noise.yaw_rad_per_sqrt_m * math.sqrt(length))
         shift = rng.normal(0, noise.translation_per_sqrt_m * math.sqrt(length), 2)
-        wrong = product(product((0, 0, turn / 2), (*(scale * step[:2] + shift), step[2])),
-                        (0, 0, turn / 2))  # fmt: skip
+        wrong = product(
+            product((0, 0, turn / 2), (*(scale * step[:2] + shift), step[2])), (0, 0, turn / 2)
+        )
         poses.append(product(poses[-1], wrong))
     out = np.array(poses)
     out[:, 2] = np.unwrap(out[:, 2])

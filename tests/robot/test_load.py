@@ -9,8 +9,9 @@ from teams import EASY, VirtualTeam
 from drslamd.conventions import SECOND_US
 
 
-@pytest.mark.parametrize(("solve_ms", "cycle_s", "said"), [(100, 1.0, False), (390, 2.0, False),
-                                                           (560, 3.0, True)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("solve_ms", "cycle_s", "said"), [(100, 1.0, False), (390, 2.0, False), (560, 3.0, True)]
+)
 def test_a_module_takes_a_fifth_of_a_core_at_most_and_names_its_pace(
     solve_ms: int, cycle_s: float, said: bool
 ) -> None:

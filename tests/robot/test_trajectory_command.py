@@ -21,8 +21,9 @@ from teams import EASY, VirtualTeam
 from drslamd import cli, report
 from drslamd.io.status_socket import StatusSocket
 
-SCENE = world.Scene(robots=2, seconds=40.0, ranges=EASY.ranges, odometry=EASY.odometry,
-                    odometry_hz=20, range_hz=10)  # fmt: skip
+SCENE = world.Scene(
+    robots=2, seconds=40.0, ranges=EASY.ranges, odometry=EASY.odometry, odometry_hz=20, range_hz=10
+)
 TOML = """
 [robot]
 id = 1

@@ -69,8 +69,15 @@ class _Columns:
         return _Columns(*(np.empty((rows, MAX_VERTICES)) for rows in (1, 3, 6, 2, 2, 6, 6)))
 
     def all(self) -> list[Array]:
-        return [self.closure, self.offset, self.covariance,
-                self.a_place, self.b_place, self.a_sums, self.b_sums]  # fmt: skip
+        return [
+            self.closure,
+            self.offset,
+            self.covariance,
+            self.a_place,
+            self.b_place,
+            self.a_sums,
+            self.b_sums,
+        ]
 
 
 @dataclass
@@ -100,8 +107,15 @@ class PairConsistency:
         local = se2.adjoint(np.array([*candidate.a_T_b[:2], 0.0]))
         carry = se2.adjoint(candidate.a_pose) @ local
         covariance = np.array(se2.packed(carry @ candidate.covariance @ carry.T))
-        row = [np.array([candidate.closure]), offset, covariance, candidate.a_pose[:2],
-               candidate.b_pose[:2], candidate.a_sums, candidate.b_sums]  # fmt: skip
+        row = [
+            np.array([candidate.closure]),
+            offset,
+            covariance,
+            candidate.a_pose[:2],
+            candidate.b_pose[:2],
+            candidate.a_sums,
+            candidate.b_sums,
+        ]
         for column, value in zip(self._columns.all(), row, strict=True):
             column[:, k] = value
         distance = self.distances(k)

@@ -1,4 +1,4 @@
-"""What a robot adds to the pose graph: keyframes, ranges and closures, and the entries of its log."""
+"""What a robot adds to the pose graph: keyframes, ranges and closures, in entries of its log."""
 
 from __future__ import annotations
 

@@ -42,8 +42,10 @@ class PublicPoses:
     def after(self, before: PublicPoses | None) -> PublicPoses:
         """These poses, and those of an earlier message that they do not replace."""
         same = before is not None and (before.frame, before.frame_epoch, before.rank) == (
-            self.frame, self.frame_epoch, self.rank,
-        )  # fmt: skip
+            self.frame,
+            self.frame_epoch,
+            self.rank,
+        )
         if before is None or not same:
             return self
         table = {**before.table(), **self.table()}

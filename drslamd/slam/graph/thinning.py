@@ -7,7 +7,7 @@ uncertain as the way was long. So later closures still move old times, as stiff 
 with their age.
 
 Which keyframes stay follows from their numbers and the age of the newest alone: robots that hold
-the same items thin them to the same.
+the same data thin them to the same.
 """
 
 from __future__ import annotations
@@ -44,25 +44,25 @@ class Thinning:
 
     def after(self, robot: int) -> None:
         """Thin a chain that has grown by a stretch of time, and what was measured with it."""
-        items = self._graph.chains.get(robot)
-        if items is None or not len(items.keyframes):
+        data = self._graph.chains.get(robot)
+        if data is None or not len(data.keyframes):
             return
-        stretch = int(items.keyframes.n[-1]) // (EVERY_S * GRID_HZ)
-        if self._done.get(items.chain) == stretch:
+        stretch = int(data.keyframes.n[-1]) // (EVERY_S * GRID_HZ)
+        if self._done.get(data.chain) == stretch:
             return
         self._done = {key: s for key, s in self._done.items() if key.robot != robot}
-        self._done[items.chain] = stretch
-        stays = survivors(items, stretch * EVERY_S * GRID_HZ, recent_s(len(self._graph.chains)))
+        self._done[data.chain] = stretch
+        stays = survivors(data, stretch * EVERY_S * GRID_HZ, recent_s(len(self._graph.chains)))
         if not stays.all():
-            self._drop(items, stays)
+            self._drop(data, stays)
 
-    def _drop(self, items: ChainData, stays: NDArray[np.bool_]) -> None:
+    def _drop(self, data: ChainData, stays: NDArray[np.bool_]) -> None:
         for pair in self._graph.pairs.values():
-            if pair.a == items.chain:
-                _carry(pair, items, stays, own=True)
-            elif pair.b == items.chain:
-                _carry(pair, items, stays, own=False)
-        items.keep(stays)
+            if pair.a == data.chain:
+                _carry(pair, data, stays, own=True)
+            elif pair.b == data.chain:
+                _carry(pair, data, stays, own=False)
+        data.keep(stays)
 
 
 def recent_s(robots: int) -> int:
@@ -73,7 +73,7 @@ def recent_s(robots: int) -> int:
     return TEAM_S // shares
 
 
-def survivors(items: ChainData, now: int, recent: int) -> NDArray[np.bool_]:
+def survivors(data: ChainData, now: int, recent: int) -> NDArray[np.bool_]:
     """Which keyframes of a chain stay at sample `now`.
 
     Args:
@@ -82,7 +82,7 @@ def survivors(items: ChainData, now: int, recent: int) -> NDArray[np.bool_]:
     Returns:
         (k,): the first of each segment, and the first in each cell of time.
     """
-    n, segment = items.keyframes.n, items.keyframes.segment
+    n, segment = data.keyframes.n, data.keyframes.segment
     age = (now - n) / (GRID_HZ * recent)
     level = np.where(age < 1, 0, 1 + np.floor(np.log2(np.maximum(age, 1)))).astype(int)
     cell = np.where(level > 0, n // (GRID_HZ * 4 ** np.minimum(level, 12)), n)
@@ -91,15 +91,15 @@ def survivors(items: ChainData, now: int, recent: int) -> NDArray[np.bool_]:
     return first
 
 
-def _carry(pair: PairData, items: ChainData, stays: NDArray[np.bool_], own: bool) -> None:
+def _carry(pair: PairData, data: ChainData, stays: NDArray[np.bool_], own: bool) -> None:
     """Take what a pair measured from the keyframes that go to those that stay."""
     anchors = np.maximum.accumulate(np.where(stays, np.arange(len(stays)), 0))
-    _carry_ranges(pair, items, anchors, own)
+    _carry_ranges(pair, data, anchors, own)
     closures = dict(pair.closures)
     for number, (seq, closure) in closures.items():
-        at, there = items.keyframes.find(np.array([closure.a_n if own else closure.b_n]))
+        at, there = data.keyframes.find(np.array([closure.a_n if own else closure.b_n]))
         if there[0] and not stays[at[0]]:
-            pair.closures[number] = seq, _carried(closure, items, anchors, int(at[0]), own)
+            pair.closures[number] = seq, _carried(closure, data, anchors, int(at[0]), own)
     seen: set[tuple[int, int]] = set()
     for number, (_, closure) in sorted(pair.closures.items()):
         if closure.kept and (closure.a_n, closure.b_n) in seen:
@@ -107,8 +107,8 @@ def _carry(pair: PairData, items: ChainData, stays: NDArray[np.bool_], own: bool
         seen.add((closure.a_n, closure.b_n))
 
 
-def _carry_ranges(pair: PairData, items: ChainData, anchors: Index, own: bool) -> None:
-    table, keyframes = pair.ranges.copy(), items.keyframes
+def _carry_ranges(pair: PairData, data: ChainData, anchors: Index, own: bool) -> None:
+    table, keyframes = pair.ranges.copy(), data.keyframes
     if not len(table):
         return
     end, arm = (table.a_n, table.q_a) if own else (table.b_n, table.q_b)
@@ -118,7 +118,7 @@ def _carry_ranges(pair: PairData, items: ChainData, anchors: Index, own: bool) -
     antenna = se2.transform(keyframes.poses[body], arm[moved])
     arm[moved] = se2.transform(se2.inverse(keyframes.poses[anchor]), antenna)
     end[moved] = keyframes.n[anchor]
-    spread = _spread(items, anchor, body, antenna)
+    spread = _spread(data, anchor, body, antenna)
     table.sigma_m[moved] = np.hypot(table.sigma_m[moved], spread)
     # of several between the same keyframes one stays: they share their slow bias
     touched = np.isin(end, keyframes.n[np.unique(anchor)])
@@ -128,9 +128,9 @@ def _carry_ranges(pair: PairData, items: ChainData, anchors: Index, own: bool) -
     pair.replace_ranges(table.chosen(keep))
 
 
-def _spread(items: ChainData, anchor: Index, body: Index, point: Array) -> Array:
+def _spread(data: ChainData, anchor: Index, body: Index, point: Array) -> Array:
     """Sigma, m, that odometry between two keyframes (m,) adds to a point (m, 2) of the body."""
-    twist = covariance_between(items.model.noise, items.keyframes.poses, items.sums, anchor, body)
+    twist = covariance_between(data.model.noise, data.keyframes.poses, data.sums, anchor, body)
     moves = np.zeros((len(point), 2, 3))
     moves[:, 0, 0] = moves[:, 1, 1] = 1.0
     moves[:, 0, 2], moves[:, 1, 2] = -point[:, 1], point[:, 0]
@@ -139,20 +139,20 @@ def _spread(items: ChainData, anchor: Index, body: Index, point: Array) -> Array
 
 
 def _carried(
-    closure: ClosureMeasurement, items: ChainData, anchors: Index, at: int, own: bool
+    closure: ClosureMeasurement, data: ChainData, anchors: Index, at: int, own: bool
 ) -> ClosureMeasurement:
     """A closure whose keyframe goes, at the keyframe before it."""
     anchor = int(anchors[at])
-    poses = items.keyframes.poses
+    poses = data.keyframes.poses
     k_T_body = se2.between(poses[anchor], poses[at])
     a_T_b = np.array(closure.a_T_b)
     moved = se2.compose(k_T_body, a_T_b) if own else se2.compose(a_T_b, se2.inverse(k_T_body))
-    twist = covariance_between(items.model.noise, poses, items.sums, anchor, at)
+    twist = covariance_between(data.model.noise, poses, data.sums, anchor, at)
     reach = float(np.hypot(*moved[:2])) + float(np.hypot(*poses[at, :2]))
     wider = np.diag([1.0, 1.0, 0.0]) * (twist[0, 0] + twist[1, 1] + reach**2 * twist[2, 2])
     wider[2, 2] = twist[2, 2]
     covariance = se2.unpacked(closure.covariance) + wider
-    number = int(items.keyframes.n[anchor])
+    number = int(data.keyframes.n[anchor])
     ends = {"a_n": number} if own else {"b_n": number}
     return replace(
         closure,

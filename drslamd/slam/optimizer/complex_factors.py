@@ -40,9 +40,13 @@ class ComplexFactors:
         x, y, theta = edges.measured.T
         spread = edges.covariance[:, 0, 0] + edges.covariance[:, 1, 1]
         return ComplexFactors(
-            edges.i, edges.j, np.exp(1j * theta), x + 1j * y,
-            2 / edges.covariance[:, 2, 2], 2 / spread,
-        )  # fmt: skip
+            edges.i,
+            edges.j,
+            np.exp(1j * theta),
+            x + 1j * y,
+            2 / edges.covariance[:, 2, 2],
+            2 / spread,
+        )
 
     @staticmethod
     def joined(parts: list[ComplexFactors]) -> ComplexFactors:
@@ -54,5 +58,11 @@ class ComplexFactors:
         return len(self.i)
 
     def chosen(self, which: Array) -> ComplexFactors:
-        return ComplexFactors(self.i[which], self.j[which], self.turn[which], self.shift[which],
-                            self.kappa[which], self.tau[which])  # fmt: skip
+        return ComplexFactors(
+            self.i[which],
+            self.j[which],
+            self.turn[which],
+            self.shift[which],
+            self.kappa[which],
+            self.tau[which],
+        )

@@ -53,12 +53,12 @@ class Numbering:
         place = self.place[robot]
         return place[place >= 0]
 
-    def of(self, items: ChainData, n: Array) -> Index:
+    def of(self, data: ChainData, n: Array) -> Index:
         """Places of keyframes n (m,) of one chain, -1 where one is not there."""
-        place = self.place.get(items.chain.robot)
+        place = self.place.get(data.chain.robot)
         if place is None or not len(place):
             return np.full(len(n), -1)
-        at, there = items.keyframes.find(n)
+        at, there = data.keyframes.find(n)
         return np.where(there, place[at], -1)
 
 
@@ -72,11 +72,11 @@ def numbering(graph: PoseGraph, members: set[Segment], shift_us: dict[int, int])
     shifts = clock_shifts(graph, {s.robot for s in members}, shift_us)
     place, when, robots, keyframes = {}, [], [], []
     for robot, shift in sorted(shifts.items()):
-        items = graph.chains[robot]
-        wanted = [s.segment for s in members if s.chain == items.chain]
-        inside = np.isin(items.keyframes.segment, wanted)
+        data = graph.chains[robot]
+        wanted = [s.segment for s in members if s.chain == data.chain]
+        inside = np.isin(data.keyframes.segment, wanted)
         place[robot] = np.where(inside, 0, -1)
-        keyframes.append(items.keyframes.n[inside])
+        keyframes.append(data.keyframes.n[inside])
         when.append(keyframes[-1] - shift)
         robots.append(np.full(len(keyframes[-1]), robot))
     robot_of, n_of = np.concatenate(robots), np.concatenate(keyframes)
@@ -151,14 +151,14 @@ def odometry(graph: PoseGraph, numbers: Numbering, robots: list[int]) -> Odometr
     return OdometryFactors(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def chain_links(items: ChainData, calibrated: bool) -> BetweenFactors:
+def chain_links(data: ChainData, calibrated: bool) -> BetweenFactors:
     """Odometry between neighbouring rows of one chain, across no break.
 
     Args:
         calibrated: scale and constant yaw rate are unknowns of the optimiser, so the covariance
             holds only what is random; otherwise they are part of it.
     """
-    keyframes, noise = items.keyframes, items.model.noise
+    keyframes, noise = data.keyframes, data.model.noise
     i = np.flatnonzero(keyframes.segment[1:] == keyframes.segment[:-1])
     if calibrated:
         noise = noise.random_part()

@@ -27,9 +27,17 @@ def _node_terms() -> Array:
     """v at the 25 nodes, phi along the first axis: (25, 7)."""
     phi, theta = np.repeat(_NODES, 5), np.tile(_NODES, 5)
     return np.stack(
-        [np.ones(25), np.cos(phi), np.sin(phi), np.cos(theta), np.sin(theta),
-         np.cos(phi - theta), np.sin(phi - theta)], axis=-1
-    )  # fmt: skip
+        [
+            np.ones(25),
+            np.cos(phi),
+            np.sin(phi),
+            np.cos(theta),
+            np.sin(theta),
+            np.cos(phi - theta),
+            np.sin(phi - theta),
+        ],
+        axis=-1,
+    )
 
 
 _TERMS = _node_terms()

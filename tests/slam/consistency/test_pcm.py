@@ -35,8 +35,9 @@ class Drive:
         covariance = np.diag([sigma**2, (2 * sigma) ** 2, (sigma / 3) ** 2])
         covariance[0, 1] = covariance[1, 0] = sigma**2 / 2
         pose = self.true(k) if a_T_b is None else a_T_b
-        return Candidate(closure, pose, covariance,
-                         self.a[k], self.b[k], self.a_sums[k], self.b_sums[k])  # fmt: skip
+        return Candidate(
+            closure, pose, covariance, self.a[k], self.b[k], self.a_sums[k], self.b_sums[k]
+        )
 
 
 def judged(*candidates: Candidate) -> PairConsistency:

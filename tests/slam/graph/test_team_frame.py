@@ -123,9 +123,11 @@ def exact(robots: int = 3) -> tuple[PoseGraph, Group, dict[int, Array]]:
 def as_estimate(group: Group, graph: PoseGraph, poses: dict[int, Array]) -> TeamEstimate:
     return TeamEstimate(
         group.frame,
-        {r: Trajectory(graph.chains[r].chain, graph.chains[r].keyframes.n[: len(p)], p)
-         for r, p in poses.items()},
-    )  # fmt: skip
+        {
+            r: Trajectory(graph.chains[r].chain, graph.chains[r].keyframes.n[: len(p)], p)
+            for r, p in poses.items()
+        },
+    )
 
 
 def test_the_frame_s_own_robot_starts_at_its_odometry_and_the_others_at_their_closures() -> None:
@@ -170,8 +172,9 @@ def test_a_new_frame_carries_all_poses_over() -> None:
     # robot 1 is now at its own odometry, and nobody moved against it
     assert same_pose(start[other.frame][0], graph.chains[1].keyframes.poses[0], 1e-9)
     for member, poses in start.items():
-        before_between = product(inverted(before.trajectories[1].poses[7]),
-                                 before.trajectories[member.robot].poses[20])  # fmt: skip
+        before_between = product(
+            inverted(before.trajectories[1].poses[7]), before.trajectories[member.robot].poses[20]
+        )
         now = product(inverted(start[other.frame][7]), poses[20])
         assert same_pose(now, before_between, 1e-9)
 

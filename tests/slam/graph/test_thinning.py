@@ -68,8 +68,9 @@ def test_which_stay_does_not_depend_on_the_order_in_which_they_came() -> None:
     )
 
 
-@pytest.mark.parametrize(("robots", "seconds"), [(1, 300), (10, 300), (11, 150), (20, 150),
-                                                 (21, 75), (50, 37)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("robots", "seconds"), [(1, 300), (10, 300), (11, 150), (20, 150), (21, 75), (50, 37)]
+)
 def test_a_large_team_shares(robots: int, seconds: int) -> None:
     assert recent_s(robots) == seconds
     assert robots * recent_s(robots) <= TEAM_S

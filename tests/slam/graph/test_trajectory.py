@@ -83,9 +83,12 @@ def test_holes_are_left_out_and_each_segment_has_its_own_keyframes() -> None:
     numbers = np.concatenate([np.arange(0, 20), np.arange(30, 50), np.arange(60, 80)])
     track = track_of(PATH, numbers)
     here, there = np.array([10.0, 0, 0]), np.array([-10.0, 0, 1.0])
-    n, poses = deform_track(track, solved([5, 10, 65], [
-        product(here, PATH[5]), product(here, PATH[10]), product(there, PATH[45])
-    ]))  # fmt: skip
+    n, poses = deform_track(
+        track,
+        solved(
+            [5, 10, 65], [product(here, PATH[5]), product(here, PATH[10]), product(there, PATH[45])]
+        ),
+    )
     # the middle segment has no solved keyframe: nothing is guessed of it
     assert n.tolist() == list(range(20)) + list(range(60, 80))
     for ours, number in zip(poses, n, strict=True):

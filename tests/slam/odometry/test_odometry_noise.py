@@ -46,9 +46,9 @@ def noisy_twists(
         rest = se2.between(
             np.array([*step[m, :2] / 2, step[m, 2] / 2]), np.array([*step[m, :2], step[m, 2]])
         )
-        wrong = se2.compose(wrong, np.column_stack(
-            [scale[:, None] * rest[:2], np.full(drives, rest[2])]
-        ))  # fmt: skip
+        wrong = se2.compose(
+            wrong, np.column_stack([scale[:, None] * rest[:2], np.full(drives, rest[2])])
+        )
     return se2.log(se2.compose(wrong, se2.inverse(path[k])))
 
 
@@ -137,15 +137,23 @@ def test_the_configuration_speaks_degrees_and_the_code_radians() -> None:
     )
     noise = settings.odometry_noise(config(extra=text).odometry)
     expected = (0.02, math.pi / 100, 0.03, math.pi / 50)
-    assert (noise.scale, noise.yaw_rad_per_m, noise.translation_per_sqrt_m,
-            noise.yaw_rad_per_sqrt_m) == pytest.approx(expected)  # fmt: skip
+    assert (
+        noise.scale,
+        noise.yaw_rad_per_m,
+        noise.translation_per_sqrt_m,
+        noise.yaw_rad_per_sqrt_m,
+    ) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(
     ("name", "most"),
-    [("scale", 0.5), ("yaw_rad_per_m", math.radians(20)), ("translation_per_sqrt_m", 1.0),
-     ("yaw_rad_per_sqrt_m", math.radians(20))],
-)  # fmt: skip
+    [
+        ("scale", 0.5),
+        ("yaw_rad_per_m", math.radians(20)),
+        ("translation_per_sqrt_m", 1.0),
+        ("yaw_rad_per_sqrt_m", math.radians(20)),
+    ],
+)
 def test_noise_is_plausible_up_to_what_a_configuration_may_say(name: str, most: float) -> None:
     assert replace(NOISE, **{name: most}).is_plausible()
     assert not replace(NOISE, **{name: 1.002 * most}).is_plausible()

@@ -38,9 +38,11 @@ def members(*chains: Chain, segment: int = 0) -> set[Segment]:
 def chain_of(path: Array, n: list[int], segments: list[int] | None = None) -> ChainData:
     items = ChainData(A)
     for k, (frame,) in enumerate(zip(keyframes(n, path), strict=True)):
-        items.add(frame if segments is None else Keyframe(
-            frame.n, segments[k], frame.x, frame.y, frame.theta
-        ))  # fmt: skip
+        items.add(
+            frame
+            if segments is None
+            else Keyframe(frame.n, segments[k], frame.x, frame.y, frame.theta)
+        )
     return items
 
 

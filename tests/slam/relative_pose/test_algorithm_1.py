@@ -18,8 +18,9 @@ def noisy_window(seed: int, tau: int, sigma: float = 0.1) -> Window:
     rng = np.random.default_rng(seed)
     window, _ = window_of(wander(rng, tau, 0.05), wander(rng, tau, 0.05) + [4, 0, 0], step_s=0.1)
     ranges = window.ranges + rng.normal(0, sigma, tau)
-    return Window(window.t, ranges, window.a_poses, window.b_poses,
-                  window.a_antenna, window.b_antenna)  # fmt: skip
+    return Window(
+        window.t, ranges, window.a_poses, window.b_poses, window.a_antenna, window.b_antenna
+    )
 
 
 def algorithm_1(window: Window, delta: float) -> tuple[Array, float]:
@@ -108,8 +109,9 @@ def test_four_measurements_are_the_fewest(count: int, verdict: Verdict) -> None:
 
 def test_a_window_that_says_nothing_has_a_covariance_that_can_be_sent() -> None:
     nothing = np.zeros((10, 3))
-    window = Window(np.arange(-9.0, 1.0), np.full(10, 3.0), nothing, nothing,
-                    np.zeros(2), np.zeros(2))  # fmt: skip
+    window = Window(
+        np.arange(-9.0, 1.0), np.full(10, 3.0), nothing, nothing, np.zeros(2), np.zeros(2)
+    )
     (hypothesis,) = solve(window, 0.1, 0.3).hypotheses
     assert np.isfinite(hypothesis.a_T_b).all()
     assert np.linalg.eigvalsh(hypothesis.covariance)[-1] <= 100.0**2 * 1.0001

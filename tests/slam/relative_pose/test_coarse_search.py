@@ -23,8 +23,9 @@ def curved(rng: np.random.Generator, sigma: float = 0.1, count: int = 100) -> Wi
     a, b = wander(rng, count), wander(rng, count)
     window, _ = window_of(a, b)
     noisy = np.abs(window.ranges + rng.normal(0, sigma, count))
-    return Window(window.t, noisy, window.a_poses, window.b_poses,
-                  window.a_antenna, window.b_antenna)  # fmt: skip
+    return Window(
+        window.t, noisy, window.a_poses, window.b_poses, window.a_antenna, window.b_antenna
+    )
 
 
 @pytest.mark.parametrize("delta", [0.8, 0.31])

@@ -124,9 +124,15 @@ def test_a_valley_is_followed_around_its_arc() -> None:
 
 
 @pytest.mark.parametrize("part", [0, 1, 2])
-@pytest.mark.parametrize(("times", "chi2", "vague"), [
-    (0.99, 0.0, False), (1.01, 0.0, True), (1.01, 0.99, True), (1.01, 1.01, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("times", "chi2", "vague"),
+    [
+        (0.99, 0.0, False),
+        (1.01, 0.0, True),
+        (1.01, 0.99, True),
+        (1.01, 1.01, False),
+    ],
+)
 def test_a_window_is_vague_as_soon_as_one_minimum_that_counts_is(
     part: int, times: float, chi2: float, vague: bool
 ) -> None:

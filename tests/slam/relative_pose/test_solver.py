@@ -185,8 +185,14 @@ def test_six_measurements_are_the_fewest(count: int, verdict: bool) -> None:
     a, b = wander(rng, 60, 0.25), wander(rng, 60, 0.25)
     whole, _ = window_of(a, b)
     part = slice(60 - count, 60)
-    window = Window(whole.t[part], whole.ranges[part], whole.a_poses[part], whole.b_poses[part],
-                    whole.a_antenna, whole.b_antenna)  # fmt: skip
+    window = Window(
+        whole.t[part],
+        whole.ranges[part],
+        whole.a_poses[part],
+        whole.b_poses[part],
+        whole.a_antenna,
+        whole.b_antenna,
+    )
     assert (solved(window).verdict is Verdict.TOO_FEW) is verdict
 
 
@@ -286,10 +292,14 @@ def cost_at_the_best_bias(window: Window, pose: Array) -> float:
 def minpack(window: Window, seeds: Array) -> Array:
     """The best pose and bias that scipy finds from the same seeds."""
     results = [
-        least_squares(lambda x: huber(window, x), np.append(seed, 0.0), loss="huber",
-                      f_scale=LINKTRACK.huber_sigmas)
+        least_squares(
+            lambda x: huber(window, x),
+            np.append(seed, 0.0),
+            loss="huber",
+            f_scale=LINKTRACK.huber_sigmas,
+        )
         for seed in seeds
-    ]  # fmt: skip
+    ]
     best = min(results, key=lambda result: float(result.cost))
     assert 2 * best.cost == pytest.approx(cost_of(window, best.x))
     return np.asarray(best.x)

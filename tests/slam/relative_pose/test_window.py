@@ -13,9 +13,7 @@ from slam_scenes import matrix, wander, window_of
 
 from drslamd.slam.relative_pose.window import binned
 
-samples = st.lists(
-    st.tuples(st.floats(-30, 0), st.floats(0, 50)), min_size=1, max_size=60
-)  # fmt: skip
+samples = st.lists(st.tuples(st.floats(-30, 0), st.floats(0, 50)), min_size=1, max_size=60)
 
 
 @given(samples, st.sampled_from([0.1, 0.5, 2.0]))

@@ -23,8 +23,10 @@ from drslamd.slam.optimizer.banded.normal_equations import Equations, System
 from drslamd.slam.optimizer.problem import Calibration, Problem, Solution
 from drslamd.slam.se2 import Array
 
-LEAST_DAMPING, MOST_DAMPING = 1e-6, 1e6
-"""Of Levenberg and Marquardt, relative to the diagonal; beyond the largest no step helps."""
+LEAST_DAMPING = 1e-6
+"""Of Levenberg and Marquardt, relative to the diagonal."""
+MOST_DAMPING = 1e6
+"""Beyond it no step helps."""
 UNKNOWN = 1e6
 """m^2 and rad^2: the covariance of a pose that nothing holds."""
 

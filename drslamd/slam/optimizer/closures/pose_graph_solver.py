@@ -29,8 +29,10 @@ HOLD = 1e8
 """How much stiffer than an edge the gauge is where its pose shall count as known."""
 LINEAR_TOLERANCE = 1e-9
 """Expected relative gain that is enough where a step is not Newton's."""
-LEAST_DAMPING, MOST_DAMPING = 1e-6, 1e6
-"""Relative to the diagonal; beyond the largest no step helps."""
+LEAST_DAMPING = 1e-6
+"""Relative to the diagonal."""
+MOST_DAMPING = 1e6
+"""Beyond it no step helps."""
 
 
 @dataclass(frozen=True)
@@ -216,8 +218,22 @@ class PoseGraphSolver:
             deform_track = 0.0
         across, along = tau * arm.imag, tau * arm.real
         own = tau * (arm.real**2 + arm.imag**2 + deform_track) + stiff
-        values = [tau, tau, tau, tau, -tau, -tau, -across, along, across, -along,
-                  own, stiff, -stiff, hold * self._gauge]  # fmt: skip
+        values = [
+            tau,
+            tau,
+            tau,
+            tau,
+            -tau,
+            -tau,
+            -across,
+            along,
+            across,
+            -along,
+            own,
+            stiff,
+            -stiff,
+            hold * self._gauge,
+        ]
         return self._system.factor(np.concatenate(values), damping)
 
 

@@ -78,27 +78,27 @@ class RbcdOptimizer:
         public: Mapping[int, PublicPoses],
     ) -> Job | None:
         """See `Optimizer.job`."""
-        items = graph.chains[self._own.robot]
-        used = _in_group(items, group)
+        data = graph.chains[self._own.robot]
+        used = _in_group(data, group)
         fitting = {k: p for k, p in sorted(public.items()) if p.rank == self._rank}
-        around = lifted_neighbours(graph, items, used, fitting, self._rank)
+        around = lifted_neighbours(graph, data, used, fitting, self._rank)
         anchor = _anchor(fitting, group)
-        lifted = self._start(items, used, group, previous, around)
+        lifted = self._start(data, used, group, previous, around)
         if lifted is None or (anchor is None and group.frame.chain != self._own):
             return None
-        start = Start(items.keyframes.n[used], lifted, _links(items, used))
+        start = Start(data.keyframes.n[used], lifted, _links(data, used))
         return partial(_round, start, around, anchor, group, self._own)
 
     def _start(
         self,
-        items: ChainData,
+        data: ChainData,
         used: Array,
         group: Group,
         previous: TeamEstimate | None,
         around: LiftedNeighbours,
     ) -> Array | None:
         """(k, 2 r) our keyframes: as they were, else by odometry from the nearest that is known."""
-        n, poses = items.keyframes.n[used], items.keyframes.poses[used]
+        n, poses = data.keyframes.n[used], data.keyframes.poses[used]
         known = previous.lifted if previous and previous.frame == group.frame else None
         if known is not None and np.isin(n, known.n).any():
             at = np.flatnonzero(np.isin(n, known.n))
@@ -108,10 +108,12 @@ class RbcdOptimizer:
         else:
             out, back = around.leaving, around.arriving
             at = np.concatenate([out.i, back.j])
-            rows = np.concatenate([
-                riemannian_descent.moved(around.rows[out.j], se2.inverse(out.measured)),
-                riemannian_descent.moved(around.rows[back.i], back.measured),
-            ])  # fmt: skip
+            rows = np.concatenate(
+                [
+                    riemannian_descent.moved(around.rows[out.j], se2.inverse(out.measured)),
+                    riemannian_descent.moved(around.rows[back.i], back.measured),
+                ]
+            )
             if not len(at):
                 return None
             order = np.argsort(at, kind="stable")
@@ -120,16 +122,16 @@ class RbcdOptimizer:
         return riemannian_descent.moved(rows[nearest], se2.between(poses[at][nearest], poses))
 
 
-def _in_group(items: ChainData, group: Group) -> Array:
+def _in_group(data: ChainData, group: Group) -> Array:
     """Which of our rows lie in segments of the group."""
-    segments = [s.segment for s in group.members if s.chain == items.chain]
-    return np.flatnonzero(np.isin(items.keyframes.segment, segments))
+    segments = [s.segment for s in group.members if s.chain == data.chain]
+    return np.flatnonzero(np.isin(data.keyframes.segment, segments))
 
 
-def _links(items: ChainData, used: Array) -> BetweenFactors:
+def _links(data: ChainData, used: Array) -> BetweenFactors:
     """Our odometry between the rows `used`, numbered as they are."""
-    links = chain_links(items, calibrated=False)
-    place = np.full(len(items.keyframes), -1)
+    links = chain_links(data, calibrated=False)
+    place = np.full(len(data.keyframes), -1)
     place[used] = np.arange(len(used))
     i, j = place[links.i], place[links.j]
     inside = (i >= 0) & (j >= 0)
@@ -151,7 +153,7 @@ def _on_sphere(rows: Array) -> Array:
 
 def lifted_neighbours(
     graph: PoseGraph,
-    items: ChainData,
+    data: ChainData,
     used: Array,
     public: Mapping[int, PublicPoses],
     rank: int,
@@ -162,14 +164,14 @@ def lifted_neighbours(
         used: (k,) rows of our chain that the block consists of.
         public: poses of that rank.
     """
-    own = items.chain
+    own = data.chain
     leaving: list[tuple[int, int, tuple[float, ...], Array]] = []
     arriving: list[tuple[int, int, tuple[float, ...], Array]] = []
     chains: list[Chain] = []
     keyframes: list[int] = []
     rows: list[Array] = []
     carriers: set[int] = set()
-    number = {int(n): k for k, n in enumerate(items.keyframes.n[used])}
+    number = {int(n): k for k, n in enumerate(data.keyframes.n[used])}
     for pair in graph.usable():
         if own not in (pair.a, pair.b):
             continue
@@ -192,9 +194,13 @@ def lifted_neighbours(
             keyframes.append(far)
             rows.append(table[far])
     return LiftedNeighbours(
-        tuple(chains), np.array(keyframes), np.array(rows, dtype=complex).reshape(-1, 2 * rank),
-        between_factors(leaving), between_factors(arriving), np.array(sorted(carriers)),
-    )  # fmt: skip
+        tuple(chains),
+        np.array(keyframes),
+        np.array(rows, dtype=complex).reshape(-1, 2 * rank),
+        between_factors(leaving),
+        between_factors(arriving),
+        np.array(sorted(carriers)),
+    )
 
 
 def _round(

@@ -66,9 +66,12 @@ class BlockProblem:
 
 
 def block(
-    own: ComplexFactors, leaving: ComplexFactors, arriving: ComplexFactors,
-    neighbours: Array, size: int,
-) -> BlockProblem:  # fmt: skip
+    own: ComplexFactors,
+    leaving: ComplexFactors,
+    arriving: ComplexFactors,
+    neighbours: Array,
+    size: int,
+) -> BlockProblem:
     """Collect one robot's block.
 
     Args:

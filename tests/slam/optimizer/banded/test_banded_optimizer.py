@@ -202,8 +202,13 @@ def test_a_robot_that_waited_while_the_others_drove_costs_little() -> None:
     for k in range(2, 890):
         apart = team.truth[0][k, :2] - (place + [0.3, 0, 0])[:2]
         ranges.append(range_item(10, team.chains[0], int(team.n[0][k]), float(np.hypot(*apart))))
-    item = closure(0, 10, team.chains[0], int(team.n[0][1]),
-                   product(inverted(place + [0.3, 0, 0]), team.truth[0][1]))  # fmt: skip
+    item = closure(
+        0,
+        10,
+        team.chains[0],
+        int(team.n[0][1]),
+        product(inverted(place + [0.3, 0, 0]), team.truth[0][1]),
+    )
     team.graph.insert(waits, GraphEntry(0, None, frames, tuple(ranges), (item,)))
     members = {Segment(*c, 0) for c in (*team.chains.values(), waits)}
     group = Group(members, Segment(*team.chains[0], 0), {0: 0, 1: 1000 * GRID_US, 2: 0})

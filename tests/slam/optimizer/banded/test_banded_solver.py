@@ -82,23 +82,31 @@ def test_the_pose_graph_of_gtsam_has_the_same_minimum_and_marginals() -> None:
     joined = [(0, 1), (10, 11), (24, 27), (40, 41), (40, 41), (48, 47)]
     links = pose_edges(rng, truth, chain, (0.05, 0.05, 0.02), 0.01)
     closures = pose_edges(rng, truth, joined, (0.1, 0.1, 0.05), 0.01)
-    odometry = OdometryFactors(links.i, links.j, links.measured, links.covariance,
-                     np.zeros(len(links), dtype=int), np.zeros(len(links)))  # fmt: skip
+    odometry = OdometryFactors(
+        links.i,
+        links.j,
+        links.measured,
+        links.covariance,
+        np.zeros(len(links), dtype=int),
+        np.zeros(len(links)),
+    )
     # calibration that is known to be nothing
     known = np.array([1e-9])
     priors = Priors(bias=np.zeros(0), scale=known, yaw=known, near_bias=known)
     start = truth + rng.normal(0, 0.02, truth.shape)
     start[0] = truth[0]
-    problem = Problem(np.zeros(50, dtype=int), np.arange(50), start, 0, odometry, closures,
-                      no_ranges(), priors)  # fmt: skip
+    problem = Problem(
+        np.zeros(50, dtype=int), np.arange(50), start, 0, odometry, closures, no_ranges(), priors
+    )
     solution = solve(problem, marginals=(0, 7, 48, 49), tolerance=1e-12)
 
     graph = gtsam.NonlinearFactorGraph()
     hold = gtsam.noiseModel.Isotropic.Sigma(3, 1e-5)
     graph.add(gtsam.PriorFactorPose2(0, gtsam.Pose2(*truth[0]), hold))
     for edges in (links, closures):
-        for i, j, measured, covariance in zip(edges.i, edges.j, edges.measured, edges.covariance,
-                                              strict=True):  # fmt: skip
+        for i, j, measured, covariance in zip(
+            edges.i, edges.j, edges.measured, edges.covariance, strict=True
+        ):
             turn = matrix((0, 0, -measured[2]))
             noise = gtsam.noiseModel.Gaussian.Covariance(turn @ covariance @ turn.T)
             graph.add(gtsam.BetweenFactorPose2(int(i), int(j), gtsam.Pose2(*measured), noise))
@@ -169,9 +177,13 @@ def test_errors_of_many_teams_are_as_large_as_the_marginals_say() -> None:
     for seed in range(60):
         rng = np.random.default_rng(1000 + seed)
         problem, truth = team_problem(
-            100 + seed, robots=2, count=15, biases=(rng.normal(0, 0.3),),
-            scale=tuple(rng.normal(0, 0.03, 2)), yaw=tuple(rng.normal(0, 0.01, 2)),
-        )  # fmt: skip
+            100 + seed,
+            robots=2,
+            count=15,
+            biases=(rng.normal(0, 0.3),),
+            scale=tuple(rng.normal(0, 0.03, 2)),
+            yaw=tuple(rng.normal(0, 0.01, 2)),
+        )
         start = problem.initial.copy()
         start[0] = truth[0]
         solution = solve(replace(problem, initial=start), marginals=(29,))
@@ -187,9 +199,15 @@ def test_errors_of_many_teams_are_as_large_as_the_marginals_say() -> None:
 
 def test_bias_scale_and_yaw_rate_are_found() -> None:
     problem, truth = team_problem(
-        8, robots=3, count=150, biases=(0.25, -0.2, 0.4), scale=(0.03, -0.02, 0.05),
-        yaw=(0.01, -0.008, 0.0), range_error=0.02, link_sigma=(0.004, 0.004, 0.002),
-    )  # fmt: skip
+        8,
+        robots=3,
+        count=150,
+        biases=(0.25, -0.2, 0.4),
+        scale=(0.03, -0.02, 0.05),
+        yaw=(0.01, -0.008, 0.0),
+        range_error=0.02,
+        link_sigma=(0.004, 0.004, 0.002),
+    )
     start = problem.initial.copy()
     start[0] = truth[0]
     solution = solve(replace(problem, initial=start))
@@ -208,9 +226,14 @@ def test_bias_scale_and_yaw_rate_are_found() -> None:
 def test_a_bias_that_only_near_ranges_have_is_found_and_told_from_that_of_the_pairs() -> None:
     """-0.25 m at no distance, as uncorrected modules have it, beside another bias of each pair."""
     problem, truth = team_problem(
-        8, robots=3, count=150, biases=(0.25, -0.2, 0.4), near_bias=-0.25, range_error=0.02,
+        8,
+        robots=3,
+        count=150,
+        biases=(0.25, -0.2, 0.4),
+        near_bias=-0.25,
+        range_error=0.02,
         link_sigma=(0.004, 0.004, 0.002),
-    )  # fmt: skip
+    )
     start = problem.initial.copy()
     start[0] = truth[0]
     solution = solve(replace(problem, initial=start))

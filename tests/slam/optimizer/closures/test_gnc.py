@@ -31,9 +31,11 @@ class Ring:
             (ROBOTS * k + a, ROBOTS * k + a + 1) for k in range(0, KEYFRAMES, 3) for a in (0, 1)
         ]
         wrong = [(ROBOTS * (k + 5), ROBOTS * (k + 5) + 2) for k in range(false)]
-        parts = [pose_edges(rng, self.truth, chain, (0.01, 0.01, 0.005)),
-                 pose_edges(rng, self.truth, right, SIGMA),
-                 self._misled(wrong, shift)]  # fmt: skip
+        parts = [
+            pose_edges(rng, self.truth, chain, (0.01, 0.01, 0.005)),
+            pose_edges(rng, self.truth, right, SIGMA),
+            self._misled(wrong, shift),
+        ]
         self.good = ComplexFactors.joined([ComplexFactors.of(p) for p in parts[:2]])
         self.edges = ComplexFactors.joined([ComplexFactors.of(p) for p in parts])
         self.doubted = np.arange(len(self.edges)) >= len(chain)

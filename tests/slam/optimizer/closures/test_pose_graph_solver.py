@@ -115,9 +115,12 @@ def test_a_cost_that_is_stated_falls_with_every_pose_that_moves() -> None:
 
 def test_two_closures_between_the_same_two_poses_both_count() -> None:
     once = edges_of(
-        np.array([0, 0]), np.array([1, 1]), np.array([[1.0, 0, 0], [2.0, 0, 0]]),
-        np.ones(2), np.array([1.0, 3.0]),
-    )  # fmt: skip
+        np.array([0, 0]),
+        np.array([1, 1]),
+        np.array([[1.0, 0, 0], [2.0, 0, 0]]),
+        np.ones(2),
+        np.array([1.0, 3.0]),
+    )
     answer = PoseGraphSolver(once, 2).solve()
     # the weighted mean of both, and its scatter: 1 * 0.75^2 + 3 * 0.25^2
     assert answer.poses[1, 0] - answer.poses[0, 0] == pytest.approx(1.75)
