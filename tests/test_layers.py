@@ -15,7 +15,7 @@ GENERATED = PACKAGE / "lcmtypes"
 LAB = REPOSITORY / "tools" / "lab"
 
 RINGS = {
-    "vocabulary": ["conventions", "events", "config"],
+    "vocabulary": ["conventions", "events", "config_faults", "config"],
     "pure": [
         "sensors",
         "slam",
