@@ -23,7 +23,8 @@ from pydantic import (
 from drslamd.config_faults import one_line, sentences
 from drslamd.conventions import MAX_ROBOT_ID
 
-Positive = Annotated[float, Field(gt=0)]
+Scale = Annotated[float, Field(ge=1e-9, le=1e9)]
+"""Between two units; beyond it products with what a sensor says could overflow."""
 Rate = Annotated[float, Field(gt=0, le=50)]
 Metres = Annotated[float, Field(ge=-5, le=5)]
 RobotId = Annotated[int, Field(ge=0, le=MAX_ROBOT_ID)]
@@ -105,13 +106,13 @@ class KobukiSection(SerialWheelSection):
     track_m: Annotated[float, Field(gt=0.01, le=10)] = 0.230
     max_speed_mps: Annotated[float, Field(gt=0, le=50)] = 1.0
     """Its motors give 0.7 m/s."""
-    counts_per_metre: Positive = 11_724.4
+    counts_per_metre: Scale = 11_724.4
     """2 pi 0.035 m at 2578.33 counts per turn (Kobuki's diff_drive)."""
 
 
 class RoboteqSection(SerialWheelSection):
     source: Literal["roboteq"]
-    counts_per_metre: Positive
+    counts_per_metre: Scale
     poll_hz: Annotated[float, Field(ge=1, le=100)] = 25.0
     swap_channels: bool = False
     """True when channel 1 drives the right wheels."""
@@ -119,7 +120,7 @@ class RoboteqSection(SerialWheelSection):
 
 class AsciiSection(SerialWheelSection):
     source: Literal["ascii"]
-    counts_per_metre: Positive
+    counts_per_metre: Scale
 
 
 class CanWheelSection(WheelSection):
@@ -149,14 +150,14 @@ class DbcSection(CanWheelSection):
     linear: str = ""
     angular: str = ""
     """`Message.Signal` of a twist: m/s and rad/s after `unit`."""
-    counts_per_metre: Positive | None = None
+    counts_per_metre: Scale | None = None
     counter_bits: Annotated[int, Field(ge=8, le=64)] = 32
     id_mask: Annotated[int, Field(ge=1, le=0x1FFFFFFF)] = 0x1FFFFFFF
     """Applied to an id before the look-up, for ids that hold a node number."""
     left_node: Annotated[int, Field(ge=0)] | None = None
     right_node: Annotated[int, Field(ge=0)] | None = None
     """Node numbers that tell the two sides apart: the bits outside `id_mask`, shifted down."""
-    unit: Positive = 1.0
+    unit: Scale = 1.0
     """Factor from the unit of the speed signals to m/s (and rad/s)."""
 
     @model_validator(mode="after")
