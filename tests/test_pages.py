@@ -32,7 +32,7 @@ MINIMAL = tomli.loads(
 NOT_OURS = {"state"}
 """Fields of messages that a page writes like keys."""
 
-SHELL_TOOLS = {"tools/lcm-types", "tools/venv"}
+SHELL_TOOLS = {"tools/format", "tools/lcm-types", "tools/venv"}
 """Those without a parser."""
 PROGRAMS = {
     f"tools/{path.name}"
