@@ -78,8 +78,17 @@ def _read_status(raw: Any) -> Status:
     if any(h.wanted_n < NOTHING_WANTED for h in heard):
         raise ValueError("odometry before the first sample wanted")
     ranged = tuple(_robot(robot) for robot in raw.ranged)
-    return Status(_flag(raw.state), _robot(raw.frame), bool(_flag(raw.leaving)), raw.uwb_id,
-                  raw.uwb_clock_us, raw.graph_hash, heard, ranged, logs)  # fmt: skip
+    return Status(
+        state=_flag(raw.state),
+        frame=_robot(raw.frame),
+        leaving=bool(_flag(raw.leaving)),
+        uwb_id=raw.uwb_id,
+        uwb_clock_us=raw.uwb_clock_us,
+        graph_hash=raw.graph_hash,
+        heard=heard,
+        ranged=ranged,
+        logs=logs,
+    )
 
 
 # ---- odometry ----------------------------------------------------------------------------------
@@ -125,8 +134,8 @@ def _fill_graph(out: Any, m: GraphEntry) -> None:
 
 def _read_graph(raw: Any) -> GraphEntry:
     # their upper bound is that all of them fit one datagram
-    if min(raw.seq, raw.n_keyframes, raw.n_peers, raw.n_ranges, raw.n_closures,
-           raw.n_relative) < 0:  # fmt: skip
+    items = (raw.n_keyframes, raw.n_ranges, raw.n_closures, raw.n_relative)
+    if min(raw.seq, raw.n_peers, *items) < 0:
         raise ValueError("negative number")
     if raw.n_traits not in (0, TRAITS):
         raise ValueError(f"{raw.n_traits} traits, allowed are {TRAITS} or none")
@@ -172,8 +181,15 @@ def _read_range(r: Any, peers: list[Chain]) -> RangeMeasurement:
     if min(r.peer, r.a_n, r.b_n) < 0 or r.sigma < 1:
         raise ValueError("range without peer, keyframe or sigma")
     q_a, q_b = ((q[0] * MILLIMETRE_M, q[1] * MILLIMETRE_M) for q in (r.qa, r.qb))
-    return RangeMeasurement(r.a_n, peers[r.peer], r.b_n, q_a, q_b,
-                     r.range * TRANSLATION_STEP_M, r.sigma * MILLIMETRE_M)  # fmt: skip
+    return RangeMeasurement(
+        a_n=r.a_n,
+        peer=peers[r.peer],
+        b_n=r.b_n,
+        q_a=q_a,
+        q_b=q_b,
+        range_m=r.range * TRANSLATION_STEP_M,
+        sigma_m=r.sigma * MILLIMETRE_M,
+    )
 
 
 def _filled_closure(item: ClosureMeasurement, peer: int) -> Any:
@@ -193,8 +209,15 @@ def _read_closure(c: Any, peers: list[Chain]) -> ClosureMeasurement:
     if not np.isfinite(full).all() or np.linalg.eigvalsh(full)[0] <= 0:
         raise ValueError("closure with a covariance that is none")
     pose = (c.x * TRANSLATION_STEP_M, c.y * TRANSLATION_STEP_M, c.theta * ROTATION_STEP_RAD)
-    return ClosureMeasurement(c.number, bool(_flag(c.kept)), c.a_n, peers[c.peer], c.b_n, pose,
-                       tuple(c.covariance))  # fmt: skip
+    return ClosureMeasurement(
+        number=c.number,
+        kept=bool(_flag(c.kept)),
+        a_n=c.a_n,
+        peer=peers[c.peer],
+        b_n=c.b_n,
+        a_T_b=pose,
+        covariance=tuple(c.covariance),
+    )
 
 
 def _filled_relative(item: RelativePoses, peer: int) -> Any:

@@ -137,9 +137,8 @@ def test_a_quiet_robot_speaks_when_it_ranges_to_somebody_new_or_no_longer_does()
     ranged: set[int] = set()
     broadcast = a_broadcast(team, ranged)
     spoke = []
-    scene: list[tuple[int, set[int]]] = [
-        (0, set()), (200, set()), (400, {1001}), (600, {1001}), (800, set()),
-    ]  # fmt: skip
+    nobody: set[int] = set()
+    scene = [(0, nobody), (200, nobody), (400, {1001}), (600, {1001}), (800, nobody)]
     for ms, now in scene:
         ranged.clear()
         ranged.update(now)

@@ -162,10 +162,13 @@ def test_a_count_that_lies_is_refused(what: str, change: int) -> None:
     assert isinstance(messages.decode(kind, bytes(payload)), str)
 
 
-@pytest.mark.parametrize("change", [
-    lambda raw: raw.peers.append(raw.peers[0]),
-    lambda raw: raw.peers.insert(0, lcmtypes.peer_t()),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda raw: raw.peers.append(raw.peers[0]),
+        lambda raw: raw.peers.insert(0, lcmtypes.peer_t()),
+    ],
+)
 def test_peers_that_no_item_names_are_refused(change: Callable[[Any], object]) -> None:
     raw = raw_of("GRAPH")
     change(raw)
@@ -173,9 +176,15 @@ def test_peers_that_no_item_names_are_refused(change: Callable[[Any], object]) -
     assert isinstance(messages.decode("GRAPH", raw.encode()), str)
 
 
-@pytest.mark.parametrize(("heard", "logs", "ranged", "fits"), [
-    (28, 28, 28, True), (29, 0, 0, False), (0, 29, 0, False), (0, 0, 29, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("heard", "logs", "ranged", "fits"),
+    [
+        (28, 28, 28, True),
+        (29, 0, 0, False),
+        (0, 29, 0, False),
+        (0, 0, 29, False),
+    ],
+)
 def test_a_status_names_at_most_28_of_each(heard: int, logs: int, ranged: int, fits: bool) -> None:
     status = a_status(
         tuple(Heard(k, 1, 0) for k in range(heard)),
