@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from drslamd import lcmtypes
+from drslamd.gossip.codecs import CODECS
 
 FOLDER = Path(lcmtypes.__file__).parent
 LCM_GEN = Path(sys.executable).parent / "lcm-gen"
@@ -28,3 +29,15 @@ def test_every_type_is_explained_and_has_a_file_of_its_own() -> None:
         text = source.read_text()
         assert text.startswith("package drslamd.lcmtypes;\n\n// "), source.name
         assert f"\nstruct {source.stem}\n{{" in text, source.name
+
+
+def test_every_type_is_part_of_what_robots_say() -> None:
+    """From the structs of the messages through their fields."""
+    said = {codec.struct.__name__ for codec in CODECS.values()}
+    while True:
+        kinds = [getattr(lcmtypes, name) for name in said]
+        parts = {t.rsplit(".")[-1] for kind in kinds for t in kind.__typenames__ if "." in t}
+        if parts <= said:
+            break
+        said |= parts
+    assert {source.stem for source in FOLDER.glob("*.lcm")} == said

@@ -22,7 +22,6 @@ from drslamd.slam.graph.measurements import (
     GraphEntry,
     Keyframe,
     RangeMeasurement,
-    RelativePoses,
 )
 from drslamd.slam.odometry.track import OdometryNoise, growth
 from drslamd.slam.optimizer.problem import Index
@@ -34,8 +33,6 @@ MAX_RANGES = 20_000
 """Of one pair, 1.6 MB; the oldest are forgotten."""
 MAX_CLOSURES = 4_000
 """Of one pair."""
-MAX_RELATIVE = 1_000
-"""Log entries with relative poses of one chain: 27,000 of them at most."""
 
 WAITING = 1_024
 """Rows that came in and are not yet sorted into their table."""
@@ -93,7 +90,6 @@ class ChainData:
     Attributes:
         noise: of its odometry.
         antenna: (2,) in the body frame, m; antenna_z_m: above the floor.
-        relative: relative poses that it measured in full precision, by log entry.
     """
 
     def __init__(self, chain: Chain) -> None:
@@ -101,7 +97,6 @@ class ChainData:
         self.noise = DEFAULT_NOISE
         self.antenna: Array = np.zeros(2)
         self.antenna_z_m = 0.0
-        self.relative: dict[int, tuple[RelativePoses, ...]] = {}
         self._traits_seq = -1
         self._table = Rows(5, MAX_KEYFRAMES)
         self._rows = self._table.data
@@ -112,12 +107,6 @@ class ChainData:
     def add(self, k: Keyframe) -> None:
         metres, radians = TRANSLATION_STEP_M, ROTATION_STEP_RAD
         self._table.add([k.n, k.segment, k.x * metres, k.y * metres, k.theta * radians])
-
-    def add_relative(self, seq: int, relative: tuple[RelativePoses, ...]) -> None:
-        """The relative poses of one log entry; a batch with nonsense in it is left out."""
-        self.relative[seq] = tuple(batch for batch in relative if _sensible(batch))
-        while len(self.relative) > MAX_RELATIVE:
-            del self.relative[min(self.relative)]
 
     def take_traits(self, seq: int, traits: tuple[float, ...]) -> None:
         """The sigmas of `OdometryNoise` and the antenna's place; the latest entry counts."""
@@ -194,12 +183,6 @@ def _found(ascending: Array, wanted: Array) -> tuple[Index, NDArray[np.bool_]]:
     return at, there
 
 
-def _sensible(batch: RelativePoses) -> bool:
-    best, worst = (sigma**-2.0 for sigma in CLOSURE_SIGMAS)
-    near = all(abs(value) < FARTHEST_M for value in (*batch.x, *batch.y, *batch.theta))
-    return near and all(worst < weight < best for weight in (*batch.tau, *batch.kappa))
-
-
 @dataclass
 class PairData:
     """What the owner of a pair measured: a is the owner's chain, b the peer's."""
@@ -268,8 +251,6 @@ class PoseGraph:
             items.take_traits(entry.seq, entry.traits)
         for k in entry.keyframes:
             items.add(k)
-        if entry.relative:
-            items.add_relative(entry.seq, entry.relative)
         for place, r in enumerate(entry.ranges):
             pair = self._pair(origin, r.peer)
             if pair:

@@ -44,7 +44,7 @@ class Thinning:
     def after(self, robot: int) -> None:
         """Thin a chain that has grown by a stretch of time, and what was measured with it."""
         items = self._graph.chains.get(robot)
-        if items is None or items.relative or not len(items.rows):
+        if items is None or not len(items.rows):
             return
         stretch = int(items.rows[-1, 0]) // (EVERY_S * GRID_HZ)
         if self._done.get(items.chain) == stretch:

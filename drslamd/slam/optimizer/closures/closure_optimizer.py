@@ -1,9 +1,8 @@
 """`optimizer.algorithm = "closures"`: the paper's pose graph, solved exactly on every robot.
 
 Odometry and kept closures alone, with the weights and the cost of `rbcd`, and with every iterate of
-it left out: the graph is replicated anyway. ClosureOptimizer that the whole of it contradicts count for
-nothing (`graduated`). Robots that measured relative poses in full precision
-(`items.RelativePoses`) add those, which are believed.
+it left out: the graph is replicated anyway. Closures that the whole of it contradicts count for
+nothing (`gnc`).
 """
 
 from __future__ import annotations
@@ -84,16 +83,9 @@ def _edges(graph: PoseGraph, numbers: Numbering) -> tuple[ComplexEdges, NDArray[
     """All edges, and which of them are closures."""
     parts = [ComplexEdges.of(factors.closures(graph, numbers))]
     for robot, place in numbers.place.items():
-        items = graph.chains[robot]
-        links = chain_links(items, calibrated=False)
+        links = chain_links(graph.chains[robot], calibrated=False)
         numbered = PoseEdges(place[links.i], place[links.j], links.measured, links.covariance)
         parts.append(ComplexEdges.of(numbered))
-        for batch in (batch for part in items.relative.values() for batch in part):
-            other = graph.chains.get(batch.chain.robot)
-            if other is not None and other.chain == batch.chain:
-                i = numbers.of(items, np.array(batch.a_n, dtype=float))
-                j = numbers.of(other, np.array(batch.b_n, dtype=float))
-                parts.append(ComplexEdges.relative(i, j, batch))
     edges = ComplexEdges.joined(parts)
     # a pose relative to itself says nothing
     used = (edges.i >= 0) & (edges.j >= 0) & (edges.i != edges.j)

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from drslamd.slam.graph.measurements import RelativePoses
 from drslamd.slam.optimizer.problem import Index, PoseEdges
 from drslamd.slam.se2 import Array
 
@@ -62,13 +61,6 @@ class ComplexEdges:
             edges.i, edges.j, np.exp(1j * theta), x + 1j * y,
             2 / edges.covariance[:, 2, 2], 2 / spread,
         )  # fmt: skip
-
-    @staticmethod
-    def relative(i: Index, j: Index, batch: RelativePoses) -> ComplexEdges:
-        """Between poses i and j (m,), with the weights that their owner gave them."""
-        x, y, theta = (np.array(column) for column in (batch.x, batch.y, batch.theta))
-        kappa, tau = np.array(batch.kappa), np.array(batch.tau)
-        return ComplexEdges(i, j, np.exp(1j * theta), x + 1j * y, kappa, tau)
 
     @staticmethod
     def joined(parts: list[ComplexEdges]) -> ComplexEdges:

@@ -23,7 +23,7 @@ from slam_scenes import (
 from drslamd.conventions import GRID_US, Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate
-from drslamd.slam.graph.measurements import GraphEntry, RelativePoses
+from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer.closures.closure_optimizer import ClosureOptimizer
@@ -157,20 +157,3 @@ def test_what_closures_are_worth_shows_in_the_covariances() -> None:
     for robot in (1, 2):
         assert 0.01 < spreads[0][robot] < 0.9 * spreads[1][robot] < 0.9
     assert spreads[0][0] < spreads[1][0] < 1.0
-
-
-def test_relative_poses_in_full_precision_pull_with_their_weight() -> None:
-    team = Team(5, sigma=0.3)
-    n, chains = team.team.n, team.team.chains
-    at = np.arange(0, COUNT, 2)
-    x, y, theta = (tuple(c) for c in np.array([team.true(1, k) for k in at.tolist()]).T.tolist())
-    weights = (1e6,) * len(at)
-    stiff = RelativePoses(
-        chains[1], tuple(n[0][at].astype(int).tolist()), tuple(n[1][at].astype(int).tolist()),
-        x, y, theta, weights, weights,
-    )  # fmt: skip
-    team.team.graph.insert(chains[0], GraphEntry(5000, relative=(stiff,)))
-    poses = {r: t.poses for r, t in team.solved().trajectories.items()}
-    between = se2.between(poses[0][at], poses[1][at])
-    expected = np.array([team.true(1, k) for k in at.tolist()])
-    np.testing.assert_allclose(between[:, :2], expected[:, :2], atol=0.005)
