@@ -52,7 +52,9 @@ def _measured(values: Array, sigmas: Array, prior: Array) -> Any:
     return banded_optimizer._measured(values, sigmas, prior**-2.0)
 
 
-def _as_configured(errors: Array, sigmas: Array, pair: Index, pairs: int) -> Array:
+def _as_configured(
+    errors: Array, sigmas: Array, pair: Index, pairs: int, configured: float
+) -> Array:
     """What ranges scatter, when nobody looks."""
     return np.ones(pairs)
 
