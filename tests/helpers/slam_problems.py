@@ -124,7 +124,7 @@ def team_problem(
 
 
 def unpacked(problem: Problem, x: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Poses, biases, scales, yaw rates and bias of near_bias signals of one vector of all unknowns."""
+    """Poses, biases, scales, yaw rates and near-range bias, of one vector of all unknowns."""
     count, priors = len(problem.initial), problem.priors
     ends = np.cumsum([3 * count, len(priors.bias), len(priors.scale), len(priors.yaw)])
     poses, bias, scale, yaw, near_bias = np.split(x, ends)
