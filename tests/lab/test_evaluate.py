@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lab import evaluate, progress
+from lab import evaluate
 from lab.play import real_team
 from lab.recordings import pyfg, world
 from lab.recordings.recording import Recording
-from lab.score import table
 from lab.score.outcome import Outcome
 
 SCENE = world.Scene(
@@ -155,30 +154,3 @@ def test_help_has_examples(capsys: pytest.CaptureFixture[str]) -> None:
         evaluate.main(["--help"])
     assert ended.value.code == 0
     assert "tools/evaluate run.pyfg --json scores.json" in capsys.readouterr().out
-
-
-def test_who_was_never_localised_has_a_row_that_says_so() -> None:
-    errors = {"ate_rmse_m": 0.25, "rot_mean_deg": 3.5}
-    given = {"robots": {"0": errors, "1": errors}, "team": errors}
-    lines = table.lines({"odometry": given, "robots": {"1": errors}, "team": None})
-    assert lines[2].split() == ["robot", "0", "0.250", "3.50", "not", "localised"]
-    assert lines[3].split() == ["robot", "1", "0.250", "3.50", "0.250", "3.50"]
-    assert lines[4].split()[-2:] == ["not", "localised"]
-
-
-def test_progress_is_a_bar_on_a_terminal_and_few_lines_elsewhere(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    quiet = progress.Progress("2 robots", 80.0)
-    for second in range(81):
-        quiet(float(second))
-    quiet.end()
-    assert capsys.readouterr().err == "2 robots 0/80 s\n"
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    bar = progress.Progress("2 robots", 80.0)
-    bar(40.0)
-    bar(90.0)
-    bar.end()
-    half, full = capsys.readouterr().err.split("\r")[1:]
-    assert half == f"[{'#' * 15}{'.' * 15}] 2 robots 40/80 s"
-    assert full == f"[{'#' * 30}] 2 robots 90/80 s\n"

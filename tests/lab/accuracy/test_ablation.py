@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
-from lab.accuracy.__main__ import NO_INPUT, main
 from lab.accuracy.ablation import PIECES, Piece, without
 from lab.play import edge_run, virtual_team
 from lab.play.playback import equip
@@ -136,15 +134,3 @@ def test_a_failure_puts_everything_back() -> None:
     with pytest.raises(RuntimeError), without(PIECES["closure-dating"]):
         raise RuntimeError
     assert before == pair_window.CONFIRM_US
-
-
-def test_a_section_in_both_is_wrong_usage(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    config = tmp_path / "other.toml"
-    config.write_text("[relative_pose]\ndelta = 0.2\n")
-    with pytest.raises(SystemExit) as end:
-        main([str(tmp_path), "--without", "nlos", "--config", str(config)])
-    assert end.value.code == 2
-    assert "[relative_pose]" in capsys.readouterr().err
-    assert main([str(tmp_path), "--without", "cauchy-priors"]) == NO_INPUT
