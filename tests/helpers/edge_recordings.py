@@ -25,7 +25,5 @@ def edged() -> EdgeRecording:
     poses = [metrics.at_times(trail.t, trail.truth, when) for trail in trails.values()]
     rng = np.random.default_rng(0)
     seen = metrics.relative(*poses) + rng.normal(size=(len(when), 3)) * [0.05, 0.05, 0.01]
-    return EdgeRecording(
-        "made", trails, np.column_stack([when, np.zeros(len(when)), np.ones(len(when)), seen]),
-        SIGMAS,
-    )  # fmt: skip
+    edges = np.column_stack([when, np.zeros(len(when)), np.ones(len(when)), seen])
+    return EdgeRecording("made", trails, edges, SIGMAS)

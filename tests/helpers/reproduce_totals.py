@@ -23,8 +23,13 @@ def good() -> Tally:
                 tally.poses(f"{name}/{when}", (np.array([0.5]), np.array([4.1])))
     tally.poses("odometry", (np.array([0.85]), np.array([8.99])))
     tally.poses("drslamd/after", (np.array([0.1]), np.array([1.0])))
-    for name in ("drslamd/localised", "drslamd/claim/below", "drslamd/claim/nees",
-                 "drslamd/published/nees", "table1/10/drslamd/claim/below"):  # fmt: skip
+    for name in (
+        "drslamd/localised",
+        "drslamd/claim/below",
+        "drslamd/claim/nees",
+        "drslamd/published/nees",
+        "table1/10/drslamd/claim/below",
+    ):
         tally.add(name, 1.0)
     tally.add("drslamd/published/inside", 0.95)
     tally.add("drslamd/claim/wild", 0.0)

@@ -17,8 +17,10 @@ from drslamd.slam.odometry.track import OdometryNoise
 
 def ranged() -> Recording:
     t = np.arange(0, 300, 0.1)
-    rows = [np.column_stack([t, np.full(len(t), a), np.full(len(t), b), np.full(len(t), 4.0)])
-            for a, b in ((0, 1), (1, 2), (2, 1))]  # fmt: skip
+    rows = [
+        np.column_stack([t, np.full(len(t), a), np.full(len(t), b), np.full(len(t), 4.0)])
+        for a, b in ((0, 1), (1, 2), (2, 1))
+    ]
     table = np.concatenate(rows)
     return Recording("made", {}, table[np.argsort(table[:, 0], kind="stable")])
 

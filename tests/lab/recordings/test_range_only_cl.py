@@ -17,10 +17,9 @@ def mat_file(folder: Path) -> Path:
     for number in (1, 4):
         t = np.arange(0, 10, 0.05)
         slam = np.arange(0, 10, 0.5)
-        robots.append({
-            "id": number, "t_m": t, "v_m": np.full(len(t), 0.2), "omega_m": np.zeros(len(t)),
-            "t": slam, "x": 0.2 * slam, "y": np.full(len(slam), number), "phi": np.zeros(len(slam)),
-        })  # fmt: skip
+        wheels = {"t_m": t, "v_m": np.full(len(t), 0.2), "omega_m": np.zeros(len(t))}
+        place = {"x": 0.2 * slam, "y": np.full(len(slam), number), "phi": np.zeros(len(slam))}
+        robots.append({"id": number, **wheels, "t": slam, **place})
     ranges = [
         {"pair": pair, "t": np.array([1.0, 2.0]), "range": np.array([2.4, 2.5])}
         for pair in ([1, 4], [0, 4], [0, 2])

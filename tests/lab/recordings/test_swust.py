@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lab.recordings import readers, swust
-from lab.recordings.recording import BadRecording
+from lab.recordings.recording import Array, BadRecording
 from lab.score import metrics
 from recorded import DATA
 
@@ -43,14 +43,13 @@ def test_a_folder_without_edges_is_no_recording_of_edges(tmp_path: Path) -> None
 @pytest.mark.skipif(not (DATA / "swust_three_robots").exists(), reason="no SWUST recording")
 def test_the_swust_edges_are_as_good_as_their_sigmas_say() -> None:
     found = readers.read_edges(DATA / "swust_three_robots")
-    poses = [
-        np.array([
-            metrics.at_times(trail.t, trail.truth, np.array([edge[0]]))[0]
-            for edge in found.edges
-            for trail in [found.trails[int(edge[end])]]
-        ])
-        for end in (1, 2)
-    ]  # fmt: skip
+
+    def true_poses(end: int) -> Array:
+        trails = [found.trails[robot] for robot in found.edges[:, end].astype(int).tolist()]
+        at = zip(trails, found.edges[:, :1], strict=True)
+        return np.concatenate([metrics.at_times(x.t, x.truth, t) for x, t in at])
+
+    poses = true_poses(1), true_poses(2)
     error = found.edges[:, 3:] - metrics.relative(*poses)
     metres, radians = swust.SIGMAS
     assert 0.5 * metres < np.sqrt(np.mean(error[:, :2] ** 2)) < metres

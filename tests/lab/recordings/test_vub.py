@@ -9,10 +9,8 @@ import pytest
 from lab.recordings import readers
 from recorded import DATA, range_errors
 
-VUB_HEADER = "t,uwb_m," + ",".join(
-    f"tb{n}_{c}" for n in (2, 3)
-    for c in ("gt_x", "gt_y", "gt_z", "gt_yaw", "odo_x", "odo_y", "odo_yaw", "odo_tilt_deg")
-)  # fmt: skip
+OF_A_ROBOT = ("gt_x", "gt_y", "gt_z", "gt_yaw", "odo_x", "odo_y", "odo_yaw", "odo_tilt_deg")
+VUB_HEADER = ",".join(["t", "uwb_m", *(f"tb{n}_{c}" for n in (2, 3) for c in OF_A_ROBOT)])
 
 
 def vub_file(folder: Path, metres: list[str]) -> Path:

@@ -32,9 +32,9 @@ def paths(rng: np.random.Generator, wrong: float) -> tuple[dict[int, Array], dic
     return truth, odometry
 
 
-def closures(rng: np.random.Generator, truth: dict[int, Array], wrong: float) -> dict[
-    tuple[int, int], Closures
-]:  # fmt: skip
+def closures(
+    rng: np.random.Generator, truth: dict[int, Array], wrong: float
+) -> dict[tuple[int, int], Closures]:
     out = {}
     for a, b in PAIRS:
         k = np.arange(0, POSES, 4)

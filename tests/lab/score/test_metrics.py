@@ -17,8 +17,8 @@ TURN = np.array([3.0, -2.0, 2.5])
 
 def as_matrix(pose: Array) -> Array:
     x, y, theta = pose
-    return np.array([[math.cos(theta), -math.sin(theta), x],
-                     [math.sin(theta), math.cos(theta), y], [0, 0, 1]])  # fmt: skip
+    c, s = math.cos(theta), math.sin(theta)
+    return np.array([[c, -s, x], [s, c, y], [0, 0, 1]])
 
 
 def random_poses(seed: int, count: int = 40) -> Array:
@@ -54,10 +54,8 @@ def test_the_alignment_of_noisy_positions_is_that_of_a_general_solver() -> None:
 
 def test_errors_are_those_of_the_definition() -> None:
     truth = np.zeros((4, 3))
-    estimate = np.array(
-        [[3, 4, math.radians(10)], [0, 1, math.radians(12)], [0, 0, math.radians(10)],
-         [0, 2, math.radians(-1)]]
-    )  # fmt: skip
+    places, degrees = [[3, 4], [0, 1], [0, 0], [0, 2]], [10, 12, 10, -1]
+    estimate = np.column_stack([places, np.radians(degrees)])
     errors = metrics.errors({0: estimate}, {0: truth}, 0)
     assert errors["ate_rmse_m"] == pytest.approx(math.sqrt((25 + 1 + 0 + 4) / 4))
     assert errors["ate_mean_m"] == pytest.approx(2.0)

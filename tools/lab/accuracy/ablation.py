@@ -61,8 +61,9 @@ def _as_configured(
 
 PIECES = {
     "self-calibration": Piece(
-        "windows know nothing of what module 3 has learned", "relative_pose",
-        "self_calibration = false",
+        "windows know nothing of what module 3 has learned",
+        section="relative_pose",
+        keys="self_calibration = false",
     ),
     "range-scatter": Piece(
         "closures claim what the configured sigma of ranges says",
@@ -99,7 +100,7 @@ PIECES = {
         "module 3 squares the errors of ranges, whatever their size",
         exchanged=((normal_equations, "ROBUST_SIGMAS", 1e6),),
     ),
-}  # fmt: skip
+}
 """By the name on the command line."""
 
 

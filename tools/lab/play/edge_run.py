@@ -8,7 +8,7 @@ perfect radio, until nothing moves. (Or every robot solves all of it: `optimizer
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,12 +118,14 @@ def _covariance(recording: EdgeRecording) -> Array:
 
 
 def _logs(
-    recording: EdgeRecording, chains: dict[int, Chains], kept: NDArray[np.bool_],
+    recording: EdgeRecording,
+    chains: dict[int, Chains],
+    kept: NDArray[np.bool_],
     noise: OdometryNoise,
-) -> dict[int, list[GraphEntry]]:  # fmt: skip
+) -> dict[int, list[GraphEntry]]:
     """What each robot would have told the others."""
-    traits = (noise.scale, noise.yaw_rad_per_m, noise.translation_per_sqrt_m,
-              noise.yaw_rad_per_sqrt_m, 0.0, 0.0, 0.0)  # fmt: skip
+    antenna = (0.0, 0.0, 0.0)
+    traits = (*astuple(noise), *antenna)
     covariance = se2.packed(_covariance(recording))
     logs = {}
     for robot, chain in chains.items():
