@@ -31,7 +31,6 @@ from drslamd.slam.graph.measurements import (
     GraphEntry,
     Keyframe,
     RangeMeasurement,
-    RelativePoses,
 )
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.robot_model import RobotModel
@@ -40,7 +39,6 @@ MILLIMETRE_M = 1e-3
 LONGEST_STEP = 2**15 - 1
 """Between two samples: 3.2 m or 3.2 rad in a tenth of a second."""
 TRAITS = 7
-_RELATIVE = ("a_n", "b_n", "x", "y", "theta", "tau", "kappa")
 MAX_TRAIT = 10.0
 MAX_UWB_ID = 2**32 - 1
 
@@ -128,14 +126,11 @@ def _fill_graph(out: Any, m: GraphEntry) -> None:
     out.closures = [_filled_closure(item, number[item.peer]) for item in m.closures]
     out.n_keyframes, out.n_peers = len(m.keyframes), len(peers)
     out.n_ranges, out.n_closures = len(m.ranges), len(m.closures)
-    out.relative = [_filled_relative(item, number[item.chain]) for item in m.relative]
-    out.n_relative = len(m.relative)
 
 
 def _read_graph(raw: Any) -> GraphEntry:
     # their upper bound is that all of them fit one datagram
-    items = (raw.n_keyframes, raw.n_ranges, raw.n_closures, raw.n_relative)
-    if min(raw.seq, raw.n_peers, *items) < 0:
+    if min(raw.seq, raw.n_keyframes, raw.n_peers, raw.n_ranges, raw.n_closures) < 0:
         raise ValueError("negative number")
     if raw.n_traits not in (0, TRAITS):
         raise ValueError(f"{raw.n_traits} traits, allowed are {TRAITS} or none")
@@ -149,8 +144,7 @@ def _read_graph(raw: Any) -> GraphEntry:
         raise ValueError("negative keyframe")
     ranges = tuple(_read_range(r, peers) for r in raw.ranges)
     closures = tuple(_read_closure(c, peers) for c in raw.closures)
-    relative = tuple(_read_relative(r, peers) for r in raw.relative)
-    entry = GraphEntry(raw.seq, model, keyframes, ranges, closures, relative)
+    entry = GraphEntry(raw.seq, model, keyframes, ranges, closures)
     if peers != _peers(entry):
         raise ValueError("peers that are not those of the measurements")
     return entry
@@ -158,8 +152,7 @@ def _read_graph(raw: Any) -> GraphEntry:
 
 def _peers(entry: GraphEntry) -> list[Chain]:
     """Whom the measurements of an entry refer to, each named once."""
-    measured = {*(r.peer for r in entry.ranges), *(c.peer for c in entry.closures)}
-    return sorted(measured | {item.chain for item in entry.relative})
+    return sorted({*(r.peer for r in entry.ranges), *(c.peer for c in entry.closures)})
 
 
 def _filled_peer(chain: Chain) -> Any:
@@ -218,23 +211,6 @@ def _read_closure(c: Any, peers: list[Chain]) -> ClosureMeasurement:
         a_T_b=pose,
         covariance=tuple(c.covariance),
     )
-
-
-def _filled_relative(item: RelativePoses, peer: int) -> Any:
-    out = lcmtypes.relative_t()
-    out.peer, out.n = peer, len(item.a_n)
-    for name in _RELATIVE:
-        setattr(out, name, getattr(item, name))
-    return out
-
-
-def _read_relative(r: Any, peers: list[Chain]) -> RelativePoses:
-    if min(r.peer, r.n, *r.a_n, *r.b_n) < 0:
-        raise ValueError("relative pose without peer or keyframe")
-    values = (*r.x, *r.y, *r.theta, *r.tau, *r.kappa)
-    if not all(map(math.isfinite, values)) or min((*r.tau, *r.kappa), default=1.0) <= 0:
-        raise ValueError("relative pose out of range")
-    return RelativePoses(peers[r.peer], *(tuple(getattr(r, name)) for name in _RELATIVE))
 
 
 # ---- poses -------------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ from message_builders import HEADER
 
 from drslamd import lcmtypes
 from drslamd.gossip import messages
+from drslamd.gossip.codecs import CODECS
 from drslamd.slam.graph.public_poses import PublicPoses
 
 FOLDER = Path(lcmtypes.__file__).parent
@@ -45,3 +46,15 @@ def test_the_size_that_public_poses_state_is_the_one_that_is_sent(rank: int, n: 
     raw = lcmtypes.public_poses_t.decode(messages.encode(HEADER, public))
     assert raw.n_values == eval(stated, {"rank": raw.rank, "n": raw.n})
     assert messages.decode("PUBLIC", raw.encode()) == public
+
+
+def test_every_type_is_part_of_what_robots_say() -> None:
+    """From the structs of the messages through their fields."""
+    said = {codec.struct.__name__ for codec in CODECS.values()}
+    while True:
+        kinds = [getattr(lcmtypes, name) for name in said]
+        parts = {t.rsplit(".")[-1] for kind in kinds for t in kind.__typenames__ if "." in t}
+        if parts <= said:
+            break
+        said |= parts
+    assert {source.stem for source in FOLDER.glob("*.lcm")} == said

@@ -166,7 +166,7 @@ def test_the_header_stands_where_every_lcm_program_finds_it() -> None:
         raw = CODECS[kind].struct.decode(messages.encode(HEADER, message))
         head = raw.header
         fields = (head.version, head.origin, head.epoch, head.counter, head.utime, head.tag)
-        assert fields == (1, 3, 11, 12, 13, bytes(8))
+        assert fields == (2, 3, 11, 12, 13, bytes(8))
 
 
 def test_positions_travel_in_tenths_of_millimetres_and_angles_in_tenths_of_milliradians() -> None:

@@ -375,7 +375,7 @@ OWN_ID_USED = "another robot uses id 1, at 10.0.0.7; give every robot a robot.id
     ("key", "message", "sentence"),
     [
         ("team.wrong_tag", forged(a_status(), secret=OTHER_SECRET), WRONG_TAG),
-        ("team.wrong_version", forged(a_status(), version=2), WRONG_VERSION),
+        ("team.wrong_version", forged(a_status(), version=1), WRONG_VERSION),
         ("team.own_id_used", forged(a_status(), robot=1, epoch=11), OWN_ID_USED),
     ],
 )

@@ -1,13 +1,10 @@
-"""The rows of tools/benchmark that need a whole team, on small inputs."""
+"""What grows, on small inputs."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from lab.benchmark import curves, growth, traffic
-from lab.benchmark.rows import Row
+from lab.benchmark import growth
 
 
 def test_time_by_hours_is_a_row_for_each_mark_and_their_ratio(
@@ -30,19 +27,3 @@ def test_in_a_crowd_nobody_measures_beyond_the_reach_of_the_radio(
     assert recording.ranges[:, 3].max() < 6.0
     ends = np.array([trail.truth[0, :2] for trail in recording.trails.values()])
     assert np.abs(ends).max() < growth.SQUARE_M * np.sqrt(6)
-
-
-def test_traffic_is_counted_by_kind_and_is_what_the_robots_sent() -> None:
-    kinds, _ = traffic.sent(1, 60.0)
-    assert set(kinds) == {"graph", "odometry", "pose", "status"}
-    # a heartbeat a second or two of three robots, with the framing of LCM
-    assert 3 * 20 * 100 < kinds["status"] < 3 * 65 * 300
-
-
-def test_rows_with_a_place_on_a_curve_are_drawn(tmp_path: Path) -> None:
-    rows = [Row(3, f"{x}", 10.0 * x, "ms", curve=("hours", x)) for x in (2.0, 1.0, 8.0)]
-    curves.draw([*rows, Row(1, "no curve", 1.0, "ms")], tmp_path / "deep" / "growth.svg")
-    drawn = (tmp_path / "deep" / "growth.svg").read_text()
-    assert drawn.startswith("<?xml")
-    curves.draw([Row(1, "no curve", 1.0, "ms")], tmp_path / "none.svg")
-    assert not (tmp_path / "none.svg").exists()

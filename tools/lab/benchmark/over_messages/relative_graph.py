@@ -7,16 +7,16 @@ is solved meanwhile.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drslamd.conventions import MAX_ROBOT_ID, Chain
-from drslamd.slam.graph.measurements import RelativePoses
-from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.conventions import MAX_ROBOT_ID
 from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.se2 import Array, Index
+from lab.benchmark.over_messages.relative_poses import RelativePoses
 
 ROBOTS = MAX_ROBOT_ID + 1
 
@@ -37,26 +37,24 @@ class SolvedPoses:
     converged: bool
 
 
-def solve(graph: PoseGraph, own: Chain) -> SolvedPoses | None:
-    """The least cost of all relative poses of current chains; None while we have none.
+def solve(held: Mapping[tuple[int, int], RelativePoses], own: int) -> SolvedPoses | None:
+    """The least cost of all relative poses that we hold; None while none leads to us.
+
+    Args:
+        held: by origin and number in its log.
+        own: our robot.
 
     Keyframes of one number are taken for poses of one time. That is only an order of elimination:
     where it is not so the answer is the same and takes longer.
     """
-    parts = [
-        _keyed(origin.chain, batch)
-        for _, origin in sorted(graph.chains.items())
-        for _, relative in sorted(origin.relative.items())
-        for batch in relative
-        if graph.chains.get(batch.chain.robot, origin).chain == batch.chain
-    ]
-    if not parts:
+    if not held:
         return None
-    edges = ComplexFactors.joined(parts)
+    # in one order, whichever came first
+    edges = ComplexFactors.joined([_keyed(origin, held[origin, k]) for origin, k in sorted(held)])
     keys, ends = np.unique(np.concatenate([edges.i, edges.j]), return_inverse=True)
     i, j = np.split(ends, 2)
     label = components(i, j, len(keys))
-    ours = np.flatnonzero(keys % ROBOTS == own.robot)
+    ours = np.flatnonzero(keys % ROBOTS == own)
     if not len(ours):
         return None
     inside = label == label[ours[0]]
@@ -68,10 +66,14 @@ def solve(graph: PoseGraph, own: Chain) -> SolvedPoses | None:
     return SolvedPoses(keys % ROBOTS, keys // ROBOTS, answer.poses, answer.cost, answer.converged)
 
 
-def _keyed(origin: Chain, batch: RelativePoses) -> ComplexFactors:
+def _keyed(origin: int, poses: RelativePoses) -> ComplexFactors:
     """Ends are named by one number for each keyframe; these sort by n, then by robot."""
-    a, b = np.array(batch.a_n, dtype=np.int64), np.array(batch.b_n, dtype=np.int64)
-    return ComplexFactors.relative(a * ROBOTS + origin.robot, b * ROBOTS + batch.chain.robot, batch)
+    edges = poses.edges
+    i, j = edges["a_n"].astype(np.int64), edges["b_n"].astype(np.int64)
+    x, y, theta = (edges[name].astype(float) for name in ("x", "y", "theta"))
+    tau, kappa = edges["tau"].astype(float), edges["kappa"].astype(float)
+    i, j = i * ROBOTS + origin, j * ROBOTS + poses.peer
+    return ComplexFactors(i, j, np.exp(1j * theta), x + 1j * y, kappa, tau)
 
 
 def components(i: Index, j: Index, count: int) -> Index:

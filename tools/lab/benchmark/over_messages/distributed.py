@@ -2,9 +2,9 @@
 
 Every robot starts with its own odometry and the closures that it measured. In a round each may say
 whatever follows from what it held when the round began; then everything that was said (and not
-lost) arrives. What is said are the daemon's own messages: graph entries of a sealed log, in LCM's
-datagrams. In its first round a robot says its log once; in every later one again what a peer may
-lack, because whoever lost a datagram cannot have said so in time.
+lost) arrives. What is said are entries of a log of relative poses (`relative_poses`), sealed as the
+daemon seals its own, in LCM's datagrams. In its first round a robot says its log once; in every
+later one again what a peer may lack, because whoever lost a datagram cannot have said so in time.
 """
 
 from __future__ import annotations
@@ -15,20 +15,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drslamd.conventions import SECOND_US, Chain
-from drslamd.events import Datagram
 from drslamd.gossip import lc02
-from drslamd.gossip.seal import Seal
-from drslamd.gossip.team import Team
-from drslamd.slam.graph.measurements import GraphEntry, RelativePoses
-from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.gossip.lc02 import FramingFault
+from drslamd.gossip.seal import Seal, SealFault
 from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
 from lab.benchmark.graphs import Graph
-from lab.benchmark.relative_graph import SolvedPoses, solve
+from lab.benchmark.over_messages import relative_poses
+from lab.benchmark.over_messages.relative_graph import SolvedPoses, solve
+from lab.benchmark.over_messages.relative_poses import EDGE, FINGERPRINT, RelativePoses
 
 KEY = bytes(32)
-EDGES_PER_ENTRY = 27
-"""As many as one datagram takes."""
 OWN_AGAIN, OTHERS_AGAIN = 7, 3
 """How often a robot says an entry in every round after the first: its own, and those of others
 that it holds. At 30 % loss an entry then fails to reach a third robot by the end of the second
@@ -56,19 +52,21 @@ class GraphRobot:
     """One robot: its log, what it heard, and what it makes of it."""
 
     def __init__(self, number: int, graph: Graph) -> None:
-        self.own = Chain(number, 1)
-        self.team = Team(Seal(KEY, number, 1, {}))
-        self.graph = PoseGraph()
+        self.own = number
         self.solved: SolvedPoses | None = None
         self.bytes_sent = 0
+        self._seal = Seal(KEY, number, 1, {})
+        self._log: dict[tuple[int, int], RelativePoses] = {}
+        """By origin and number."""
         self._held: dict[bytes, bool] = {}
         """Datagrams of log entries: are they our own?"""
         self._news = True
-        for seq, relative in enumerate(_own_edges(number, graph)):
-            entry, sealed = self.team.append(GraphEntry(seq, relative=(relative,)), 0)
-            self.graph.insert(self.own, entry)
-            send = self.team.send_sealed(number, sealed)
-            self._held[lc02.encode(seq, send.channel, send.payload)] = True
+        channel = relative_poses.channel(number)
+        for entry in _own_edges(number, graph):
+            self._log[number, entry.seq] = entry
+            message = relative_poses.encode(self._seal.header(0), entry)
+            datagram = lc02.encode(entry.seq, channel, self._seal.close(channel, message))
+            self._held[datagram] = True
 
     def say(self, number: int) -> Iterator[bytes]:
         """Our datagrams of a round."""
@@ -77,30 +75,40 @@ class GraphRobot:
                 self.bytes_sent += len(datagram)
                 yield datagram
 
-    def hear(self, datagram: bytes, number: int) -> None:
-        received = self.team.receive(Datagram(number * SECOND_US, datagram))
-        if received is not None and isinstance(received.message, GraphEntry):
-            self.graph.insert(received.origin, received.message)
+    def hear(self, datagram: bytes) -> None:
+        framed = lc02.decode(datagram)
+        if isinstance(framed, FramingFault):
+            return
+        channel, payload = framed
+        # a repetition is harmless, as it is to the daemon's logs
+        header = self._seal.open(channel, payload, frozenset([FINGERPRINT]), once=False)
+        if isinstance(header, SealFault):
+            return
+        entry = relative_poses.decode(payload)
+        if (header.origin, entry.seq) not in self._log:
+            self._log[header.origin, entry.seq] = entry
             self._held[datagram] = False
             self._news = True
 
     def solve(self) -> None:
         if self._news:
-            self.solved, self._news = solve(self.graph, self.own), False
+            self.solved, self._news = solve(self._log, self.own), False
 
 
 def _own_edges(number: int, graph: Graph) -> Iterator[RelativePoses]:
     """The edges that leave a robot's poses, peer by peer, in parts that fit a datagram."""
-    read = graph.read
+    read, seq = graph.read, 0
     mine = graph.robot[read.i] == number
     for peer in range(int(graph.robot.max()) + 1):
         at = np.flatnonzero(mine & (graph.robot[read.j] == peer))
-        for first in range(0, len(at), EDGES_PER_ENTRY):
-            part = at[first : first + EDGES_PER_ENTRY]
-            numbers = (graph.n[read.i[part]], graph.n[read.j[part]])
-            values = (*read.measured[part].T, graph.tau[part], graph.kappa[part])
-            columns = (tuple(column.tolist()) for column in (*numbers, *values))
-            yield RelativePoses(Chain(peer, 1), *columns)
+        for first in range(0, len(at), relative_poses.MOST):
+            part = at[first : first + relative_poses.MOST]
+            edges = np.empty(len(part), EDGE)
+            edges["a_n"], edges["b_n"] = graph.n[read.i[part]], graph.n[read.j[part]]
+            edges["x"], edges["y"], edges["theta"] = read.measured[part].T
+            edges["tau"], edges["kappa"] = graph.tau[part], graph.kappa[part]
+            yield RelativePoses(seq, peer, edges)
+            seq += 1
 
 
 def run(graph: Graph, loss: float, gap: float, most: int, seed: int = 0) -> Outcome:
@@ -130,7 +138,7 @@ def run(graph: Graph, loss: float, gap: float, most: int, seed: int = 0) -> Outc
             ]
             began = time.process_time()
             for datagram in arriving:
-                robot.hear(datagram, number)
+                robot.hear(datagram)
             robot.solve()
             cpu += time.process_time() - began
         worst = max(_gap(robot, graph, judge) for robot in robots)

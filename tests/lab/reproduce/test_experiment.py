@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from lab.recordings import world
-from lab.reproduce import driving, experiment
+from lab.reproduce import experiment
 from lab.reproduce.experiment import GRID_S, PAIRS, POSE_TIMES, SCENE, Trial
 from lab.score import metrics
 
@@ -81,28 +81,6 @@ def test_three_robots_drive_about_sixty_metres_each_inside_the_room(perfect: Tri
         assert step.max() <= 0.2 * GRID_S * 1.001
         assert (trail.truth[:, :2] > 0).all()
         assert (trail.truth[:, :2] < [SCENE.width, SCENE.height]).all()
-
-
-def test_a_path_has_curves_both_ways_straight_lines_and_stops() -> None:
-    rng = np.random.default_rng(11)
-    path = driving.by_hand(rng, SCENE)
-    step = np.diff(path, axis=0) / world.STEP_S
-    speed = np.hypot(step[:, 0], step[:, 1])
-    for part in (
-        step[:, 2] > 0.1,
-        step[:, 2] < -0.1,
-        (np.abs(step[:, 2]) < 1e-9) & (speed > 0.15),
-        speed < 1e-9,
-    ):
-        assert np.mean(part) > 0.005
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_nobody_is_driven_into_a_wall(seed: int) -> None:
-    rng = np.random.default_rng(100 + seed)
-    path = driving.by_hand(rng, replace(SCENE, seconds=120.0))
-    assert (path[:, :2] > 0.3).all()
-    assert (path[:, :2] < np.array([SCENE.width, SCENE.height]) - 0.3).all()
 
 
 def test_a_heading_error_is_counted_across_the_half_turn() -> None:

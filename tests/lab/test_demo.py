@@ -99,8 +99,14 @@ def test_a_good_team_ends_with_0_a_table_a_picture_and_figures(
     png, figures = tmp_path / "new" / "demo.png", tmp_path / "other" / "demo.json"
     assert demo.main([*SMALL, "--png", str(png), "--json", str(figures)]) == 0
     printed = capsys.readouterr().out
-    for word in ("robot 0", "robot 1", "team", "dead reckoning (true start given)",
-                 "drslamd (no start given)", f"picture: {png}"):  # fmt: skip
+    for word in (
+        "robot 0",
+        "robot 1",
+        "team",
+        "dead reckoning (true start given)",
+        "drslamd (no start given)",
+        f"picture: {png}",
+    ):
         assert word in printed
     assert "FAILED" not in printed
     assert png.read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
