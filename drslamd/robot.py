@@ -281,7 +281,9 @@ class Robot:
         if not track.covers(last, now):
             return None
         pose = se2.compose(solved.poses[-1], se2.between(track.at(last), track.at(now)))
-        covariance = self.back.estimate.covariances[self.own.robot]
+        covariance = self.back.estimate.covariance(self.own.robot)
+        if covariance is None:
+            return None
         return PoseNow(now * GRID_US, np.append(pose[:2], se2.wrap(pose[2])), covariance)
 
     def _check_health(self, utime: int) -> list[Effect]:

@@ -55,6 +55,4 @@ def optimizer(config: Config, own: Chain, tuning: Tuning = DEFAULTS) -> Optimize
         range_sigma=ranges.range_sigma_m,
         model=tuning.ranges,
         scale_tails=tuning.scale_tails,
-        has_cauchy_priors=tuning.has_cauchy_priors,
-        learns_scatter=tuning.learns_scatter,
     )

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+import numpy as np
+
 from drslamd.conventions import Chain, Segment
 from drslamd.slam.se2 import Array
 
@@ -55,23 +57,36 @@ class TeamEstimate:
 
     Attributes:
         trajectories: by robot.
-        covariances: (3, 3) of each robot's last pose.
+        joint: (3 k, 3 k) covariance of x, y, theta of the last poses of the first k robots in the
+            order of `trajectories`; of the others nothing is claimed.
         bias_m: range bias of each pair, m.
         scale, yaw: of each robot's odometry, fraction and rad/m.
         near_bias_m: of the team, at range 0 (`RangeModel.near_range_shape`).
+        team_bias_m: what the biases of all pairs have in common.
         scatter: how many times the configured sigma the ranges of a pair scatter.
         lifted: state of the relaxation, with `rbcd`.
     """
 
     frame: Segment
     trajectories: dict[int, Trajectory]
-    covariances: dict[int, Array] = field(default_factory=dict)
+    joint: Array = field(default_factory=lambda: np.zeros((0, 0)))
     bias_m: dict[tuple[int, int], Learned] = field(default_factory=dict)
     scale: dict[int, Learned] = field(default_factory=dict)
     yaw: dict[int, Learned] = field(default_factory=dict)
     near_bias_m: Learned = field(default_factory=Learned)
+    team_bias_m: Learned = field(default_factory=Learned)
     scatter: dict[tuple[int, int], float] = field(default_factory=dict)
     cost: float = 0.0
     iterations: int = 0
     converged: bool = True
     lifted: Lifted | None = None
+
+    def covariance(self, robot: int) -> Array | None:
+        """(3, 3) of the last pose of a robot; None where nothing is known of it."""
+        at = self._rows(robot)
+        return None if at is None else np.asarray(self.joint[at, at])
+
+    def _rows(self, robot: int) -> slice | None:
+        robots = list(self.trajectories)
+        at = 3 * robots.index(robot) if robot in robots else len(self.joint)
+        return slice(at, at + 3) if at < len(self.joint) else None

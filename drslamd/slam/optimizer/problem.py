@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.slam import range_model, se2
+from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.range_model import LINKTRACK, RangeModel
 from drslamd.slam.se2 import Array, Index
 
@@ -47,6 +48,10 @@ class BetweenFactors:
         scale = sigma[:, :, None] * sigma[:, None, :]
         inverse = np.linalg.inv(self.covariance / scale + RIDGE * np.eye(3)) / scale
         return np.asarray((inverse + np.swapaxes(inverse, 1, 2)) / 2)
+
+    def cost(self, errors: Array) -> float:
+        """Of errors (m, 3)."""
+        return float(np.vdot(errors, (self.information @ errors[..., None])[..., 0]))
 
 
 @dataclass(frozen=True)
@@ -90,28 +95,40 @@ class RangeFactors:
 
 @dataclass(frozen=True)
 class Priors:
-    """Sigmas of the sensors' constants before anything is measured.
+    """What is believed of the sensors' constants before anything is measured.
 
     Attributes:
-        bias: (pairs,) m, half widths of Cauchy's distribution (or sigmas of Gauss's).
-        scale: (robots,) fraction, likewise.
-        yaw: (robots,) rad/m.
-        near_bias: (1,) m, for the whole team: its modules are of one kind, and the near-range bias
+        bias: of the pairs' range biases.
+        scale: (robots,) sigmas as configured, a fraction.
+        scale_tails: the distribution of a scale is Cauchy's, so many times narrower than that.
+        yaw: (robots,) sigmas, rad/m.
+        near_bias: m, for the whole team: its modules are of one kind, and the near-range bias
             follows the power that is received.
-        has_cauchy_tails: have biases and scales?
     """
 
-    bias: Array
+    bias: BiasPrior
     scale: Array
+    scale_tails: float
     yaw: Array
-    near_bias: Array
-    has_cauchy_tails: bool = True
+    near_bias: float
 
-    def stiffness(self, values: Array, widths: Array) -> Array:
-        """Information that priors of these widths hold values with: the weight of their cost."""
-        if not self.has_cauchy_tails:
-            return np.asarray(widths**-2.0)
-        return np.asarray(1 / (widths**2 * (1 + (values / widths) ** 2)))
+    def scale_stiffness(self, scale: Array) -> Array:
+        """(robots,) information with which scales are held."""
+        width = self.scale / self.scale_tails
+        return np.asarray(1 / (width**2 + scale**2))
+
+    def cost(self, calibration: Calibration) -> float:
+        """Of all that is learned of the sensors."""
+        team = float(calibration.team_bias[0])
+        scale = calibration.scale * self.scale_tails / self.scale
+        gaussian = np.concatenate(
+            [calibration.yaw / self.yaw, calibration.near_bias / self.near_bias]
+        )
+        return (
+            self.bias.cost(calibration.bias - team, team)
+            + float(np.log1p(scale**2).sum())
+            + float(gaussian @ gaussian)
+        )
 
 
 @dataclass(frozen=True)
@@ -122,6 +139,8 @@ class Problem:
         robot, n: (k,) whose keyframe each pose is, and which.
         initial: (k, 3) w_T_k.
         gauge: the pose that is held where `initial` has it.
+        pairs: how many pairs of robots have ranges.
+        range_sigma: of a range, as configured, m.
         model: of its ranges.
     """
 
@@ -129,26 +148,34 @@ class Problem:
     n: Index
     initial: Array
     gauge: int
+    pairs: int
     odometry: OdometryFactors
     closures: BetweenFactors
     ranges: RangeFactors
     priors: Priors
+    range_sigma: float = 0.1
     model: RangeModel = LINKTRACK
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What an optimiser learned about the sensors, in the numbering of `Priors`."""
+    """What an optimiser learned about the sensors.
+
+    Attributes:
+        bias: (pairs,) m; team_bias: (1,) what they have in common.
+        scale, yaw: (robots,) fraction and rad/m.
+        near_bias: (1,) m.
+    """
 
     bias: Array
     scale: Array
     yaw: Array
     near_bias: Array
+    team_bias: Array
 
     @staticmethod
-    def zero(priors: Priors) -> Calibration:
-        sigmas = (priors.bias, priors.scale, priors.yaw, priors.near_bias)
-        return Calibration(*(np.zeros(len(sigma)) for sigma in sigmas))
+    def zero(pairs: int, robots: int) -> Calibration:
+        return Calibration(*(np.zeros(count) for count in (pairs, robots, robots, 1, 1)))
 
     def plus(self, step: Calibration) -> Calibration:
         return Calibration(
@@ -156,6 +183,7 @@ class Calibration:
             scale=self.scale + step.scale,
             yaw=self.yaw + step.yaw,
             near_bias=self.near_bias + step.near_bias,
+            team_bias=self.team_bias + step.team_bias,
         )
 
 
@@ -164,8 +192,9 @@ class Solution:
     """Poses (k, 3) in the order of the problem, and how they were reached.
 
     Attributes:
-        covariances: marginals (3, 3) of x, y, theta in w, for the poses that were asked for.
-        spread: sigmas of the calibration, priors included, where marginals were asked for.
+        scatter: (pairs,) how many times the configured sigma ranges scatter.
+        joint: (3 k, 3 k) covariance of x, y, theta in w of the k poses that were asked for.
+        spread: sigmas of the calibration, where poses were asked for.
     """
 
     poses: Array
@@ -173,7 +202,8 @@ class Solution:
     cost: float
     iterations: int
     converged: bool
-    covariances: dict[int, Array] = field(default_factory=dict)
+    scatter: Array = field(default_factory=lambda: np.zeros(0))
+    joint: Array = field(default_factory=lambda: np.zeros((0, 0)))
     spread: Calibration | None = None
 
 

@@ -10,23 +10,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
 from drslamd.conventions import Chain
-from drslamd.slam.calibration.range_scatter import scatter_ratios
 from drslamd.slam.graph.estimate import Learned, TeamEstimate, Trajectory
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer import factors
+from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.factors import Numbering
-from drslamd.slam.optimizer.problem import Calibration, Priors, Problem, Solution, range_errors
+from drslamd.slam.optimizer.problem import Calibration, Priors, Problem
 from drslamd.slam.range_model import LINKTRACK, RangeModel
 from drslamd.slam.se2 import Array
+
+Name = TypeVar("Name")
 
 YAW_PRIOR_FLOOR = 1e-4
 """rad/m; a prior of zero width would make the system singular."""
@@ -46,16 +48,12 @@ class BandedOptimizer:
         bias_sigma: how far off the ranges of a pair may be, m.
         range_sigma: around that, as configured, m.
         scale_tails: see `SCALE_TAILS`.
-        has_cauchy_priors: of biases and scales; else they are Gauss's.
-        learns_scatter: is it looked how much ranges scatter?
     """
 
     bias_sigma: float
     range_sigma: float
     model: RangeModel = LINKTRACK
     scale_tails: float = SCALE_TAILS
-    has_cauchy_priors: bool = True
-    learns_scatter: bool = True
 
     def job(
         self,
@@ -66,7 +64,7 @@ class BandedOptimizer:
     ) -> Job:
         """See `Optimizer.job`; public poses are not needed."""
         team = build_problem(graph, group, previous, self)
-        return partial(_solve, team, group, self.range_sigma if self.learns_scatter else None)
+        return partial(_solve, team, group)
 
 
 @dataclass(frozen=True)
@@ -97,24 +95,26 @@ def build_problem(
     closures = factors.closures(graph, places)
     hints = replace(closures, covariance=closures.covariance + HINT * np.eye(3))
     priors = Priors(
-        bias=np.full(len(pairs), numbers.bias_sigma / numbers.model.bias_tails),
-        scale=np.array([data.model.noise.scale for data in chains]) / numbers.scale_tails,
+        bias=BiasPrior.of(numbers.bias_sigma, numbers.model),
+        scale=np.array([data.model.noise.scale for data in chains]),
+        scale_tails=numbers.scale_tails,
         yaw=np.array([max(data.model.noise.yaw_rad_per_m, YAW_PRIOR_FLOOR) for data in chains]),
-        near_bias=np.array([numbers.model.near_bias_sigma_m]),
-        has_cauchy_tails=numbers.has_cauchy_priors,
+        near_bias=numbers.model.near_bias_sigma_m,
     )
     problem = Problem(
         robot=places.robot,
         n=places.n,
         initial=factors.initial_poses(graph, group, previous, places),
         gauge=factors.gauge_place(graph, group, places),
+        pairs=len(pairs),
         odometry=factors.odometry(graph, places, robots),
         closures=hints.chosen(factors.sensible(hints.i, hints.j)),
         ranges=ranges.chosen(factors.sensible(ranges.i, ranges.j)),
         priors=priors,
+        range_sigma=numbers.range_sigma,
         model=numbers.model,
     )
-    start = _start(previous, pairs, robots) if previous else Calibration.zero(priors)
+    start = _start(previous, pairs, robots) if previous else Calibration.zero(len(pairs), len(robots))
     return TeamProblem(problem, start, [data.chain for data in chains], pairs, places)
 
 
@@ -125,14 +125,17 @@ def _start(previous: TeamEstimate, pairs: list[tuple[int, int]], robots: list[in
         scale=np.array([previous.scale.get(robot, Learned()).value for robot in robots]),
         yaw=np.array([previous.yaw.get(robot, Learned()).value for robot in robots]),
         near_bias=np.array([previous.near_bias_m.value]),
+        team_bias=np.array([previous.team_bias_m.value]),
     )
 
 
-def _solve(team: TeamProblem, group: Group, range_sigma: float | None) -> TeamEstimate:
+def _solve(team: TeamProblem, group: Group) -> TeamEstimate:
     """Solve, with the uncertainty of everybody's latest pose, and sort the answer by robot."""
     mine = {chain.robot: team.places.of_robot(chain.robot) for chain in team.chains}
-    last = {robot: int(at[-1]) for robot, at in mine.items()}
-    solution = banded_solver.solve(team.problem, team.start, tuple(last.values()))
+    last = tuple(int(at[-1]) for at in mine.values())
+    solution = banded_solver.solve(team.problem, team.start, last)
+    learned, spread = solution.calibration, solution.spread
+    assert spread is not None
     return TeamEstimate(
         frame=group.frame,
         trajectories={
@@ -141,51 +144,19 @@ def _solve(team: TeamProblem, group: Group, range_sigma: float | None) -> TeamEs
             )
             for chain in team.chains
         },
-        covariances={robot: solution.covariances[at] for robot, at in last.items()},
-        **_learned(team, solution),
-        scatter=_scatter(team, solution, range_sigma) if range_sigma else {},
+        joint=solution.joint,
+        bias_m=_named(team.pairs, learned.bias, spread.bias),
+        scale=_named(list(mine), learned.scale, spread.scale),
+        yaw=_named(list(mine), learned.yaw, spread.yaw),
+        near_bias_m=Learned(float(learned.near_bias[0]), float(spread.near_bias[0])),
+        team_bias_m=Learned(float(learned.team_bias[0]), float(spread.team_bias[0])),
+        scatter=dict(zip(team.pairs, solution.scatter.tolist(), strict=True)),
         cost=solution.cost,
         iterations=solution.iterations,
         converged=solution.converged,
     )
 
 
-def _scatter(
-    team: TeamProblem, solution: Solution, range_sigma: float
-) -> dict[tuple[int, int], float]:
-    """How much the ranges of each pair scatter about the solution."""
-    ranges = team.problem.ranges
-    errors = range_errors(solution.poses, ranges, solution.calibration, team.problem.model)[0]
-    ratios = scatter_ratios(
-        errors,
-        ranges.sigma,
-        ranges.pair,
-        pairs=len(team.pairs),
-        configured=range_sigma,
-        most_sigmas=team.problem.model.cauchy_sigmas,
-    )
-    return dict(zip(team.pairs, ratios.tolist(), strict=True))
-
-
-def _learned(team: TeamProblem, solution: Solution) -> dict[str, Any]:
-    """The sensors' constants by name, as `TeamEstimate` has them."""
-    learned, spread, priors = solution.calibration, solution.spread, team.problem.priors
-    assert spread is not None
-    robots = [chain.robot for chain in team.chains]
-    bias = _beside(learned.bias, spread.bias, priors.stiffness(learned.bias, priors.bias))
-    scale = _beside(learned.scale, spread.scale, priors.stiffness(learned.scale, priors.scale))
-    yaw = _beside(learned.yaw, spread.yaw, priors.yaw**-2.0)
-    near_bias = _beside(learned.near_bias, spread.near_bias, priors.near_bias**-2.0)
-    return {
-        "bias_m": dict(zip(team.pairs, bias, strict=True)),
-        "scale": dict(zip(robots, scale, strict=True)),
-        "yaw": dict(zip(robots, yaw, strict=True)),
-        "near_bias_m": near_bias[0],
-    }
-
-
-def _beside(values: Array, sigmas: Array, by_prior: Array) -> list[Learned]:
-    """Values with the sigmas of what was measured of them, the information of priors taken out."""
-    information = np.maximum(sigmas**-2.0 - by_prior, 1e-12)
-    sigma = (information**-0.5).tolist()
-    return [Learned(*pair) for pair in zip(values.tolist(), sigma, strict=True)]
+def _named(names: list[Name], values: Array, sigmas: Array) -> dict[Name, Learned]:
+    pairs = zip(values.tolist(), sigmas.tolist(), strict=True)
+    return {name: Learned(*pair) for name, pair in zip(names, pairs, strict=True)}

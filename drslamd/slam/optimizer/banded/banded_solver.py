@@ -1,9 +1,8 @@
 """Module 3, default: the team's graph solved exactly, because ordered by time it is a band.
 
-The Gauss-Newton Hessian of the team has a half-bandwidth of about 3 R for R robots
-(`normal_equations`), so one banded Cholesky factorisation solves it exactly in linear time. The
-border is eliminated by its Schur complement. The factorisation also yields the marginal
-covariances of the poses that are asked for.
+The Gauss-Newton Hessian of the team has a half-bandwidth of about 3 R for R robots (`layout`), so
+one banded Cholesky factorisation solves it exactly in linear time. The border is eliminated by its
+Schur complement. A second system, at the solution, says what may be claimed of it.
 
 The cost of a step grows with the cube of the number of robots; up to about a dozen robots in one
 connected group it stays below the cost of linearising.
@@ -14,14 +13,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cholesky_banded
-from scipy.linalg.lapack import dtbtrs
 
 from drslamd.slam import se2
+from drslamd.slam.calibration.range_scatter import LEAST_SCATTER, inlier_scatter, scatter_ratios
+from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.layout import BandLayout
 from drslamd.slam.optimizer.banded.normal_equations import Equations, System
-from drslamd.slam.optimizer.problem import Calibration, Problem, Solution
-from drslamd.slam.se2 import Array
+from drslamd.slam.optimizer.problem import Calibration, Problem, Solution, range_errors
+from drslamd.slam.se2 import Array, Index
 
 LEAST_DAMPING = 1e-6
 """Of Levenberg and Marquardt, relative to the diagonal."""
@@ -29,6 +28,23 @@ MOST_DAMPING = 1e6
 """Beyond it no step helps."""
 UNKNOWN = 1e6
 """m^2 and rad^2: the covariance of a pose that nothing holds."""
+TOLERANCE = 3e-7
+"""m and rad: largest step after which the solution counts as reached. Far below every noise, so that
+robots which hold the same graph have the same answer wherever they started from."""
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A solution on its way.
+
+    Attributes:
+        threshold: (pairs,) sigmas beyond which a range loses weight.
+    """
+
+    poses: Array
+    calibration: Calibration
+    threshold: Array
+    cost: float
 
 
 def solve(
@@ -36,26 +52,24 @@ def solve(
     start: Calibration | None = None,
     marginals: tuple[int, ...] = (),
     most: int = 30,
-    tolerance: float = 5e-4,
+    tolerance: float = TOLERANCE,
 ) -> Solution:
     """Levenberg-Marquardt to convergence.
 
-    Whatever the edges say, there is a solution; when they make no sense, or leave poses loose, it
+    Whatever the factors say, there is a solution; when they make no sense, or leave poses loose, it
     is the best that was met and does not count as converged.
 
     Args:
         problem: one connected group.
         start: calibration to start from (zero when left out).
-        marginals: poses whose covariance is wanted.
+        marginals: poses whose joint covariance is wanted.
         most: bound on iterations.
-        tolerance: largest step, m and rad, after which the solution counts as reached; the
-            default is far below every noise, and the next solve goes on from there.
+        tolerance: see `TOLERANCE`.
     """
     equations = Equations(problem)
-    layout = equations.layout
-    poses = problem.initial.copy()
-    calibration = start or Calibration.zero(problem.priors)
-    system = equations.at(poses, calibration)
+    calibration = start or Calibration.zero(problem.pairs, len(problem.priors.scale))
+    point = _point(equations, problem, problem.initial.copy(), calibration)
+    system = equations.at(point.poses, point.calibration, point.threshold)
     damping, steps, converged = LEAST_DAMPING, 0, False
     while steps < most and not converged and damping < MOST_DAMPING:
         steps += 1
@@ -63,114 +77,97 @@ def solve(
         if step is None:
             damping *= 10
             continue
-        pose_step = step[layout.poses]
-        trial, trial_calibration = poses + pose_step, calibration.plus(layout.calibration(step))
-        new = equations.at(trial, trial_calibration)
-        if not new.cost <= system.cost * (1 + 1e-12):
+        poses = point.poses + step[equations.layout.poses]
+        calibration = point.calibration.plus(equations.layout.calibration(step))
+        cost = equations.cost(poses, calibration, point.threshold)
+        if not cost <= point.cost + 1e-12 * (1 + abs(point.cost)):
             damping *= 10
             continue
-        converged = bool(
-            np.abs(pose_step).max() < tolerance or system.cost - new.cost < 1e-9 * (1 + new.cost)
-        )
-        poses, calibration, system, damping = trial, trial_calibration, new, damping / 10
-    poses[:, 2] = se2.wrap(poses[:, 2])
-    if not marginals:
-        return Solution(poses, calibration, system.cost, steps, converged)
-    factors = _Factors.of(system)
-    blocks = _marginals(factors, layout.poses[list(marginals)])
-    covariances = dict(zip(marginals, blocks, strict=True))
-    spread = _spread(factors, layout)
-    return Solution(poses, calibration, system.cost, steps, converged, covariances, spread)
+        damping /= 10
+        converged = bool(np.abs(step[equations.layout.poses]).max() < tolerance)
+        point = _point(equations, problem, poses, calibration)
+        if not converged:
+            system = equations.at(point.poses, point.calibration, point.threshold)
+    return _solution(equations, problem, point, marginals, steps, converged)
+
+
+def _point(
+    equations: Equations, problem: Problem, poses: Array, calibration: Calibration
+) -> _Point:
+    threshold = _threshold(problem, poses, calibration)
+    cost = equations.cost(poses, calibration, threshold)
+    return _Point(poses, calibration, threshold, cost)
+
+
+def _threshold(problem: Problem, poses: Array, calibration: Calibration) -> Array:
+    """(pairs,) follows how much the ranges of a pair scatter, outliers left out."""
+    ranges, model = problem.ranges, problem.model
+    errors = range_errors(poses, ranges, calibration, model)[0]
+    scatter = inlier_scatter(
+        errors, ranges.sigma, ranges.pair, pairs=problem.pairs, sigmas_cut=model.cauchy_sigmas
+    )
+    return model.cauchy_sigmas * scatter
 
 
 def _step(system: System, damping: float) -> Array | None:
     """Step of all unknowns; None where rounding has made the system indefinite."""
-    factors = _Factors.of(system, damping)
-    step = None if factors is None else factors.solved(-system.gradient)
+    factor = BandFactor.of(system, damping)
+    step = None if factor is None else factor.solved(-system.gradient)
     return step if step is not None and np.isfinite(step).all() else None
 
 
-@dataclass(frozen=True)
-class _Factors:
-    """A system [A B; B' C] taken apart: A = L L', and what is left for the border.
-
-    Attributes:
-        lower: L in lower banded form.
-        halfway: (n, b) L^-1 B: half of the way is enough, since B' A^-1 B = (L^-1 B)' (L^-1 B).
-        schur: (b, b) C - B' A^-1 B, whose inverse is the covariance of the border.
-    """
-
-    lower: Array
-    halfway: Array
-    schur: Array
-
-    @staticmethod
-    def of(system: System, damping: float = 0.0) -> _Factors | None:
-        """None where the system is not positive definite."""
-        band, corner = system.band.copy(), system.corner.copy()
-        band[0] *= 1 + damping
-        corner[np.diag_indices(len(corner))] *= 1 + damping
-        try:
-            lower = cholesky_banded(band, lower=True, check_finite=False)
-        except np.linalg.LinAlgError:
-            return None
-        halfway, _ = dtbtrs(lower, system.border, uplo="L")
-        schur = corner - halfway.T @ halfway
-        # a tiny pivot of A can leave nothing of the border but rounding
-        definite = np.isfinite(schur).all() and bool((np.diag(schur) > 0).all())
-        return _Factors(lower, halfway, schur) if definite else None
-
-    def solved(self, right: Array) -> Array | None:
-        """(n + b,) the solution for a right-hand side (n + b,)."""
-        n = len(self.halfway)
-        middle = self.forward(right[:n, None])[:, 0]
-        try:
-            outer = np.linalg.solve(self.schur, right[n:] - self.halfway.T @ middle)
-        except np.linalg.LinAlgError:
-            return None
-        rest = (middle - self.halfway @ outer)[:, None]
-        inner, _ = dtbtrs(self.lower, rest, uplo="L", trans="T")
-        return np.concatenate([inner[:, 0], outer])
-
-    def forward(self, columns: Array) -> Array:
-        """L^-1 times columns (n, c)."""
-        solved, _ = dtbtrs(self.lower, columns, uplo="L")
-        return np.asarray(solved)
+def _solution(
+    equations: Equations,
+    problem: Problem,
+    point: _Point,
+    marginals: tuple[int, ...],
+    steps: int,
+    converged: bool,
+) -> Solution:
+    """The answer, with what may be claimed of it."""
+    poses: Array = point.poses.copy()
+    poses[:, 2] = se2.wrap(poses[:, 2])
+    solution = Solution(
+        poses, point.calibration, point.cost, steps, converged, scatter=_scatter(problem, point)
+    )
+    if not marginals:
+        return solution
+    layout, model = equations.layout, problem.model
+    claims = model.correlated_ratio(1.0) * np.maximum(solution.scatter, LEAST_SCATTER)
+    system = equations.claimed(point.poses, point.calibration, point.threshold, claims)
+    wanted = layout.poses[list(marginals)].ravel()
+    sensors = np.arange(3 * len(poses), layout.band + layout.border)
+    joint = _covariance(system, np.concatenate([wanted, sensors]))
+    k = len(wanted)
+    sigmas = np.zeros(layout.band + layout.border)
+    sigmas[sensors] = np.sqrt(np.diag(joint)[k:])
+    return Solution(
+        poses,
+        point.calibration,
+        point.cost,
+        steps,
+        converged,
+        scatter=solution.scatter,
+        joint=joint[:k, :k],
+        spread=layout.calibration(sigmas),
+    )
 
 
-def _marginals(factors: _Factors | None, wanted: Array) -> Array:
-    """(k, 3, 3) blocks of the inverse of the whole system for the unknowns (k, 3) of k poses."""
-    nothing = np.tile(UNKNOWN * np.eye(3), (len(wanted), 1, 1))
-    border = None if factors is None else _inverse(factors.schur)
-    if factors is None or border is None:
-        return nothing
-    n = len(factors.halfway)
-    inside = wanted[:, 0] < n
-    at = wanted[inside]
-    unit = np.zeros((n, at.size))
-    unit[at.ravel(), np.arange(at.size)] = 1
-    own = factors.forward(unit).reshape(n, len(at), 3)
-    bound = np.einsum("nb,nki->kbi", factors.halfway, own)
-    out = nothing
-    out[inside] = np.einsum("nki,nkj->kij", own, own)
-    out[inside] += np.swapaxes(bound, 1, 2) @ border @ bound
-    outside = wanted[~inside] - n
-    out[~inside] = border[outside[:, :, None], outside[:, None, :]]
-    return out if np.isfinite(out).all() else nothing
+def _covariance(system: System, unknowns: Index) -> Array:
+    factor = BandFactor.of(system)
+    joint = None if factor is None else factor.joint_covariance(unknowns)
+    return UNKNOWN * np.eye(len(unknowns)) if joint is None else joint
 
 
-def _spread(factors: _Factors | None, layout: BandLayout) -> Calibration:
-    """Sigmas of the sensors' constants, all else being unknown too."""
-    variances = np.full(layout.band + layout.border, UNKNOWN)
-    border = None if factors is None else _inverse(factors.schur)
-    if border is not None:
-        variances[layout.band :] = np.maximum(np.diag(border), 0.0)
-    return layout.calibration(np.sqrt(variances))
-
-
-def _inverse(matrix: Array) -> Array | None:
-    try:
-        inverse = np.linalg.inv(matrix)
-    except np.linalg.LinAlgError:
-        return None
-    return inverse if np.isfinite(inverse).all() else None
+def _scatter(problem: Problem, point: _Point) -> Array:
+    """(pairs,) how much ranges scatter about the solution, over what is configured."""
+    ranges, model = problem.ranges, problem.model
+    errors = range_errors(point.poses, ranges, point.calibration, model)[0]
+    return scatter_ratios(
+        errors,
+        ranges.sigma,
+        ranges.pair,
+        pairs=problem.pairs,
+        configured=problem.range_sigma,
+        most_sigmas=model.cauchy_sigmas,
+    )

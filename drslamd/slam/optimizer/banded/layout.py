@@ -24,7 +24,7 @@ class BandLayout:
 
     Attributes:
         poses: (k, 3) of each pose.
-        bias, scale, yaw: of each pair and robot; near_bias: of the team.
+        bias, scale, yaw: of each pair and robot; near_bias, team_bias: of the team.
         band, border: how many unknowns are in each.
         width: diagonals of the band, the main one included.
     """
@@ -34,32 +34,34 @@ class BandLayout:
     scale: Index
     yaw: Index
     near_bias: Index
+    team_bias: Index
     band: int
     border: int
     width: int
 
     @staticmethod
     def of(problem: Problem) -> BandLayout:
-        count, priors = len(problem.initial), problem.priors
+        count, robots = len(problem.initial), len(problem.priors.scale)
         factors = (problem.odometry, problem.closures, problem.ranges)
         i = np.concatenate([f.i for f in factors])
         j = np.concatenate([f.j for f in factors])
-        apart = border_poses(i, j, narrow=8 + 4 * len(priors.scale))
+        apart = border_poses(i, j, narrow=8 + 4 * robots)
         inside = np.ones(count, dtype=bool)
         inside[apart] = False
         place = np.where(inside, np.cumsum(inside) - 1, 0)
         place[apart] = count - len(apart) + np.arange(len(apart))
         both = inside[i] & inside[j]
         reach = int(np.abs(place[i] - place[j])[both].max(initial=0))
-        sizes = [len(p) for p in (priors.bias, priors.scale, priors.yaw, priors.near_bias)]
+        sizes = [problem.pairs, robots, robots, 1, 1]
         numbers = 3 * count + np.arange(sum(sizes))
-        bias, scale, yaw, near_bias = np.split(numbers, np.cumsum(sizes)[:-1])
+        bias, scale, yaw, near_bias, team_bias = np.split(numbers, np.cumsum(sizes)[:-1])
         return BandLayout(
             poses=3 * place[:, None] + np.arange(3),
             bias=bias,
             scale=scale,
             yaw=yaw,
             near_bias=near_bias,
+            team_bias=team_bias,
             band=3 * (count - len(apart)),
             border=3 * len(apart) + sum(sizes),
             width=3 * reach + 3,
@@ -67,7 +69,7 @@ class BandLayout:
 
     def calibration(self, unknowns: Array) -> Calibration:
         """The part of a vector over all unknowns that belongs to the sensors."""
-        parts = (self.bias, self.scale, self.yaw, self.near_bias)
+        parts = (self.bias, self.scale, self.yaw, self.near_bias, self.team_bias)
         return Calibration(*(unknowns[numbers] for numbers in parts))
 
 

@@ -19,43 +19,46 @@ from drslamd.slam.se2 import Array, Index
 
 GAUGE_SIGMA = 1e-5
 """The gauge pose is held to 10 um and 10 urad: far below all noise, far above rounding."""
+LEAST_CURVATURE = 0.1
+"""Of Cauchy's cost over that of a square with the same pull: beyond its threshold the curvature is
+negative, and a system must stay positive definite."""
 
 
 @dataclass
 class System:
-    """Lower band (w, n), border (n, b), corner (b, b), gradient (n + b,) and cost at some point."""
+    """Lower band (w, n), border (n, b), corner (b, b) and gradient (n + b,) at some point."""
 
     band: Array
     border: Array
     corner: Array
     gradient: Array
-    cost: float
 
     @staticmethod
     def empty(layout: BandLayout) -> System:
         n, b = layout.band, layout.border
         return System(
-            np.zeros((layout.width, n)), np.zeros((n, b)), np.zeros((b, b)), np.zeros(n + b), 0.0
+            np.zeros((layout.width, n)), np.zeros((n, b)), np.zeros((b, b)), np.zeros(n + b)
         )
 
-    def add_gaussian_prior(self, unknowns: Index, error: Array, stiffness: Array | float) -> None:
-        """Add independent priors."""
-        stiffness = np.broadcast_to(stiffness, error.shape)
+    def add_prior(self, unknowns: Index, values: Array, stiffness: Array | float) -> None:
+        """Add independent priors by the information with which they hold values at zero."""
+        stiffness = np.broadcast_to(stiffness, values.shape)
         inside = unknowns < len(self.border)
         self.band[0, unknowns[inside]] += stiffness[inside]
         outside = unknowns[~inside] - len(self.border)
         self.corner[outside, outside] += stiffness[~inside]
-        self.gradient[unknowns] += stiffness * error
-        self.cost += float(np.sum(stiffness * error**2))
+        self.gradient[unknowns] += stiffness * values
 
-    def add_cauchy_prior(self, unknowns: Index, error: Array, sigma: Array) -> None:
-        """Add independent priors with the tails of Cauchy's: log(1 + (e / sigma)^2) by its weight.
-
-        Where little is measured the unknown stays near zero; where much is, the prior gives way.
-        """
-        scaled = (error / sigma) ** 2
-        self.add_gaussian_prior(unknowns, error, 1 / (sigma**2 * (1 + scaled)))
-        self.cost += float(np.sum(np.log1p(scaled) - scaled / (1 + scaled)))
+    def add_difference(self, unknowns: Index, one: Index, values: Array, stiffness: float) -> None:
+        """Hold unknowns (k,) of the border beside one other (1,); values (k,) of the differences."""
+        n = len(self.border)
+        many, (single,) = unknowns - n, one - n
+        self.corner[many, many] += stiffness
+        self.corner[many, single] -= stiffness
+        self.corner[single, many] -= stiffness
+        self.corner[single, single] += stiffness * len(many)
+        self.gradient[unknowns] += stiffness * values
+        self.gradient[one] -= stiffness * values.sum()
 
 
 class _Assembly:
@@ -67,29 +70,31 @@ class _Assembly:
             unknowns: (m, c) on which each factor depends.
         """
         n, b = layout.band, layout.border
-        row, column = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
+        shape = (*unknowns.shape, unknowns.shape[1])
+        row = np.broadcast_to(unknowns[:, :, None], shape).ravel()
+        column = np.broadcast_to(unknowns[:, None, :], shape).ravel()
         self._unknowns = unknowns.ravel()
-        self._in_band = (row >= column) & (row < n)
-        self._in_border = (row < n) & (column >= n)
-        self._in_corner = (row >= n) & (column >= n)
+        self._in_band = np.flatnonzero((row >= column) & (row < n))
+        self._in_border = np.flatnonzero((row < n) & (column >= n))
+        self._in_corner = np.flatnonzero((row >= n) & (column >= n))
         self._band = ((row - column) * n + column)[self._in_band]
         self._border = (row * b + column - n)[self._in_border]
         self._corner = ((row - n) * b + column - n)[self._in_corner]
 
-    def add(self, system: System, error: Array, jacobian: Array, information: Array) -> None:
-        """Add J' W J, J' W e and e' W e.
+    def add(self, system: System, jacobian: Array, information: Array, pull: Array) -> None:
+        """Add J' W J to the matrix and J' f to the gradient.
 
         Args:
-            error: (m, d); jacobian: (m, d, c); information: (m, d, d).
+            jacobian: (m, d, c); information: (m, d, d).
+            pull: (m, d) f, half the derivative of the cost by the error.
         """
-        weighted = np.swapaxes(information @ jacobian, 1, 2)
-        blocks = weighted @ jacobian
+        transposed = np.swapaxes(jacobian, 1, 2)
+        blocks = (transposed @ (information @ jacobian)).ravel()
         system.band += _sums(self._band, blocks[self._in_band], system.band)
         system.border += _sums(self._border, blocks[self._in_border], system.border)
         system.corner += _sums(self._corner, blocks[self._in_corner], system.corner)
-        gradient = (weighted @ error[..., None]).ravel()
+        gradient = (transposed @ pull[..., None]).ravel()
         system.gradient += _sums(self._unknowns, gradient, system.gradient)
-        system.cost += float(np.vdot(error, information @ error[..., None]))
 
 
 def _sums(at: Index, values: Array, like: Array) -> Array:
@@ -115,27 +120,89 @@ class Equations:
             np.column_stack([poses[ranges.i], poses[ranges.j], layout.bias[ranges.pair], shared]),
         )
 
-    def at(self, poses: Array, calibration: Calibration) -> System:
-        """Sum of J' W J and J' W e over all factors and priors."""
+    def cost(self, poses: Array, calibration: Calibration, threshold: Array) -> float:
+        """Of all factors and priors.
+
+        Args:
+            threshold: (pairs,) sigmas beyond which a range loses weight.
+        """
+        problem = self._problem
+        odometry, closures, ranges, priors = (
+            problem.odometry,
+            problem.closures,
+            problem.ranges,
+            problem.priors,
+        )
+        moved = poses[problem.gauge] - problem.initial[problem.gauge]
+        c = threshold[ranges.pair]
+        error = range_errors(poses, ranges, calibration, problem.model)[0]
+        return (
+            odometry.cost(pose_errors(poses, odometry, corrected(odometry, calibration)))
+            + closures.cost(pose_errors(poses, closures, closures.measured))
+            + float(np.sum(c**2 * np.log1p((error / (c * ranges.sigma)) ** 2)))
+            + priors.cost(calibration)
+            + float(moved @ moved) * GAUGE_SIGMA**-2
+        )
+
+    def at(self, poses: Array, calibration: Calibration, threshold: Array) -> System:
+        """Half the gradient of the cost, and a matrix close to half its second derivative.
+
+        Args:
+            threshold: (pairs,) sigmas beyond which a range loses weight.
+        """
         system = System.empty(self.layout)
         self._add_odometry(system, poses, calibration)
         self._add_closures(system, poses)
-        self._add_ranges(system, poses, calibration)
+        self._add_ranges(system, poses, calibration, threshold)
+        self._add_priors(system, calibration)
+        self._add_gauge(system, poses)
+        return system
+
+    def claimed(
+        self, poses: Array, calibration: Calibration, threshold: Array, claims: Array
+    ) -> System:
+        """What is known at the solution: a system whose inverse is the covariance to be claimed.
+
+        Weights that make a good estimate are no honest claim. Here ranges that share their errors
+        count as such, and priors are as wide as they are configured.
+
+        Args:
+            claims: (pairs,) how many times the sent sigma ranges are really as wrong by.
+        """
+        problem, layout = self._problem, self.layout
+        system = System.empty(layout)
+        self._add_odometry(system, poses, calibration)
+        self._add_closures(system, poses)
+        self._add_ranges(system, poses, calibration, threshold, claims)
+        priors = problem.priors
+        system.add_prior(layout.bias, calibration.bias, priors.bias.sigma**-2)
+        system.add_prior(layout.team_bias, calibration.team_bias, priors.bias.sigma**-2)
+        system.add_prior(layout.scale, calibration.scale, priors.scale**-2.0)
+        self._add_gaussian_priors(system, calibration)
+        self._add_gauge(system, poses)
+        return system
+
+    def _add_priors(self, system: System, calibration: Calibration) -> None:
         layout, priors = self.layout, self._problem.priors
-        for unknowns, values, widths in (
-            (layout.bias, calibration.bias, priors.bias),
-            (layout.scale, calibration.scale, priors.scale),
-        ):
-            if priors.has_cauchy_tails:
-                system.add_cauchy_prior(unknowns, values, widths)
-            else:
-                system.add_gaussian_prior(unknowns, values, widths**-2.0)
-        system.add_gaussian_prior(layout.yaw, calibration.yaw, priors.yaw**-2.0)
-        system.add_gaussian_prior(layout.near_bias, calibration.near_bias, priors.near_bias**-2.0)
+        team = float(calibration.team_bias[0])
+        own = calibration.bias - team
+        stiffness = priors.bias.own_stiffness(own)
+        system.add_difference(layout.bias, layout.team_bias, own, stiffness)
+        team_stiffness = priors.bias.team_stiffness(team)
+        system.add_prior(layout.team_bias, calibration.team_bias, team_stiffness)
+        scale = calibration.scale
+        system.add_prior(layout.scale, scale, priors.scale_stiffness(scale))
+        self._add_gaussian_priors(system, calibration)
+
+    def _add_gaussian_priors(self, system: System, calibration: Calibration) -> None:
+        layout, priors = self.layout, self._problem.priors
+        system.add_prior(layout.yaw, calibration.yaw, priors.yaw**-2.0)
+        system.add_prior(layout.near_bias, calibration.near_bias, priors.near_bias**-2.0)
+
+    def _add_gauge(self, system: System, poses: Array) -> None:
         gauge = self._problem.gauge
         moved = poses[gauge] - self._problem.initial[gauge]
-        system.add_gaussian_prior(layout.poses[gauge], moved, GAUGE_SIGMA**-2)
-        return system
+        system.add_prior(self.layout.poses[gauge], moved, GAUGE_SIGMA**-2)
 
     def _add_odometry(self, system: System, poses: Array, calibration: Calibration) -> None:
         odometry = self._problem.odometry
@@ -147,14 +214,24 @@ class Equations:
         jacobian[:, 0, 7] = -odometry.path / 2 * y
         jacobian[:, 1, 7] = odometry.path / 2 * x
         jacobian[:, 2, 7] = odometry.path
-        self._odometry.add(system, error, jacobian, odometry.information)
+        pull = (odometry.information @ error[..., None])[..., 0]
+        self._odometry.add(system, jacobian, odometry.information, pull)
 
     def _add_closures(self, system: System, poses: Array) -> None:
         closures = self._problem.closures
         error = pose_errors(poses, closures, closures.measured)
-        self._closures.add(system, error, _pose_jacobians(poses, closures), closures.information)
+        pull = (closures.information @ error[..., None])[..., 0]
+        self._closures.add(system, _pose_jacobians(poses, closures), closures.information, pull)
 
-    def _add_ranges(self, system: System, poses: Array, calibration: Calibration) -> None:
+    def _add_ranges(
+        self,
+        system: System,
+        poses: Array,
+        calibration: Calibration,
+        threshold: Array,
+        claims: Array | None = None,
+    ) -> None:
+        """Cauchy's cost c^2 log(1 + (e / c)^2), e and c in sigmas."""
         ranges, model = self._problem.ranges, self._problem.model
         error, u, arm_i, arm_j = range_errors(poses, ranges, calibration, model)
         jacobian = np.ones((len(ranges), 1, 8))
@@ -163,14 +240,15 @@ class Equations:
         jacobian[:, 0, 3], jacobian[:, 0, 4] = u.real, u.imag
         jacobian[:, 0, 5] = u.imag * arm_j.real - u.real * arm_j.imag
         jacobian[:, 0, 7] = model.near_range_shape(ranges.measured)
-        # Cauchy's cost c^2 log(1 + (e / c)^2) by its weight; e and c in sigmas
-        c = model.cauchy_sigmas
-        scaled = (error / (c * ranges.sigma)) ** 2
-        weight = 1 / (1 + scaled)
-        information = (weight / ranges.sigma**2)[:, None, None]
-        self._ranges.add(system, error[:, None], jacobian, information)
-        robust = float(np.sum(c**2 * np.log1p(scaled)))
-        system.cost += robust - float(np.sum(weight * (error / ranges.sigma) ** 2))
+        c = threshold[ranges.pair]
+        squared = (error / (c * ranges.sigma)) ** 2
+        weight = 1 / (1 + squared) / ranges.sigma**2
+        if claims is None:
+            # the second derivative makes the steps of an iteration shrink fast
+            bent = weight * np.maximum((1 - squared) / (1 + squared), LEAST_CURVATURE)
+        else:
+            bent = weight / claims[ranges.pair] ** 2
+        self._ranges.add(system, jacobian, bent[:, None, None], (weight * error)[:, None])
 
 
 def _pose_jacobians(poses: Array, factors: BetweenFactors) -> Array:

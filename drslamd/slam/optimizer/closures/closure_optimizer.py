@@ -103,19 +103,16 @@ def _solve(problem: _ClosureProblem, group: Group, believable: float) -> TeamEst
     poses = se2.compose(w_T_any[None], answer.poses)
     poses[:, 2] = se2.wrap(poses[:, 2])
     mine = {chain.robot: places.of_robot(chain.robot) for chain in problem.chains}
-    last = {robot: int(at[-1]) for robot, at in mine.items()}
     # the cost counts an angle twice (`ComplexFactors.of`), which for a covariance it must not
     weighed = replace(edges, kappa=edges.kappa / 2)
-    covariances = PoseGraphSolver(weighed, count, problem.gauge).marginals(
-        poses, list(last.values())
-    )
+    solver = PoseGraphSolver(weighed, count, problem.gauge)
     return TeamEstimate(
         frame=group.frame,
         trajectories={
             c.robot: Trajectory(c, places.n[mine[c.robot]], poses[mine[c.robot]])
             for c in problem.chains
         },
-        covariances=dict(zip(last, covariances, strict=True)),
+        joint=solver.joint_covariance(poses, [int(mine[c.robot][-1]) for c in problem.chains]),
         cost=answer.cost,
         iterations=answer.steps,
         converged=answer.converged,

@@ -227,7 +227,7 @@ def _round(
     return TeamEstimate(
         group.frame,
         trajectories,
-        {chain.robot: riemannian_descent.conditional_covariance(block, last, 0 if ours else None)},
+        joint=riemannian_descent.conditional_covariance(block, last, 0 if ours else None),
         cost=cost,
         iterations=riemannian_descent.STEPS_PER_ROUND,
         converged=gain <= SETTLED * (1 + cost),
