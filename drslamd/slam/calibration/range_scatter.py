@@ -78,5 +78,5 @@ def inlier_scatter(
         total = np.bincount(pair, GAUSSIAN * weights * squares, pairs)
         count = np.bincount(pair, weights, pairs)
         scatter = np.sqrt((PRIOR_RANGES + total) / (PRIOR_RANGES + count))
-        scatter = np.clip(scatter, LEAST_SCATTER, 1.0)
+        scatter = np.minimum(np.maximum(scatter, LEAST_SCATTER), 1.0)
     return scatter

@@ -20,6 +20,12 @@ import numpy as np
 from drslamd.slam.range_model import RangeModel
 from drslamd.slam.se2 import Array
 
+LEAST_CURVATURE = 0.1
+"""Of a heavy tail over that of a square with the same pull: beyond some value the curvature is
+negative, and a system must stay positive definite."""
+TINY = 1e-12
+"""m^2; no bias is known so well."""
+
 
 @dataclass(frozen=True)
 class BiasPrior:
@@ -46,17 +52,39 @@ class BiasPrior:
             team=model.team_share * sigma,
         )
 
-    def own_stiffness(self, own: Array) -> float:
-        """Information, 1/m^2, with which each of these values (pairs,) is held."""
-        scale = self.dof * self.spread**2 + float(own @ own)
-        return (self.dof + len(own)) / scale + self.sigma**-2
-
-    def team_stiffness(self, team: float) -> float:
-        """Likewise of what is common."""
-        return 1 / (self.team**2 + team**2) + self.sigma**-2
-
     def cost(self, own: Array, team: float) -> float:
         squares = float(own @ own)
         student = (self.dof + len(own)) * np.log1p(squares / (self.dof * self.spread**2))
         cauchy = np.log1p((team / self.team) ** 2)
         return float(student + cauchy + (squares + team**2) / self.sigma**2)
+
+    def own_pull(self, own: Array) -> Array:
+        """(pairs,) half the derivative of the cost by what each pair has of its own."""
+        return np.asarray((self._student(own) + self.sigma**-2) * own)
+
+    def own_curvature(self, own: Array) -> Array:
+        """(pairs, pairs) half the second derivative, kept positive definite."""
+        squares = float(own @ own)
+        bend = min(2 / self._scale(own), (1 - LEAST_CURVATURE) / max(squares, TINY))
+        rounded = self._student(own) * (np.eye(len(own)) - bend * np.outer(own, own))
+        return np.asarray(rounded + self.sigma**-2 * np.eye(len(own)))
+
+    def team_pull(self, team: float) -> float:
+        """Likewise of what is common."""
+        return team * (1 / (self.team**2 + team**2) + self.sigma**-2)
+
+    def team_curvature(self, team: float) -> float:
+        return float(cauchy_curvature(self.team, np.array([team]))[0]) + self.sigma**-2
+
+    def _scale(self, own: Array) -> float:
+        return self.dof * self.spread**2 + float(own @ own)
+
+    def _student(self, own: Array) -> float:
+        return (self.dof + len(own)) / self._scale(own)
+
+
+def cauchy_curvature(width: Array | float, values: Array) -> Array:
+    """(k,) half the second derivative of log(1 + (value / width)^2), kept positive."""
+    squares = (values / width) ** 2
+    ratio = np.maximum((1 - squares) / (1 + squares), LEAST_CURVATURE)
+    return np.asarray(ratio / (1 + squares) / np.square(width))

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.slam import range_model, se2
-from drslamd.slam.optimizer.bias_prior import BiasPrior
+from drslamd.slam.optimizer.bias_prior import BiasPrior, cauchy_curvature
 from drslamd.slam.range_model import LINKTRACK, RangeModel
 from drslamd.slam.se2 import Array, Index
 
@@ -112,15 +112,23 @@ class Priors:
     yaw: Array
     near_bias: float
 
-    def scale_stiffness(self, scale: Array) -> Array:
-        """(robots,) information with which scales are held."""
-        width = self.scale / self.scale_tails
-        return np.asarray(1 / (width**2 + scale**2))
+    @property
+    def scale_width(self) -> Array:
+        """(robots,) half widths of the distributions of scales."""
+        return self.scale / self.scale_tails
+
+    def scale_pull(self, scale: Array) -> Array:
+        """(robots,) half the derivative of the cost by scales."""
+        return np.asarray(scale / (self.scale_width**2 + scale**2))
+
+    def scale_curvature(self, scale: Array) -> Array:
+        """(robots,) half the second derivative."""
+        return cauchy_curvature(self.scale_width, scale)
 
     def cost(self, calibration: Calibration) -> float:
         """Of all that is learned of the sensors."""
         team = float(calibration.team_bias[0])
-        scale = calibration.scale * self.scale_tails / self.scale
+        scale = calibration.scale / self.scale_width
         gaussian = np.concatenate(
             [calibration.yaw / self.yaw, calibration.near_bias / self.near_bias]
         )
@@ -194,7 +202,9 @@ class Solution:
     Attributes:
         scatter: (pairs,) how many times the configured sigma ranges scatter.
         joint: (3 k, 3 k) covariance of x, y, theta in w of the k poses that were asked for.
-        spread: sigmas of the calibration, where poses were asked for.
+        spread: sigmas of the calibration.
+        odometry_level: (m,) sigmas of the links of odometry over what was configured.
+        is_explained: is the model, with these levels, one of what was measured?
     """
 
     poses: Array
@@ -205,6 +215,8 @@ class Solution:
     scatter: Array = field(default_factory=lambda: np.zeros(0))
     joint: Array = field(default_factory=lambda: np.zeros((0, 0)))
     spread: Calibration | None = None
+    odometry_level: Array = field(default_factory=lambda: np.zeros(0))
+    is_explained: bool = True
 
 
 def pose_errors(poses: Array, factors: BetweenFactors, measured: Array) -> Array:

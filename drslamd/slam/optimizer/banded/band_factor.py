@@ -11,6 +11,9 @@ from scipy.linalg.lapack import dtbtrs
 from drslamd.slam.optimizer.banded.normal_equations import System
 from drslamd.slam.se2 import Array, Index
 
+ROOM = 64
+"""Poses that are done before a window is moved, because moving it costs as much as some of them."""
+
 
 @dataclass(frozen=True)
 class BandFactor:
@@ -43,16 +46,16 @@ class BandFactor:
         return BandFactor(lower, halfway, schur) if definite else None
 
     def solved(self, right: Array) -> Array | None:
-        """(n + b,) the solution for a right-hand side (n + b,)."""
+        """The solution for a right-hand side (n + b,), or for c of them (n + b, c)."""
         n = len(self.halfway)
-        middle = self._forward(right[:n, None])[:, 0]
+        columns = right.reshape(len(right), -1)
+        middle = self._forward(columns[:n])
         try:
-            outer = np.linalg.solve(self.schur, right[n:] - self.halfway.T @ middle)
+            outer = np.linalg.solve(self.schur, columns[n:] - self.halfway.T @ middle)
         except np.linalg.LinAlgError:
             return None
-        rest = (middle - self.halfway @ outer)[:, None]
-        inner, _ = dtbtrs(self.lower, rest, uplo="L", trans="T")
-        return np.concatenate([inner[:, 0], outer])
+        inner, _ = dtbtrs(self.lower, middle - self.halfway @ outer, uplo="L", trans="T")
+        return np.concatenate([inner, outer]).reshape(right.shape)
 
     def joint_covariance(self, unknowns: Index) -> Array | None:
         """(k, k) block of the inverse for some unknowns (k,); None where there is none."""
@@ -70,7 +73,65 @@ class BandFactor:
             return None
         return joint if np.isfinite(joint).all() else None
 
+    def covariance_blocks(self, unknowns: Index) -> Array:
+        """(m, c, c) blocks of the inverse, for m factors that depend on unknowns (m, c) each.
+
+        Those that are in the band are no farther apart than its width.
+        """
+        n = len(self.halfway)
+        across, _ = dtbtrs(self.lower, self.halfway, uplo="L", trans="T")
+        outer = np.linalg.inv(self.schur)
+        rows = np.zeros((*unknowns.shape, len(outer)))
+        inside = unknowns < n
+        rows[inside] = -across[unknowns[inside]]
+        rows[~inside] = np.eye(len(outer))[unknowns[~inside] - n]
+        blocks = rows @ outer @ np.swapaxes(rows, 1, 2)
+        shape = (*unknowns.shape, unknowns.shape[1])
+        row = np.maximum(*np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :]))
+        column = np.minimum(*np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :]))
+        both = (row < n).reshape(shape)
+        blocks[both] += selected_inverse(self.lower)[(row - column)[both], column[both]]
+        return np.asarray(blocks)
+
     def _forward(self, columns: Array) -> Array:
         """L^-1 times columns (n, c)."""
         solved, _ = dtbtrs(self.lower, columns, uplo="L")
         return np.asarray(solved)
+
+
+def selected_inverse(lower: Array) -> Array:
+    """(w, n) lower band of (L L')^-1, of L in lower banded form, poses (three columns) at a time.
+
+    With K the columns of one pose and R the rows below them, Z = (L L')^-1 follows from the end
+    (Takahashi's equations):
+
+        Z_RK = -Z_RR G     Z_KK = L_KK^-T L_KK^-1 + G' Z_RR G     G = L_RK L_KK^-1
+    """
+    width, n = lower.shape
+    reach = width - 1
+    dense = np.zeros((n, reach + 3, 3))
+    for c in range(3):
+        dense[:, c : c + width, c] = lower.T
+    blocks = np.stack([dense[c::3, :, c] for c in range(3)], axis=-1)
+    own = np.linalg.inv(blocks[:, :3])
+    gain = blocks[:, 3:] @ own
+    pivot = np.swapaxes(own, 1, 2) @ own
+    found = np.zeros((n // 3, reach + 3, 3))
+    room = reach + 3 * ROOM
+    window, at = np.zeros((room, room)), room - reach
+    for k in range(n // 3 - 1, -1, -1):
+        if at < 3:
+            window[-reach:, -reach:] = window[at : at + reach, at : at + reach].copy()
+            at = room - reach
+        known = window[at : at + reach, at : at + reach]
+        aside = -known @ gain[k]
+        middle = pivot[k] - gain[k].T @ aside
+        window[at : at + reach, at - 3 : at] = aside
+        window[at - 3 : at, at : at + reach] = aside.T
+        window[at - 3 : at, at - 3 : at] = middle
+        found[k, :3], found[k, 3:] = middle, aside
+        at -= 3
+    band = np.zeros((width, n))
+    for c in range(3):
+        band[:, c::3] = found[:, c : c + width, c].T
+    return band

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drslamd.slam.optimizer.problem import Calibration, Problem
+from drslamd.slam.optimizer.problem import Calibration, OdometryFactors, Problem
 from drslamd.slam.optimizer.vertex_cover import vertex_cover
 from drslamd.slam.se2 import Array, Index
 
@@ -66,6 +66,11 @@ class BandLayout:
             border=3 * len(apart) + sum(sizes),
             width=3 * reach + 3,
         )
+
+    def odometry_unknowns(self, odometry: OdometryFactors) -> Index:
+        """(m, 8) on which each link depends: both poses, scale and yaw rate."""
+        sensors = np.stack([self.scale[odometry.robot], self.yaw[odometry.robot]], axis=-1)
+        return np.hstack([self.poses[odometry.i], self.poses[odometry.j], sensors])
 
     def calibration(self, unknowns: Array) -> Calibration:
         """The part of a vector over all unknowns that belongs to the sensors."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from drslamd.slam.optimizer.banded import linearised
 from drslamd.slam.optimizer.banded.layout import BandLayout
+from drslamd.slam.optimizer.banded.linearised import Linearised
 from drslamd.slam.optimizer.problem import (
-    BetweenFactors,
     Calibration,
     Problem,
     corrected,
@@ -19,46 +21,37 @@ from drslamd.slam.se2 import Array, Index
 
 GAUGE_SIGMA = 1e-5
 """The gauge pose is held to 10 um and 10 urad: far below all noise, far above rounding."""
-LEAST_CURVATURE = 0.1
-"""Of Cauchy's cost over that of a square with the same pull: beyond its threshold the curvature is
-negative, and a system must stay positive definite."""
 
 
 @dataclass
 class System:
-    """Lower band (w, n), border (n, b), corner (b, b) and gradient (n + b,) at some point."""
+    """A symmetric matrix: lower band (w, n), border (n, b) and corner (b, b)."""
 
     band: Array
     border: Array
     corner: Array
-    gradient: Array
 
     @staticmethod
     def empty(layout: BandLayout) -> System:
         n, b = layout.band, layout.border
-        return System(
-            np.zeros((layout.width, n)), np.zeros((n, b)), np.zeros((b, b)), np.zeros(n + b)
-        )
+        return System(np.zeros((layout.width, n)), np.zeros((n, b)), np.zeros((b, b)))
 
-    def add_prior(self, unknowns: Index, values: Array, stiffness: Array | float) -> None:
-        """Add independent priors by the information with which they hold values at zero."""
-        stiffness = np.broadcast_to(stiffness, values.shape)
+    def add_prior(self, unknowns: Index, stiffness: Array | float) -> None:
+        """Add independent priors by the information with which they hold unknowns (k,)."""
+        stiffness = np.broadcast_to(stiffness, unknowns.shape)
         inside = unknowns < len(self.border)
         self.band[0, unknowns[inside]] += stiffness[inside]
         outside = unknowns[~inside] - len(self.border)
         self.corner[outside, outside] += stiffness[~inside]
-        self.gradient[unknowns] += stiffness * values
 
-    def add_difference(self, unknowns: Index, one: Index, values: Array, stiffness: float) -> None:
-        """Hold unknowns (k,) of the border beside one other (1,); values (k,) of the differences."""
+    def add_difference(self, unknowns: Index, one: Index, stiffness: Array) -> None:
+        """Hold unknowns (k,) of the border beside one other (1,) with information (k, k)."""
         n = len(self.border)
-        many, (single,) = unknowns - n, one - n
-        self.corner[many, many] += stiffness
-        self.corner[many, single] -= stiffness
-        self.corner[single, many] -= stiffness
-        self.corner[single, single] += stiffness * len(many)
-        self.gradient[unknowns] += stiffness * values
-        self.gradient[one] -= stiffness * values.sum()
+        many, single = unknowns - n, one - n
+        self.corner[np.ix_(many, many)] += stiffness
+        self.corner[many, single] -= stiffness.sum(axis=0)
+        self.corner[single, many] -= stiffness.sum(axis=0)
+        self.corner[single, single] += stiffness.sum()
 
 
 class _Assembly:
@@ -81,20 +74,18 @@ class _Assembly:
         self._border = (row * b + column - n)[self._in_border]
         self._corner = ((row - n) * b + column - n)[self._in_corner]
 
-    def add(self, system: System, jacobian: Array, information: Array, pull: Array) -> None:
-        """Add J' W J to the matrix and J' f to the gradient.
-
-        Args:
-            jacobian: (m, d, c); information: (m, d, d).
-            pull: (m, d) f, half the derivative of the cost by the error.
-        """
-        transposed = np.swapaxes(jacobian, 1, 2)
-        blocks = (transposed @ (information @ jacobian)).ravel()
+    def add_matrix(self, system: System, factors: Linearised) -> None:
+        """Add J' W J."""
+        transposed = np.swapaxes(factors.jacobian, 1, 2)
+        blocks = (transposed @ (factors.information @ factors.jacobian)).ravel()
         system.band += _sums(self._band, blocks[self._in_band], system.band)
         system.border += _sums(self._border, blocks[self._in_border], system.border)
         system.corner += _sums(self._corner, blocks[self._in_corner], system.corner)
-        gradient = (transposed @ pull[..., None]).ravel()
-        system.gradient += _sums(self._unknowns, gradient, system.gradient)
+
+    def add_gradient(self, gradient: Array, factors: Linearised) -> None:
+        """Add J' f."""
+        each = (factors.pull[:, None, :] @ factors.jacobian).ravel()
+        gradient += _sums(self._unknowns, each, gradient)
 
 
 def _sums(at: Index, values: Array, like: Array) -> Array:
@@ -105,14 +96,11 @@ class Equations:
     """The normal equations of one problem, at any point."""
 
     def __init__(self, problem: Problem) -> None:
-        self._problem = problem
+        self.problem = problem
         self.layout = layout = BandLayout.of(problem)
         odometry, closures, ranges = problem.odometry, problem.closures, problem.ranges
         poses = layout.poses
-        sensors = np.stack([layout.scale[odometry.robot], layout.yaw[odometry.robot]], axis=-1)
-        self._odometry = _Assembly(
-            layout, np.hstack([poses[odometry.i], poses[odometry.j], sensors])
-        )
+        self._odometry = _Assembly(layout, layout.odometry_unknowns(odometry))
         self._closures = _Assembly(layout, np.hstack([poses[closures.i], poses[closures.j]]))
         shared = np.tile(layout.near_bias, (len(ranges), 1))
         self._ranges = _Assembly(
@@ -126,13 +114,8 @@ class Equations:
         Args:
             threshold: (pairs,) sigmas beyond which a range loses weight.
         """
-        problem = self._problem
-        odometry, closures, ranges, priors = (
-            problem.odometry,
-            problem.closures,
-            problem.ranges,
-            problem.priors,
-        )
+        problem = self.problem
+        odometry, closures, ranges = problem.odometry, problem.closures, problem.ranges
         moved = poses[problem.gauge] - problem.initial[problem.gauge]
         c = threshold[ranges.pair]
         error = range_errors(poses, ranges, calibration, problem.model)[0]
@@ -140,23 +123,31 @@ class Equations:
             odometry.cost(pose_errors(poses, odometry, corrected(odometry, calibration)))
             + closures.cost(pose_errors(poses, closures, closures.measured))
             + float(np.sum(c**2 * np.log1p((error / (c * ranges.sigma)) ** 2)))
-            + priors.cost(calibration)
+            + problem.priors.cost(calibration)
             + float(moved @ moved) * GAUGE_SIGMA**-2
         )
 
-    def at(self, poses: Array, calibration: Calibration, threshold: Array) -> System:
-        """Half the gradient of the cost, and a matrix close to half its second derivative.
+    def gradient(self, poses: Array, calibration: Calibration, threshold: Array) -> Array:
+        """(n + b,) half the derivative of the cost."""
+        gradient = np.zeros(self.layout.band + self.layout.border)
+        for where, factors in self._factors(poses, calibration, threshold):
+            where.add_gradient(gradient, factors)
+        self._add_pull_of_priors(gradient, poses, calibration)
+        return gradient
 
-        Args:
-            threshold: (pairs,) sigmas beyond which a range loses weight.
-        """
-        system = System.empty(self.layout)
-        self._add_odometry(system, poses, calibration)
-        self._add_closures(system, poses)
-        self._add_ranges(system, poses, calibration, threshold)
-        self._add_priors(system, calibration)
-        self._add_gauge(system, poses)
-        return system
+    def at(
+        self, poses: Array, calibration: Calibration, threshold: Array
+    ) -> tuple[System, Array]:
+        """A matrix close to half the second derivative of the cost, and the gradient."""
+        layout = self.layout
+        system, gradient = System.empty(layout), np.zeros(layout.band + layout.border)
+        for where, factors in self._factors(poses, calibration, threshold):
+            where.add_matrix(system, factors)
+            where.add_gradient(gradient, factors)
+        self._add_heavy_priors(system, calibration)
+        self._add_gaussian_priors(system)
+        self._add_pull_of_priors(gradient, poses, calibration)
+        return system, gradient
 
     def claimed(
         self, poses: Array, calibration: Calibration, threshold: Array, claims: Array
@@ -167,100 +158,69 @@ class Equations:
         count as such, and priors are as wide as they are configured.
 
         Args:
-            claims: (pairs,) how many times the sent sigma ranges are really as wrong by.
+            claims: see `linearised.weighed_ranges`.
         """
-        problem, layout = self._problem, self.layout
-        system = System.empty(layout)
-        self._add_odometry(system, poses, calibration)
-        self._add_closures(system, poses)
-        self._add_ranges(system, poses, calibration, threshold, claims)
-        priors = problem.priors
-        system.add_prior(layout.bias, calibration.bias, priors.bias.sigma**-2)
-        system.add_prior(layout.team_bias, calibration.team_bias, priors.bias.sigma**-2)
-        system.add_prior(layout.scale, calibration.scale, priors.scale**-2.0)
-        self._add_gaussian_priors(system, calibration)
-        self._add_gauge(system, poses)
+        layout, priors = self.layout, self.problem.priors
+        system = self._weighed(poses, calibration, threshold, claims)
+        system.add_prior(layout.bias, priors.bias.sigma**-2)
+        system.add_prior(layout.team_bias, priors.bias.sigma**-2)
+        system.add_prior(layout.scale, priors.scale**-2.0)
         return system
 
-    def _add_priors(self, system: System, calibration: Calibration) -> None:
-        layout, priors = self.layout, self._problem.priors
+    def weighed(self, poses: Array, calibration: Calibration, threshold: Array) -> System:
+        """What the factors say by their weights: what is left of an outlier's counts still."""
+        claims = np.ones(self.problem.pairs)
+        system = self._weighed(poses, calibration, threshold, claims)
+        self._add_heavy_priors(system, calibration)
+        return system
+
+    def _weighed(
+        self, poses: Array, calibration: Calibration, threshold: Array, claims: Array
+    ) -> System:
+        problem = self.problem
+        system = System.empty(self.layout)
+        self._odometry.add_matrix(system, linearised.odometry(problem, poses, calibration))
+        if len(problem.closures):
+            self._closures.add_matrix(system, linearised.closures(problem, poses))
+        ranges = linearised.weighed_ranges(problem, poses, calibration, threshold, claims)
+        self._ranges.add_matrix(system, ranges)
+        self._add_gaussian_priors(system)
+        return system
+
+    def _factors(
+        self, poses: Array, calibration: Calibration, threshold: Array
+    ) -> Iterator[tuple[_Assembly, Linearised]]:
+        problem = self.problem
+        yield self._odometry, linearised.odometry(problem, poses, calibration)
+        if len(problem.closures):
+            yield self._closures, linearised.closures(problem, poses)
+        yield self._ranges, linearised.ranges(problem, poses, calibration, threshold)
+
+    def _add_heavy_priors(self, system: System, calibration: Calibration) -> None:
+        layout, priors = self.layout, self.problem.priors
         team = float(calibration.team_bias[0])
-        own = calibration.bias - team
-        stiffness = priors.bias.own_stiffness(own)
-        system.add_difference(layout.bias, layout.team_bias, own, stiffness)
-        team_stiffness = priors.bias.team_stiffness(team)
-        system.add_prior(layout.team_bias, calibration.team_bias, team_stiffness)
-        scale = calibration.scale
-        system.add_prior(layout.scale, scale, priors.scale_stiffness(scale))
-        self._add_gaussian_priors(system, calibration)
+        own = priors.bias.own_curvature(calibration.bias - team)
+        system.add_difference(layout.bias, layout.team_bias, own)
+        system.add_prior(layout.team_bias, priors.bias.team_curvature(team))
+        system.add_prior(layout.scale, priors.scale_curvature(calibration.scale))
 
-    def _add_gaussian_priors(self, system: System, calibration: Calibration) -> None:
-        layout, priors = self.layout, self._problem.priors
-        system.add_prior(layout.yaw, calibration.yaw, priors.yaw**-2.0)
-        system.add_prior(layout.near_bias, calibration.near_bias, priors.near_bias**-2.0)
+    def _add_gaussian_priors(self, system: System) -> None:
+        layout, priors = self.layout, self.problem.priors
+        system.add_prior(layout.yaw, priors.yaw**-2.0)
+        system.add_prior(layout.near_bias, priors.near_bias**-2.0)
+        system.add_prior(layout.poses[self.problem.gauge], GAUGE_SIGMA**-2)
 
-    def _add_gauge(self, system: System, poses: Array) -> None:
-        gauge = self._problem.gauge
-        moved = poses[gauge] - self._problem.initial[gauge]
-        system.add_prior(self.layout.poses[gauge], moved, GAUGE_SIGMA**-2)
-
-    def _add_odometry(self, system: System, poses: Array, calibration: Calibration) -> None:
-        odometry = self._problem.odometry
-        error = pose_errors(poses, odometry, corrected(odometry, calibration))
-        x, y = odometry.measured[:, 0], odometry.measured[:, 1]
-        jacobian = np.zeros((len(odometry), 3, 8))
-        jacobian[:, :, :6] = _pose_jacobians(poses, odometry)
-        jacobian[:, 0, 6], jacobian[:, 1, 6] = x, y
-        jacobian[:, 0, 7] = -odometry.path / 2 * y
-        jacobian[:, 1, 7] = odometry.path / 2 * x
-        jacobian[:, 2, 7] = odometry.path
-        pull = (odometry.information @ error[..., None])[..., 0]
-        self._odometry.add(system, jacobian, odometry.information, pull)
-
-    def _add_closures(self, system: System, poses: Array) -> None:
-        closures = self._problem.closures
-        error = pose_errors(poses, closures, closures.measured)
-        pull = (closures.information @ error[..., None])[..., 0]
-        self._closures.add(system, _pose_jacobians(poses, closures), closures.information, pull)
-
-    def _add_ranges(
-        self,
-        system: System,
-        poses: Array,
-        calibration: Calibration,
-        threshold: Array,
-        claims: Array | None = None,
+    def _add_pull_of_priors(
+        self, gradient: Array, poses: Array, calibration: Calibration
     ) -> None:
-        """Cauchy's cost c^2 log(1 + (e / c)^2), e and c in sigmas."""
-        ranges, model = self._problem.ranges, self._problem.model
-        error, u, arm_i, arm_j = range_errors(poses, ranges, calibration, model)
-        jacobian = np.ones((len(ranges), 1, 8))
-        jacobian[:, 0, 0], jacobian[:, 0, 1] = -u.real, -u.imag
-        jacobian[:, 0, 2] = u.real * arm_i.imag - u.imag * arm_i.real
-        jacobian[:, 0, 3], jacobian[:, 0, 4] = u.real, u.imag
-        jacobian[:, 0, 5] = u.imag * arm_j.real - u.real * arm_j.imag
-        jacobian[:, 0, 7] = model.near_range_shape(ranges.measured)
-        c = threshold[ranges.pair]
-        squared = (error / (c * ranges.sigma)) ** 2
-        weight = 1 / (1 + squared) / ranges.sigma**2
-        if claims is None:
-            # the second derivative makes the steps of an iteration shrink fast
-            bent = weight * np.maximum((1 - squared) / (1 + squared), LEAST_CURVATURE)
-        else:
-            bent = weight / claims[ranges.pair] ** 2
-        self._ranges.add(system, jacobian, bent[:, None, None], (weight * error)[:, None])
-
-
-def _pose_jacobians(poses: Array, factors: BetweenFactors) -> Array:
-    """(m, 3, 6): derivative of `pose_errors` by both poses of each factor."""
-    theta = poses[factors.i, 2]
-    cos, sin = np.cos(theta), np.sin(theta)
-    d = poses[factors.j, :2] - poses[factors.i, :2]
-    j = np.zeros((len(factors), 3, 6))
-    j[:, 0, 0] = j[:, 1, 1] = -cos
-    j[:, 0, 1], j[:, 1, 0] = -sin, sin
-    j[:, 0, 2] = -sin * d[:, 0] + cos * d[:, 1]
-    j[:, 1, 2] = -cos * d[:, 0] - sin * d[:, 1]
-    j[:, :2, 3:5] = -j[:, :2, :2]
-    j[:, 2, 2], j[:, 2, 5] = -1, 1
-    return j
+        layout, problem = self.layout, self.problem
+        priors, gauge = problem.priors, problem.gauge
+        team = float(calibration.team_bias[0])
+        pull = priors.bias.own_pull(calibration.bias - team)
+        gradient[layout.bias] += pull
+        gradient[layout.team_bias] += priors.bias.team_pull(team) - pull.sum()
+        gradient[layout.scale] += priors.scale_pull(calibration.scale)
+        gradient[layout.yaw] += calibration.yaw / priors.yaw**2
+        gradient[layout.near_bias] += calibration.near_bias / priors.near_bias**2
+        moved = poses[gauge] - problem.initial[gauge]
+        gradient[layout.poses[gauge]] += moved / GAUGE_SIGMA**2

@@ -1,0 +1,126 @@
+"""The factors of the team's problem at some point: how errors depend on the unknowns, and pull."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
+from drslamd.slam.optimizer.problem import (
+    BetweenFactors,
+    Calibration,
+    Problem,
+    corrected,
+    pose_errors,
+    range_errors,
+)
+from drslamd.slam.se2 import Array
+
+
+class Linearised(NamedTuple):
+    """m factors with errors of d components that depend on c unknowns.
+
+    Attributes:
+        jacobian: (m, d, c); information: (m, d, d).
+        pull: (m, d) half the derivative of the cost by the error.
+    """
+
+    jacobian: Array
+    information: Array
+    pull: Array
+
+
+def odometry(problem: Problem, poses: Array, calibration: Calibration) -> Linearised:
+    """By both poses, scale and yaw rate."""
+    factors = problem.odometry
+    error = pose_errors(poses, factors, corrected(factors, calibration))
+    return Linearised(
+        odometry_jacobian(problem, poses), factors.information, _pulled(factors, error)
+    )
+
+
+def odometry_jacobian(problem: Problem, poses: Array) -> Array:
+    """(m, 3, 8)"""
+    factors = problem.odometry
+    x, y = factors.measured[:, 0], factors.measured[:, 1]
+    jacobian = np.zeros((len(factors), 3, 8))
+    jacobian[:, :, :6] = pose_jacobian(poses, factors)
+    jacobian[:, 0, 6], jacobian[:, 1, 6] = x, y
+    jacobian[:, 0, 7] = -factors.path / 2 * y
+    jacobian[:, 1, 7] = factors.path / 2 * x
+    jacobian[:, 2, 7] = factors.path
+    return jacobian
+
+
+def closures(problem: Problem, poses: Array) -> Linearised:
+    """By both poses."""
+    factors = problem.closures
+    error = pose_errors(poses, factors, factors.measured)
+    return Linearised(pose_jacobian(poses, factors), factors.information, _pulled(factors, error))
+
+
+def ranges(
+    problem: Problem, poses: Array, calibration: Calibration, threshold: Array
+) -> Linearised:
+    """By both poses, bias and near-range bias; cost is Cauchy's, c^2 log(1 + (e / c)^2).
+
+    Args:
+        threshold: (pairs,) c, in sigmas, as e is.
+    """
+    factors = problem.ranges
+    error, jacobian = _range_jacobian(problem, poses, calibration)
+    squared = (error / (threshold[factors.pair] * factors.sigma)) ** 2
+    weight = 1 / (1 + squared) / factors.sigma**2
+    # the second derivative makes the steps of an iteration shrink fast
+    bent = weight * np.maximum((1 - squared) / (1 + squared), LEAST_CURVATURE)
+    return Linearised(jacobian, bent[:, None, None], (weight * error)[:, None])
+
+
+def weighed_ranges(
+    problem: Problem, poses: Array, calibration: Calibration, threshold: Array, claims: Array
+) -> Linearised:
+    """The same without the curvature, and with so much information as ranges really have.
+
+    Args:
+        claims: (pairs,) how many times the sent sigma ranges are as wrong by.
+    """
+    factors = problem.ranges
+    error, jacobian = _range_jacobian(problem, poses, calibration)
+    squared = (error / (threshold[factors.pair] * factors.sigma)) ** 2
+    weight = 1 / (1 + squared) / (claims[factors.pair] * factors.sigma) ** 2
+    return Linearised(jacobian, weight[:, None, None], (weight * error)[:, None])
+
+
+def _range_jacobian(
+    problem: Problem, poses: Array, calibration: Calibration
+) -> tuple[Array, Array]:
+    """Errors (m,) and their derivatives (m, 1, 8)."""
+    factors, model = problem.ranges, problem.model
+    error, u, arm_i, arm_j = range_errors(poses, factors, calibration, model)
+    jacobian = np.ones((len(factors), 1, 8))
+    jacobian[:, 0, 0], jacobian[:, 0, 1] = -u.real, -u.imag
+    jacobian[:, 0, 2] = u.real * arm_i.imag - u.imag * arm_i.real
+    jacobian[:, 0, 3], jacobian[:, 0, 4] = u.real, u.imag
+    jacobian[:, 0, 5] = u.imag * arm_j.real - u.real * arm_j.imag
+    jacobian[:, 0, 7] = model.near_range_shape(factors.measured)
+    return error, jacobian
+
+
+def pose_jacobian(poses: Array, factors: BetweenFactors) -> Array:
+    """(m, 3, 6): derivative of `pose_errors` by both poses of each factor."""
+    theta = poses[factors.i, 2]
+    cos, sin = np.cos(theta), np.sin(theta)
+    d = poses[factors.j, :2] - poses[factors.i, :2]
+    j = np.zeros((len(factors), 3, 6))
+    j[:, 0, 0] = j[:, 1, 1] = -cos
+    j[:, 0, 1], j[:, 1, 0] = -sin, sin
+    j[:, 0, 2] = -sin * d[:, 0] + cos * d[:, 1]
+    j[:, 1, 2] = -cos * d[:, 0] - sin * d[:, 1]
+    j[:, :2, 3:5] = -j[:, :2, :2]
+    j[:, 2, 2], j[:, 2, 5] = -1, 1
+    return j
+
+
+def _pulled(factors: BetweenFactors, errors: Array) -> Array:
+    return np.asarray((factors.information @ errors[..., None])[..., 0])
