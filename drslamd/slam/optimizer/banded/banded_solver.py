@@ -16,7 +16,7 @@ from drslamd.slam import se2
 from drslamd.slam.optimizer.banded import claims
 from drslamd.slam.optimizer.banded.descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.banded.odometry_levels import explain
+from drslamd.slam.optimizer.banded.odometry_levels import explain, raised
 from drslamd.slam.optimizer.problem import Calibration, Problem, Solution
 from drslamd.slam.se2 import Array
 
@@ -48,9 +48,11 @@ def solve(
     poses: Array = point.poses.copy()
     poses[:, 2] = se2.wrap(poses[:, 2])
     scatter = claims.scatter_of(problem, point)
-    joint, spread = claims.covariances(
-        Equations(explained.problem), point, scatter, np.array(marginals, dtype=int)
-    )
+    feared = Equations(raised(problem, explained.feared, point))
+    wanted = np.array(marginals, dtype=int)
+    joint, spread = claims.covariances(feared, point, scatter, wanted)
+    if not explained.is_odometry:
+        joint += claims.between(nominal, explained.point, wanted)
     return Solution(
         poses,
         point.calibration,
@@ -60,6 +62,6 @@ def solve(
         scatter=scatter,
         joint=joint,
         spread=spread,
-        odometry_level=np.sqrt(explained.variance),
+        odometry_level=np.sqrt(explained.seen),
         is_explained=explained.is_odometry,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from drslamd.slam import se2
 from drslamd.slam.calibration.range_scatter import LEAST_SCATTER, scatter_ratios
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.descent import Point
@@ -52,3 +53,10 @@ def scatter_of(problem: Problem, point: Point) -> Array:
         configured=problem.range_sigma,
         most_sigmas=model.cauchy_sigmas,
     )
+
+
+def between(one: Point, other: Point, wanted: Index) -> Array:
+    """(3 k, 3 k) what two explanations differ by, when nobody can tell which is right."""
+    apart = one.poses[wanted] - other.poses[wanted]
+    apart[:, 2] = se2.wrap(apart[:, 2])
+    return np.outer(apart, apart)
