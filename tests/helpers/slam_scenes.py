@@ -33,14 +33,14 @@ from drslamd.slam.robot_model import RobotModel
 Array = NDArray[Any]
 
 NOISE = OdometryNoise(0.03, math.radians(0.15), 0.01, math.radians(0.5))
-"""The default of the configuration."""
+"""Wheels of usual quality: their scale is better than the configuration allows for by default."""
 EXACT = OdometryNoise(1e-9, 1e-9, 1e-9, 1e-9)
 
 
-def config(robot: int = 0, extra: str = "") -> Config:
-    """A configuration that says only what must be said."""
+def config(robot: int = 0, extra: str = "", uwb: str = "") -> Config:
+    """A configuration that says only what must be said, and `uwb` more in its section."""
     return parse(
-        f'[robot]\nid = {robot}\n[team]\ninsecure = true\n[uwb]\nport = "/dev/uwb"\n'
+        f'[robot]\nid = {robot}\n[team]\ninsecure = true\n[uwb]\nport = "/dev/uwb"\n{uwb}'
         f'[wheels]\nsource = "kobuki"\nport = "/dev/wheels"\n{extra}'
     )
 
