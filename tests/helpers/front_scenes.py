@@ -112,7 +112,7 @@ class FrontScene:
 
     def distances(self, n: Array | float) -> Array:
         """Between both robots at fractional samples, m."""
-        return np.interp(n, np.arange(1, self._n + 1), self._distances)
+        return np.asarray(np.interp(n, np.arange(1, self._n + 1), self._distances))
 
     def neighbour(self, uwb_id: int | None = None) -> PeerInRange:
         return PeerInRange(

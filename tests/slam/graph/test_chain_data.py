@@ -102,8 +102,8 @@ def test_what_was_thinned_out_moves_no_sum_of_what_stays() -> None:
     for k in frames[50:]:
         whole.add(k)
         thinned.add(k)
-    for i, k in ((0, 40), (10, 30), (50, 59)):
-        assert np.allclose(sums_between(thinned, i, k), sums_between(whole, i, k))
+    for ends in ((0, 40), (10, 30), (50, 59)):
+        assert np.allclose(sums_between(thinned, *ends), sums_between(whole, *ends))
 
 
 def test_until_it_has_spoken_a_robot_is_like_any_other() -> None:

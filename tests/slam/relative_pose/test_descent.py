@@ -77,7 +77,7 @@ def test_the_covariance_is_the_dense_inverse_with_the_bias_left_unknown() -> Non
     def distances(step: Array) -> Array:
         pose = matrix(fit.poses(stepped(centred, step[None]))[0])
         places = np.array([(pose @ [*b, 1.0])[:2] for b in window.b_points])
-        return np.hypot(*(places - window.a_points).T)
+        return np.asarray(np.hypot(*(places - window.a_points).T))
 
     columns = [(distances(s * h) - distances(-s * h)) / (2 * h) for s in np.eye(3)]
     j = np.column_stack([*columns, np.ones(50)])
