@@ -37,11 +37,16 @@ NOISE = OdometryNoise(0.03, math.radians(0.15), 0.01, math.radians(0.5))
 EXACT = OdometryNoise(1e-9, 1e-9, 1e-9, 1e-9)
 
 
-def config(robot: int = 0, extra: str = "", uwb: str = "") -> Config:
-    """A configuration that says only what must be said, and `uwb` more in its section."""
+def config(robot: int = 0, extra: str = "", uwb: str = "", wheels: str | None = None) -> Config:
+    """A configuration that says only what must be said, in `uwb` more of that section.
+
+    Args:
+        wheels: the whole section, for another base than a Kobuki.
+    """
+    base = 'source = "kobuki"\nport = "/dev/wheels"\n' if wheels is None else wheels
     return parse(
         f'[robot]\nid = {robot}\n[team]\ninsecure = true\n[uwb]\nport = "/dev/uwb"\n{uwb}'
-        f'[wheels]\nsource = "kobuki"\nport = "/dev/wheels"\n{extra}'
+        f"[wheels]\n{base}{extra}"
     )
 
 
