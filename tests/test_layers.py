@@ -11,6 +11,7 @@ import pytest
 from places import REPOSITORY
 
 PACKAGE = REPOSITORY / "drslamd"
+TESTS = REPOSITORY / "tests"
 GENERATED = PACKAGE / "lcmtypes"
 LAB = REPOSITORY / "tools" / "lab"
 
@@ -82,6 +83,37 @@ IMPURE = {
 }  # fmt: skip
 
 MAX_FILE, MAX_FUNCTION = 350, 60
+
+NOUNS = {
+    "conventions",
+    "events",
+    "gossip.message_types",
+    "io.transport",
+    "sensors.samples",
+    "slam.graph.estimate",
+    "slam.graph.measurements",
+    "slam.optimizer.contract",
+    "slam.peer_in_range",
+    "slam.relative_pose.estimate",
+    "slam.tuning",
+}
+"""Modules that hold only nouns, types or protocols: what uses them is tested."""
+
+TESTED_SOON = {
+    "daemon",
+    "health",
+    "status_text",
+    "io.backoff",
+    "io.clock",
+    "io.logs",
+    "io.pace",
+    "io.state_store",
+    "io.status_socket",
+    "io.systemd",
+    "io.tum",
+    "io.worker",
+}
+"""Modules whose tests have other names still."""
 
 SAID_OF_MANY = {"solve"}
 """Verbs that their module qualifies."""
@@ -227,6 +259,18 @@ def test_there_is_no_import_cycle() -> None:
         free = {n for n in graph if n not in done and graph[n] <= done | {"drslamd"}}
         assert free, f"a cycle among {sorted(set(graph) - done)}"
         done |= free
+
+
+def test_every_module_has_a_test_that_one_finds_by_its_name() -> None:
+    """In the folder that mirrors the package; what is about whole robots is in `robot`."""
+    names = {name_of(p).removeprefix("drslamd."): p for p in modules() if "__" not in p.name}
+    assert NOUNS | TESTED_SOON <= set(names)
+    for name, path in names.items():
+        folder = TESTS / path.parent.relative_to(PACKAGE)
+        places = [folder, TESTS / "robot"] if folder == TESTS else [folder]
+        is_found = any((place / f"test_{path.name}").exists() for place in places)
+        assert is_found or name in NOUNS | TESTED_SOON, name
+        assert not (is_found and name in NOUNS), name
 
 
 @pytest.mark.slow

@@ -132,6 +132,21 @@ def window_of(
     return window, product(inverted(a[-1]), b[-1])
 
 
+def curved_window(
+    rng: np.random.Generator,
+    apart: float = 6.0,
+    count: int = 60,
+    step_m: float = 0.25,
+    bias: float = 0.0,
+    a_antenna: Sequence[float] = (0.0, 0.0),
+    b_antenna: Sequence[float] = (0.0, 0.0),
+    step_s: float = 0.5,
+) -> tuple[Window, Array]:
+    """The exact window of two robots on random curves, b moved by `apart`, and the true a_T_b."""
+    a, b = wander(rng, count, step_m), wander(rng, count, step_m) + [apart, 0, 0]
+    return window_of(a, b, bias, a_antenna, b_antenna, step_s)
+
+
 # ---- items -------------------------------------------------------------------------------------
 
 

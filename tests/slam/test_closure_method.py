@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from slam_scenes import NOISE, Array, same_pose, wander, window_of
+from slam_scenes import NOISE, Array, curved_window, same_pose, window_of
 
 from drslamd.conventions import GRID_US, SECOND_US
 from drslamd.slam.calibration.window_calibration import PairCalibration
@@ -31,8 +31,7 @@ PAPER = paper_method(tau=50, range_sigma=0.1, delta=0.1)
 
 def window(bias: float = 0.0) -> tuple[Window, Array]:
     """Curves at 0.5 m/s for half a minute, all ranges too long by the bias; and the true pose."""
-    rng = np.random.default_rng(0)
-    return window_of(wander(rng, 60, 0.25), wander(rng, 60, 0.25) + [6.0, 0, 0], bias)
+    return curved_window(np.random.default_rng(0), bias=bias)
 
 
 @pytest.mark.parametrize("method", [DRSLAMD, PAPER])

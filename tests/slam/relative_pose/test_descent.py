@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from slam_scenes import Array, matrix, wander, window_of
+from slam_scenes import Array, curved_window, matrix, wander, window_of
 
 from drslamd.slam.range_model import LINKTRACK, RangeNoise
 from drslamd.slam.relative_pose.descent import (
@@ -27,7 +27,7 @@ NOISE = RangeNoise(0.1, 0.3)
 def noisy_window(seed: int, burst_m: float = 0.0) -> tuple[Window, Array]:
     """Fifty ranges with white noise, a tenth of them too long, and the true pose."""
     rng = np.random.default_rng(seed)
-    window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [6.0, 0, 0], bias=0.2)
+    window, true = curved_window(rng, 6.0, 50, 0.2, bias=0.2)
     ranges = window.ranges + rng.normal(0, NOISE.sigma, 50)
     ranges[20:25] += burst_m
     return replace(window, ranges=ranges), true
@@ -70,7 +70,7 @@ def test_it_ends_where_a_general_minimiser_ends(seed: int, burst_m: float) -> No
 
 def test_the_covariance_is_the_dense_inverse_with_the_bias_left_unknown() -> None:
     rng = np.random.default_rng(3)
-    window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [6.0, 0, 0])
+    window, true = curved_window(rng, 6.0, 50, 0.2)
     fit, h = fit_of(window), 1e-6
     centred = fit.centred(true[None])
 
@@ -150,7 +150,7 @@ def test_a_valley_is_followed_around_its_arc() -> None:
 
 def test_a_descent_that_is_settled_does_nothing_more() -> None:
     rng = np.random.default_rng(6)
-    window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [6.0, 0, 0])
+    window, true = curved_window(rng, 6.0, 50, 0.2)
     fit = RangeFit(window.a_points, window.b_points, window.ranges)
     once, twice = (Descent(fit, fit.centred(true[None]), NOISE) for _ in range(2))
     once.run(ITERATIONS)
@@ -161,7 +161,7 @@ def test_a_descent_that_is_settled_does_nothing_more() -> None:
 
 def test_ranges_that_are_known_to_scatter_less_leave_a_window_less_vague() -> None:
     rng = np.random.default_rng(6)
-    window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [6.0, 0, 0])
+    window, true = curved_window(rng, 6.0, 50, 0.2)
     fit = RangeFit(window.a_points, window.b_points, window.ranges)
     plain, quiet, loud = (
         Descent(fit, fit.centred(true[None]), replace(NOISE, scatter=scatter)).minima()

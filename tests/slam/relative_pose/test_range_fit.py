@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.linalg import eigvalsh
-from slam_scenes import Array, matrix, same_pose, wander, window_of
+from slam_scenes import Array, curved_window, matrix, same_pose
 
 from drslamd.slam.relative_pose import range_fit
 from drslamd.slam.relative_pose.range_fit import Minima, RangeFit, stepped
@@ -14,7 +14,7 @@ from drslamd.slam.relative_pose.range_fit import Minima, RangeFit, stepped
 def scene(seed: int, apart: float = 6.0) -> tuple[RangeFit, Array, Array, Array]:
     """A window's fit, its points a, b, and its true pose."""
     rng = np.random.default_rng(seed)
-    window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [apart, 0, 0])
+    window, true = curved_window(rng, apart, 50, 0.2)
     a, b = window.a_points, window.b_points
     return RangeFit(a, b, window.ranges), a, b, true
 
@@ -141,7 +141,7 @@ def test_a_window_that_fits_nothing_is_not_called_vague(share: float, vague: boo
 
 def test_the_other_side_is_as_far_away_where_both_were_nearest() -> None:
     rng = np.random.default_rng(11)
-    window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [1.0, 0, 0])
+    window, true = curved_window(rng, 1.0, 50, 0.2)
     fit = RangeFit(window.a_points, window.b_points, window.ranges)
     other = fit.poses(fit.other_side(fit.centred(true[None])))[0]
     n = int(np.argmin(window.ranges))
