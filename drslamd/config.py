@@ -6,24 +6,43 @@ key, the value and what is allowed. The paper's parameters have its names and, i
 
 from __future__ import annotations
 
-import difflib
+import re
 from pathlib import PurePath
-from typing import Annotated, Any, Literal, Union
+from typing import Annotated, Literal, Union
 
 import tomli
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
+from drslamd.config_faults import one_line, sentences
 from drslamd.conventions import MAX_ROBOT_ID
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Rate = Annotated[float, Field(gt=0, le=50, allow_inf_nan=False)]
-Metres = Annotated[float, Field(allow_inf_nan=False, ge=-5, le=5)]
+Scale = Annotated[float, Field(ge=1e-9, le=1e9)]
+"""Between two units; beyond it products with what a sensor says could overflow."""
+Rate = Annotated[float, Field(gt=0, le=50)]
+Metres = Annotated[float, Field(ge=-5, le=5)]
 RobotId = Annotated[int, Field(ge=0, le=MAX_ROBOT_ID)]
 Baud = Annotated[int, Field(ge=1200, le=4_000_000)]
 
 
 class Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    """Nothing is guessed: no unknown key, no "3" for 3, no 1 for true, no number without end."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+    @field_validator("*")
+    @classmethod
+    def _is_readable(cls, value: object) -> object:
+        # a NUL in a path would end the daemon later, where nobody expects it
+        if isinstance(value, str) and not value.isprintable():
+            raise ValueError("text without control characters")
+        return value
 
 
 class RobotSection(Section):
@@ -87,13 +106,13 @@ class KobukiSection(SerialWheelSection):
     track_m: Annotated[float, Field(gt=0.01, le=10)] = 0.230
     max_speed_mps: Annotated[float, Field(gt=0, le=50)] = 1.0
     """Its motors give 0.7 m/s."""
-    counts_per_metre: Positive = 11_724.4
+    counts_per_metre: Scale = 11_724.4
     """2 pi 0.035 m at 2578.33 counts per turn (Kobuki's diff_drive)."""
 
 
 class RoboteqSection(SerialWheelSection):
     source: Literal["roboteq"]
-    counts_per_metre: Positive
+    counts_per_metre: Scale
     poll_hz: Annotated[float, Field(ge=1, le=100)] = 25.0
     swap_channels: bool = False
     """True when channel 1 drives the right wheels."""
@@ -101,7 +120,7 @@ class RoboteqSection(SerialWheelSection):
 
 class AsciiSection(SerialWheelSection):
     source: Literal["ascii"]
-    counts_per_metre: Positive
+    counts_per_metre: Scale
 
 
 class CanWheelSection(WheelSection):
@@ -131,14 +150,14 @@ class DbcSection(CanWheelSection):
     linear: str = ""
     angular: str = ""
     """`Message.Signal` of a twist: m/s and rad/s after `unit`."""
-    counts_per_metre: Positive | None = None
+    counts_per_metre: Scale | None = None
     counter_bits: Annotated[int, Field(ge=8, le=64)] = 32
     id_mask: Annotated[int, Field(ge=1, le=0x1FFFFFFF)] = 0x1FFFFFFF
     """Applied to an id before the look-up, for ids that hold a node number."""
     left_node: Annotated[int, Field(ge=0)] | None = None
     right_node: Annotated[int, Field(ge=0)] | None = None
     """Node numbers that tell the two sides apart: the bits outside `id_mask`, shifted down."""
-    unit: Positive = 1.0
+    unit: Scale = 1.0
     """Factor from the unit of the speed signals to m/s (and rad/s)."""
 
     @model_validator(mode="after")
@@ -226,7 +245,7 @@ class GossipSection(Section):
     @model_validator(mode="after")
     def _group_is_multicast(self) -> GossipSection:
         parts = self.group.split(".")
-        numbers = [int(p) for p in parts if p.isdigit() and int(p) < 256]
+        numbers = [int(p) for p in parts if re.fullmatch("[0-9]{1,3}", p) and int(p) < 256]
         if len(parts) != 4 or len(numbers) != 4 or not 224 <= numbers[0] <= 239:
             raise ValueError(
                 f'group = "{self.group}": must be an IPv4 multicast address, '
@@ -280,7 +299,11 @@ def parse(text: str, base_dir: str = "") -> Config:
     try:
         table = tomli.loads(text)
     except tomli.TOMLDecodeError as error:
-        raise ConfigError([f"not valid TOML: {error}"]) from None
+        raise ConfigError([f"not valid TOML: {one_line(str(error))}"]) from None
+    except ValueError:
+        raise ConfigError(["not valid TOML: a number of thousands of digits"]) from None
+    except RecursionError:
+        raise ConfigError(["not valid TOML: brackets or keys nested too deep"]) from None
     for section, key in (("team", "key_file"), ("wheels", "dbc_file")):
         values = table.get(section)
         if isinstance(values, dict) and isinstance(values.get(key), str) and values[key]:
@@ -288,56 +311,7 @@ def parse(text: str, base_dir: str = "") -> Config:
     try:
         return Config.model_validate(table)
     except ValidationError as error:
-        raise ConfigError([_sentence(fault, table) for fault in error.errors()]) from None
-
-
-def _sentence(fault: Any, table: dict[str, Any]) -> str:
-    """One of pydantic's error records as: key = value: what is allowed."""
-    path = [str(part) for part in fault["loc"]]
-    if path and path[0] == "wheels" and len(path) > 1:
-        del path[1]  # the discriminator's value, which is not a key of the file
-    key = ".".join(path)
-    kind, message = fault["type"], fault["msg"].removeprefix("Value error, ")
-    if kind == "extra_forbidden":
-        return f"{key} = {_shown(fault['input'])}: unknown key{_nearest(path, table)}"
-    if kind == "missing":
-        return f"{key}: missing, and it has no default"
-    if kind == "union_tag_not_found":
-        return f"{key}.source: missing; allowed are {_sources()}"
-    if kind == "union_tag_invalid":
-        return f"{key}.source = {_shown(fault['input'].get('source'))}: allowed are {_sources()}"
-    if kind == "value_error":
-        return f"{key}: {message}"
-    return f"{key} = {_shown(fault['input'])}: {message[0].lower()}{message[1:]}"
-
-
-def _shown(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _sources() -> str:
-    return ", ".join(f'"{name}"' for name in SOURCES)
-
-
-def _models(path: list[str], table: dict[str, Any]) -> type[BaseModel]:
-    """The model that holds the last key of `path`."""
-    if len(path) == 1:
-        return Config
-    if path[0] == "wheels":
-        wheels = SOURCES[table["wheels"]["source"]]
-        return CanSection if len(path) > 2 else wheels
-    annotation = Config.model_fields[path[0]].annotation
-    assert isinstance(annotation, type)
-    assert issubclass(annotation, BaseModel)
-    return annotation
-
-
-def _nearest(path: list[str], table: dict[str, Any]) -> str:
-    allowed = list(_models(path, table).model_fields)
-    close = difflib.get_close_matches(path[-1], allowed, n=1)
-    hint = f"; did you mean {close[0]}?" if close else ""
-    return f"{hint or '; allowed are ' + ', '.join(allowed)}"
+        raise ConfigError(sentences(error, Config)) from None
 
 
 SOURCES: dict[str, type[WheelSection]] = {

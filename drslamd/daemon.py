@@ -81,14 +81,12 @@ class Daemon:
         self._wheels = self._make_wheels()
         self._uwb = SerialPort("uwb", config.uwb.port, config.uwb.baud, self._clock, self.handle)
         self._pace = Pace()
-        self._status = StatusSocket(
-            socket_path(config),
-            {
-                "status": self._picture,
-                "trajectory": lambda: report.trajectories(self.robot),
-                "closures": lambda: report.closures(self.robot),
-            },
-        )
+        questions: dict[str, Callable[[], Any]] = {
+            "status": self._picture,
+            "trajectory": lambda: report.trajectories(self.robot),
+            "closures": lambda: report.closures(self.robot),
+        }
+        self._status = StatusSocket(socket_path(config), questions)
         self._notifier = Notifier()
         self._worker = Worker()
         self._jobs_waiting = 0

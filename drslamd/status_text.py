@@ -19,7 +19,7 @@ def lines(s: dict[str, Any]) -> list[str]:
             f"(sigma {pose['sigma_m']:.2f} m, {pose['sigma_deg']:.1f} deg)"
         )
     else:
-        out.append("not localised: no peer is connected to this robot by consistent closures yet")
+        out.append("not localised")  # the problems above say why
     out += _sensor("uwb", s["uwb"]) + _ranges(s["uwb"]) + _sensor("wheels", s["wheels"])
     network = s["network"]
     out.append(

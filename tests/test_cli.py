@@ -11,7 +11,6 @@ import pytest
 
 from drslamd import cli
 from drslamd.config import parse
-from drslamd.status_text import lines
 
 TOML = """
 [robot]
@@ -112,35 +111,3 @@ def test_the_module_can_be_run() -> None:
         [sys.executable, "-m", "drslamd", "--version"], capture_output=True, text=True, check=True
     )
     assert answer.stdout.startswith("drslamd ")
-
-
-def test_the_status_text_puts_the_problems_first() -> None:
-    answer = {
-        "robot": 3, "epoch": 17, "insecure": True, "problems": ["the sky falls"],
-        "pose": {"state": "localised", "frame": 0, "x_m": 1.0, "y_m": 2.0, "theta_deg": 90.0,
-                 "sigma_m": 0.05, "sigma_deg": 1.5},
-        "uwb": {"port": "open", "age_s": 0.02, "voltage_v": 4.9,
-                "counters": {"frames.refused.OTHER_MODULE": 4},
-                "ranges": {"7": {"robot": None, "count": 9, "age_s": 0.1}}},
-        "wheels": {"port": "missing", "detail": "/dev/none", "age_s": None, "counters": {}},
-        "network": {"up": True, "detail": "lo", "bytes_sent": 10, "accepted": 5,
-                    "refused": {"tag does not fit the team key": 2}},
-        "peers": {"1": {"alive": True, "hears_us": False, "age_s": 0.4, "loss": 0.25,
-                        "clock_offset_ms": -7200.5, "clock_uncertainty_ms": 1.5,
-                        "clock_source": "messages", "same_graph": False,
-                        "log_entries_lacking": 3}},
-        "pairs": {"1": {"connected": False, "windows": {"ambiguous": 4}, "closures_seen": 4,
-                        "closures_kept": 2}},
-        "graph": {"group": [0, 3]},
-    }  # fmt: skip
-    text = "\n".join(lines(answer))
-    assert text.splitlines()[1].startswith("INSECURE")
-    assert text.splitlines()[2] == "! the sky falls"
-    for part in (
-        "localised in the frame of robot 0: x 1.00 m", "wheels port missing /dev/none, good never",
-        "4 frames.refused.OTHER_MODULE", "no robot says it is its", "refused 2: tag does not fit",
-        "does not hear us", "loss 25 %", "clock -7200.5 ms +- 1.5 (messages)",
-        "lacking 3 entries", "not connected yet, closures 2 kept of 4 (4 ambiguous)",
-        "group [0, 3]",
-    ):  # fmt: skip
-        assert part in text, part

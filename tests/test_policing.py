@@ -19,13 +19,12 @@ def hold():
 """
 BAD = {
     "threading.Thread(target=hold).start()": "left behind: thread",
-    "threading.Thread(target=hold, name='worker', daemon=True).start()":
-        "left behind: thread 'worker'",
+    "threading.Thread(None, hold, 'worker', daemon=True).start()": "left behind: thread 'worker'",
     "socket.socket().detach()": "of socket:",
     "os.open('/proc/self/stat', os.O_RDONLY)": "/stat",
     "os.spawnlp(os.P_NOWAIT, 'sleep', 'sleep', '60')": "left behind: child process",
     "os.spawnlp(os.P_NOWAIT, 'true', 'true')": "left behind: child process",
-}  # fmt: skip
+}
 """What is done, and what is said to it."""
 GOOD = [
     "threading.Thread(target=time.sleep, args=(0.05,)).start()",

@@ -31,7 +31,6 @@ from drslamd.slam.graph.measurements import (
     GraphEntry,
     Keyframe,
     RangeMeasurement,
-    RelativePoses,
 )
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.robot_model import RobotModel
@@ -40,7 +39,6 @@ MILLIMETRE_M = 1e-3
 LONGEST_STEP = 2**15 - 1
 """Between two samples: 3.2 m or 3.2 rad in a tenth of a second."""
 TRAITS = 7
-_RELATIVE = ("a_n", "b_n", "x", "y", "theta", "tau", "kappa")
 MAX_TRAIT = 10.0
 MAX_UWB_ID = 2**32 - 1
 
@@ -78,8 +76,17 @@ def _read_status(raw: Any) -> Status:
     if any(h.wanted_n < NOTHING_WANTED for h in heard):
         raise ValueError("odometry before the first sample wanted")
     ranged = tuple(_robot(robot) for robot in raw.ranged)
-    return Status(_flag(raw.state), _robot(raw.frame), bool(_flag(raw.leaving)), raw.uwb_id,
-                  raw.uwb_clock_us, raw.graph_hash, heard, ranged, logs)  # fmt: skip
+    return Status(
+        state=_flag(raw.state),
+        frame=_robot(raw.frame),
+        leaving=bool(_flag(raw.leaving)),
+        uwb_id=raw.uwb_id,
+        uwb_clock_us=raw.uwb_clock_us,
+        graph_hash=raw.graph_hash,
+        heard=heard,
+        ranged=ranged,
+        logs=logs,
+    )
 
 
 # ---- odometry ----------------------------------------------------------------------------------
@@ -119,14 +126,11 @@ def _fill_graph(out: Any, m: GraphEntry) -> None:
     out.closures = [_filled_closure(item, number[item.peer]) for item in m.closures]
     out.n_keyframes, out.n_peers = len(m.keyframes), len(peers)
     out.n_ranges, out.n_closures = len(m.ranges), len(m.closures)
-    out.relative = [_filled_relative(item, number[item.chain]) for item in m.relative]
-    out.n_relative = len(m.relative)
 
 
 def _read_graph(raw: Any) -> GraphEntry:
     # their upper bound is that all of them fit one datagram
-    if min(raw.seq, raw.n_keyframes, raw.n_peers, raw.n_ranges, raw.n_closures,
-           raw.n_relative) < 0:  # fmt: skip
+    if min(raw.seq, raw.n_keyframes, raw.n_peers, raw.n_ranges, raw.n_closures) < 0:
         raise ValueError("negative number")
     if raw.n_traits not in (0, TRAITS):
         raise ValueError(f"{raw.n_traits} traits, allowed are {TRAITS} or none")
@@ -140,8 +144,7 @@ def _read_graph(raw: Any) -> GraphEntry:
         raise ValueError("negative keyframe")
     ranges = tuple(_read_range(r, peers) for r in raw.ranges)
     closures = tuple(_read_closure(c, peers) for c in raw.closures)
-    relative = tuple(_read_relative(r, peers) for r in raw.relative)
-    entry = GraphEntry(raw.seq, model, keyframes, ranges, closures, relative)
+    entry = GraphEntry(raw.seq, model, keyframes, ranges, closures)
     if peers != _peers(entry):
         raise ValueError("peers that are not those of the measurements")
     return entry
@@ -149,8 +152,7 @@ def _read_graph(raw: Any) -> GraphEntry:
 
 def _peers(entry: GraphEntry) -> list[Chain]:
     """Whom the measurements of an entry refer to, each named once."""
-    measured = {*(r.peer for r in entry.ranges), *(c.peer for c in entry.closures)}
-    return sorted(measured | {item.chain for item in entry.relative})
+    return sorted({*(r.peer for r in entry.ranges), *(c.peer for c in entry.closures)})
 
 
 def _filled_peer(chain: Chain) -> Any:
@@ -172,8 +174,15 @@ def _read_range(r: Any, peers: list[Chain]) -> RangeMeasurement:
     if min(r.peer, r.a_n, r.b_n) < 0 or r.sigma < 1:
         raise ValueError("range without peer, keyframe or sigma")
     q_a, q_b = ((q[0] * MILLIMETRE_M, q[1] * MILLIMETRE_M) for q in (r.qa, r.qb))
-    return RangeMeasurement(r.a_n, peers[r.peer], r.b_n, q_a, q_b,
-                     r.range * TRANSLATION_STEP_M, r.sigma * MILLIMETRE_M)  # fmt: skip
+    return RangeMeasurement(
+        a_n=r.a_n,
+        peer=peers[r.peer],
+        b_n=r.b_n,
+        q_a=q_a,
+        q_b=q_b,
+        range_m=r.range * TRANSLATION_STEP_M,
+        sigma_m=r.sigma * MILLIMETRE_M,
+    )
 
 
 def _filled_closure(item: ClosureMeasurement, peer: int) -> Any:
@@ -193,25 +202,15 @@ def _read_closure(c: Any, peers: list[Chain]) -> ClosureMeasurement:
     if not np.isfinite(full).all() or np.linalg.eigvalsh(full)[0] <= 0:
         raise ValueError("closure with a covariance that is none")
     pose = (c.x * TRANSLATION_STEP_M, c.y * TRANSLATION_STEP_M, c.theta * ROTATION_STEP_RAD)
-    return ClosureMeasurement(c.number, bool(_flag(c.kept)), c.a_n, peers[c.peer], c.b_n, pose,
-                       tuple(c.covariance))  # fmt: skip
-
-
-def _filled_relative(item: RelativePoses, peer: int) -> Any:
-    out = lcmtypes.relative_t()
-    out.peer, out.n = peer, len(item.a_n)
-    for name in _RELATIVE:
-        setattr(out, name, getattr(item, name))
-    return out
-
-
-def _read_relative(r: Any, peers: list[Chain]) -> RelativePoses:
-    if min(r.peer, r.n, *r.a_n, *r.b_n) < 0:
-        raise ValueError("relative pose without peer or keyframe")
-    values = (*r.x, *r.y, *r.theta, *r.tau, *r.kappa)
-    if not all(map(math.isfinite, values)) or min((*r.tau, *r.kappa), default=1.0) <= 0:
-        raise ValueError("relative pose out of range")
-    return RelativePoses(peers[r.peer], *(tuple(getattr(r, name)) for name in _RELATIVE))
+    return ClosureMeasurement(
+        number=c.number,
+        kept=bool(_flag(c.kept)),
+        a_n=c.a_n,
+        peer=peers[c.peer],
+        b_n=c.b_n,
+        a_T_b=pose,
+        covariance=tuple(c.covariance),
+    )
 
 
 # ---- poses -------------------------------------------------------------------------------------

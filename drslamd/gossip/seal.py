@@ -22,7 +22,8 @@ from drslamd.conventions import MAX_ROBOT_ID
 from drslamd.gossip.lc02 import MAX_PAYLOAD
 from drslamd.gossip.replay_window import ReplayWindow
 
-VERSION = 1
+VERSION = 2
+"""Of the set of types: 2 says the graph without relative poses in full precision."""
 KEY_BYTES = 32
 TAG_BYTES = 8
 """A forger needs 2^63 tries, each of them a datagram."""

@@ -28,7 +28,7 @@ FORGET_US = 600 * SECOND_US
 MODEL_EVERY = 64
 """Log entries between two that say what our sensors are like."""
 MEASUREMENTS_PER_ENTRY = 20
-"""Keyframes, ranges and closures in one log entry; 20 closures with 20 peers are 1,282 bytes."""
+"""Keyframes, ranges and closures in one log entry; 20 closures with 20 peers are 1,280 bytes."""
 PUBLIC_ENVELOPE_BYTES = 57
 """What a public_poses_t needs besides its poses."""
 UNVERIFIED_US = 10 * SECOND_US

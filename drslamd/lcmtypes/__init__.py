@@ -15,5 +15,4 @@ from .peer_t import peer_t as peer_t
 from .pose_t import pose_t as pose_t
 from .public_poses_t import public_poses_t as public_poses_t
 from .range_t import range_t as range_t
-from .relative_t import relative_t as relative_t
 from .status_t import status_t as status_t

@@ -15,11 +15,11 @@ class graph_t(object):
     from 0; whoever misses one gets it again, from anybody who has it.
     """
 
-    __slots__ = ["header", "seq", "n_traits", "traits", "n_keyframes", "keyframes", "n_peers", "peers", "n_ranges", "ranges", "n_closures", "closures", "n_relative", "relative"]
+    __slots__ = ["header", "seq", "n_traits", "traits", "n_keyframes", "keyframes", "n_peers", "peers", "n_ranges", "ranges", "n_closures", "closures"]
 
-    __typenames__ = ["drslamd.lcmtypes.header_t", "int32_t", "int8_t", "float", "int16_t", "drslamd.lcmtypes.keyframe_t", "int16_t", "drslamd.lcmtypes.peer_t", "int16_t", "drslamd.lcmtypes.range_t", "int16_t", "drslamd.lcmtypes.closure_t", "int16_t", "drslamd.lcmtypes.relative_t"]
+    __typenames__ = ["drslamd.lcmtypes.header_t", "int32_t", "int8_t", "float", "int16_t", "drslamd.lcmtypes.keyframe_t", "int16_t", "drslamd.lcmtypes.peer_t", "int16_t", "drslamd.lcmtypes.range_t", "int16_t", "drslamd.lcmtypes.closure_t"]
 
-    __dimensions__ = [None, None, None, ["n_traits"], None, ["n_keyframes"], None, ["n_peers"], None, ["n_ranges"], None, ["n_closures"], None, ["n_relative"]]
+    __dimensions__ = [None, None, None, ["n_traits"], None, ["n_keyframes"], None, ["n_peers"], None, ["n_ranges"], None, ["n_closures"]]
 
     def __init__(self):
         self.header = drslamd.lcmtypes.header_t()
@@ -51,10 +51,6 @@ class graph_t(object):
         """ LCM Type: int16_t """
         self.closures = []
         """ LCM Type: drslamd.lcmtypes.closure_t[n_closures] """
-        self.n_relative = 0
-        """ LCM Type: int16_t """
-        self.relative = []
-        """ LCM Type: drslamd.lcmtypes.relative_t[n_relative] """
 
     def encode(self):
         buf = BytesIO()
@@ -83,10 +79,6 @@ class graph_t(object):
         for i0 in range(self.n_closures):
             assert self.closures[i0]._get_packed_fingerprint() == drslamd.lcmtypes.closure_t._get_packed_fingerprint()
             self.closures[i0]._encode_one(buf)
-        buf.write(struct.pack(">h", self.n_relative))
-        for i0 in range(self.n_relative):
-            assert self.relative[i0]._get_packed_fingerprint() == drslamd.lcmtypes.relative_t._get_packed_fingerprint()
-            self.relative[i0]._encode_one(buf)
 
     @staticmethod
     def decode(data: bytes):
@@ -120,17 +112,13 @@ class graph_t(object):
         self.closures = []
         for i0 in range(self.n_closures):
             self.closures.append(drslamd.lcmtypes.closure_t._decode_one(buf))
-        self.n_relative = struct.unpack(">h", buf.read(2))[0]
-        self.relative = []
-        for i0 in range(self.n_relative):
-            self.relative.append(drslamd.lcmtypes.relative_t._decode_one(buf))
         return self
 
     @staticmethod
     def _get_hash_recursive(parents):
         if graph_t in parents: return 0
         newparents = parents + [graph_t]
-        tmphash = (0x296f0a0be9a2aae7+ drslamd.lcmtypes.header_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.keyframe_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.peer_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.range_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.closure_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.relative_t._get_hash_recursive(newparents)) & 0xffffffffffffffff
+        tmphash = (0xabe17e5747c206de+ drslamd.lcmtypes.header_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.keyframe_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.peer_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.range_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.closure_t._get_hash_recursive(newparents)) & 0xffffffffffffffff
         tmphash  = (((tmphash<<1)&0xffffffffffffffff) + (tmphash>>63)) & 0xffffffffffffffff
         return tmphash
     _packed_fingerprint = None

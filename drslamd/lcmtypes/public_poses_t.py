@@ -11,9 +11,9 @@ import drslamd.lcmtypes
 
 class public_poses_t(object):
     """
-    Lifted public poses for optimizer = "rbcd": values are the rows of a complex (n + 1) x (2 rank)
-    array, real and imaginary parts alternating, rotation before translation. The first row is the
-    pose that anchors the frame, row k + 1 belongs to keyframe k.
+    Lifted public poses for [optimizer] algorithm = "rbcd": values are the rows of a complex
+    (n + 1) x (2 rank) array, real and imaginary parts alternating, rotation before translation. The
+    first row is the pose that anchors the frame, row k + 1 belongs to keyframe k.
     """
 
     __slots__ = ["header", "frame", "frame_epoch", "rank", "n", "keyframes", "n_values", "values"]
@@ -41,7 +41,7 @@ class public_poses_t(object):
         """ LCM Type: int32_t[n] """
         self.n_values = 0
         """
-        4 * rank * n
+        4 * rank * (n + 1)
         LCM Type: int32_t
         """
 

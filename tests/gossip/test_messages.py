@@ -17,7 +17,7 @@ def test_the_header_stands_where_every_lcm_program_finds_it() -> None:
         raw = CODECS[kind].struct.decode(messages.encode(HEADER, message))
         head = raw.header
         fields = (head.version, head.origin, head.epoch, head.counter, head.utime, head.tag)
-        assert fields == (1, 3, 11, 12, 13, bytes(8))
+        assert fields == (2, 3, 11, 12, 13, bytes(8))
 
 
 def test_each_kind_has_a_channel_for_each_robot() -> None:

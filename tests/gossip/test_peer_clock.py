@@ -205,9 +205,13 @@ def test_system_time_that_wraps_between_the_readings_of_two_robots_makes_no_diff
     assert talk.found() == Offset(9 * SECOND, 3 * MS, "LinkTrack system_time")
 
 
-@pytest.mark.parametrize(("age", "source"), [
-    (5 * SECOND - 1, "LinkTrack system_time"), (5 * SECOND, "messages"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("age", "source"),
+    [
+        (5 * SECOND - 1, "LinkTrack system_time"),
+        (5 * SECOND, "messages"),
+    ],
+)
 def test_the_radio_counts_for_five_seconds(age: int, source: str) -> None:
     talk = with_radio(a_conversation())
     found = talk.ours.offset(talk.now + age)

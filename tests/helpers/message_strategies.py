@@ -55,9 +55,9 @@ diagonals = st.floats(2**-20, 2**20, width=32).map(lambda v: (v, 0.0, 0.0, v, 0.
 
 log_states = st.builds(
     lambda robot, epoch, numbers: LogState(robot, epoch, *sorted(numbers)),
-    robots,
-    i64,
-    st.tuples(n32, n32, n32),
+    robot=robots,
+    epoch=i64,
+    numbers=st.tuples(n32, n32, n32),
 )
 
 
@@ -66,15 +66,15 @@ heard = st.builds(Heard, robots, i64, i64, st.integers(-1, 2**31 - 1))
 
 statuses = st.builds(
     Status,
-    st.integers(0, 1),
-    robots,
-    st.booleans(),
-    st.integers(0, 2**32 - 1),
-    i64,
-    i64,
-    st.lists(heard, max_size=28).map(tuple),
-    st.lists(robots, max_size=28).map(tuple),
-    st.lists(log_states, max_size=28).map(tuple),
+    state=st.integers(0, 1),
+    frame=robots,
+    leaving=st.booleans(),
+    uwb_id=st.integers(0, 2**32 - 1),
+    uwb_clock_us=i64,
+    graph_hash=i64,
+    heard=st.lists(heard, max_size=28).map(tuple),
+    ranged=st.lists(robots, max_size=28).map(tuple),
+    logs=st.lists(log_states, max_size=28).map(tuple),
 )
 
 
@@ -82,10 +82,10 @@ batches = st.builds(
     lambda start, later, first, steps: OdometryBatch(
         start, start + later, np.cumsum([first, *steps], axis=0).astype(float)
     ),
-    st.integers(0, 2**30),
-    st.integers(0, 2**30),
-    st.tuples(i32, i32, i32),
-    st.lists(st.tuples(*[st.integers(-32_767, 32_767)] * 3), max_size=149),
+    start=st.integers(0, 2**30),
+    later=st.integers(0, 2**30),
+    first=st.tuples(i32, i32, i32),
+    steps=st.lists(st.tuples(*[st.integers(-32_767, 32_767)] * 3), max_size=149),
 )
 
 
@@ -97,25 +97,25 @@ keyframes = st.builds(Keyframe, n32, st.integers(0, 2**15 - 1), i32, i32, i32)
 
 ranges = st.builds(
     RangeMeasurement,
-    n32,
-    chains,
-    n32,
-    antennas,
-    antennas,
-    i32.map(tenths),
-    st.integers(1, 2**15 - 1).map(millimetres),
+    a_n=n32,
+    peer=chains,
+    b_n=n32,
+    q_a=antennas,
+    q_b=antennas,
+    range_m=i32.map(tenths),
+    sigma_m=st.integers(1, 2**15 - 1).map(millimetres),
 )
 
 
 closures = st.builds(
     ClosureMeasurement,
-    n32,
-    st.booleans(),
-    n32,
-    chains,
-    n32,
-    st.tuples(*[i32.map(tenths)] * 3),
-    diagonals,
+    number=n32,
+    kept=st.booleans(),
+    a_n=n32,
+    peer=chains,
+    b_n=n32,
+    a_T_b=st.tuples(*[i32.map(tenths)] * 3),
+    covariance=diagonals,
 )
 
 
@@ -131,11 +131,11 @@ models = st.builds(
 
 entries = st.builds(
     GraphEntry,
-    n32,
-    models | st.none(),
-    st.lists(keyframes, max_size=6).map(tuple),
-    st.lists(ranges, max_size=6).map(tuple),
-    st.lists(closures, max_size=6).map(tuple),
+    seq=n32,
+    model=models | st.none(),
+    keyframes=st.lists(keyframes, max_size=6).map(tuple),
+    ranges=st.lists(ranges, max_size=6).map(tuple),
+    closures=st.lists(closures, max_size=6).map(tuple),
 )
 
 

@@ -50,10 +50,11 @@ def exchange(section: CanSection, sent: list[Any], extra: dict[str, Any]) -> lis
 BUSES = [
     pytest.param(CanSection(interface="virtual", channel="test"), {}, id="virtual"),
     pytest.param(
-        CanSection(interface="udp_multicast", channel="239.74.163.77"), {"hop_limit": 0},
+        CanSection(interface="udp_multicast", channel="239.74.163.77"),
+        {"hop_limit": 0},
         id="udp_multicast",
     ),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("section", "extra"), BUSES)
@@ -74,8 +75,10 @@ def test_frames_arrive_with_id_width_and_data(section: CanSection, extra: dict[s
     assert events[0].condition is PortCondition.OPEN
     frames = [(e.can_id, e.extended, e.data) for e in events if isinstance(e, CanFrame)]
     assert frames == [
-        (0x311, False, bytes(range(8))), (0x12345678, True, b"\x01"), (0x7FF, False, b""),
-    ]  # fmt: skip
+        (0x311, False, bytes(range(8))),
+        (0x12345678, True, b"\x01"),
+        (0x7FF, False, b""),
+    ]
 
 
 def test_an_agilex_base_on_a_bus_becomes_motion() -> None:
@@ -98,12 +101,13 @@ def test_an_odrive_pair_on_a_bus_becomes_motion() -> None:
     )
     sent = [
         can.Message(
-            arbitration_id=axis << 5 | 0x09, is_extended_id=False,
+            arbitration_id=axis << 5 | 0x09,
+            is_extended_id=False,
             data=struct.pack("<ff", 0.01 * k, 1.0),
         )
         for k in range(20)
         for axis in (0, 1)
-    ]  # fmt: skip
+    ]
     events = exchange(CanSection(interface="virtual", channel="odrive"), sent, {})
     wheels = WheelInput(section)
     motions = [m for e in events if isinstance(e, CanFrame) for m in wheels.on_frame(e)]

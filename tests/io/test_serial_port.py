@@ -101,8 +101,11 @@ def test_a_pulled_cable_is_told_once_and_the_port_comes_back(tmp_path: Path) -> 
 
     states = conditions(with_port(tmp_path, script))
     assert states == [
-        PortCondition.OPEN, PortCondition.LOST, PortCondition.MISSING, PortCondition.OPEN,
-    ]  # fmt: skip
+        PortCondition.OPEN,
+        PortCondition.LOST,
+        PortCondition.MISSING,
+        PortCondition.OPEN,
+    ]
 
 
 def test_a_port_that_another_program_holds_is_busy_until_it_lets_go(tmp_path: Path) -> None:

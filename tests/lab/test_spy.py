@@ -33,10 +33,12 @@ def test_the_jar_holds_a_class_for_every_type(
 
 @pytest.mark.parametrize(
     ("hidden", "remedy"),
-    [("javac", "javac is not installed; apt install default-jdk-headless\n"),
-     ("jar", "jar is not installed; apt install default-jdk-headless\n"),
-     ("lcm-gen", "lcm-gen is not installed; pip install lcm\n")],
-)  # fmt: skip
+    [
+        ("javac", "javac is not installed; apt install default-jdk-headless\n"),
+        ("jar", "jar is not installed; apt install default-jdk-headless\n"),
+        ("lcm-gen", "lcm-gen is not installed; pip install lcm\n"),
+    ],
+)
 def test_a_program_that_is_missing_ends_with_69_and_names_its_package(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

@@ -29,8 +29,8 @@ def long_solve() -> int:
     """Three seconds of module 1, as one job."""
     rng = np.random.default_rng(0)
     poses = np.cumsum(rng.normal(size=(60, 3)) * 0.05, axis=0)
-    window = Window(np.linspace(-30, 0, 60), rng.uniform(2, 8, 60), poses, poses[::-1],
-                    np.zeros(2), np.zeros(2))  # fmt: skip
+    times, ranges, antenna = np.linspace(-30, 0, 60), rng.uniform(2, 8, 60), np.zeros(2)
+    window = Window(times, ranges, poses, poses[::-1], antenna, antenna)
     odometry = OdometryNoise(0.03, 0.0026, 0.01, 0.0087)
     noise = PairNoise(RangeNoise(0.1, 0.3), odometry, odometry)
     count, end = 0, time.monotonic() + 3.0

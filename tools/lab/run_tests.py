@@ -91,11 +91,11 @@ def _quick_tests_on(version: str, python: str) -> int:
     """In an environment of its own; what is said is printed at the end."""
     began, folder = time.monotonic(), ROOT / ".venvs" / version
     inside = str(folder / "bin" / "python")
+    install = [inside, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     steps = [
-        [inside, "-m", "pip", "install", "--quiet", "--disable-pip-version-check",
-         "--editable", f"{ROOT}[test]"],
+        [*install, "--editable", f"{ROOT}[test]"],
         [inside, "-m", "pytest", "-q", "-m", "not slow", "-p", "no:cacheprovider"],
-    ]  # fmt: skip
+    ]
     if not Path(inside).exists():
         steps.insert(0, [python, "-m", "venv", str(folder)])
     code = 0

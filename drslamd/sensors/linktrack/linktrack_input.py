@@ -10,10 +10,14 @@ used only when all of this holds as well:
 
 The role byte is a free label in the DR modes and never a reason. Whatever is turned away is
 counted under one reason. A range is stamped with the time at which the module measured it.
+
+This is the border for numbers: every range passes `LinkTrackInput.feed`, and each one that leaves
+it is finite and within the limits of the module, whatever a table says of how numbers are sent.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from enum import Enum
 from statistics import median
@@ -50,6 +54,7 @@ HEALTH_BITS: Final = (
 )
 
 _SHORT_IDS: Final = frozenset({Kind.NODE_FRAME2, Kind.NODE_FRAME3})
+_MEASURED: Final = ("distance_m", "fp_rssi_db", "rx_rssi_db")
 _RANGING: Final = _SHORT_IDS | {Kind.NODE_FRAME5}
 _REFUSED_KINDS: Final = {
     Kind.ANCHOR_FRAME0: Refusal.LP_MODE,
@@ -65,6 +70,7 @@ class RangeRefusal(Enum):
 
     EMPTY = "marked as not valid by the module"
     SELF = "a range to itself"
+    NOT_FINITE = "a value that is not a finite number"
     LIMITS = "a distance that this kind of module cannot measure"
     DUPLICATE = "further distance to the same module, taken into the median"
 
@@ -217,6 +223,8 @@ class LinkTrackInput:
             return RangeRefusal.EMPTY
         if node["id"] == self._uwb_id:
             return RangeRefusal.SELF
+        if not all(math.isfinite(node[name]) for name in _MEASURED):
+            return RangeRefusal.NOT_FINITE
         if not MIN_RANGE_M <= node["distance_m"] <= self._max_range_m:
             return RangeRefusal.LIMITS
         return None

@@ -3,7 +3,7 @@
 The configuration names two signals: the counters or the speeds of both sides, or the two speeds of
 the body. When both are in one frame they make one sample; when they are in two, they are brought to
 a common time as in `side_pairing`. Counts are taken raw, since a scaled counter does not wrap at a
-power of two; speeds are taken scaled and multiplied by ``unit``.
+power of two; speeds are taken scaled, must be finite, and are multiplied by ``unit``.
 
 Ids that hold a node number are masked by ``id_mask`` before the look-up; the node number is what
 stands outside the mask, shifted down (ODrive: mask 0x1F, node = axis; VESC: mask 0x1FFFFF00, node =
@@ -100,8 +100,10 @@ class DbcDriver(CanDriver):
             return signals
         if source.signal not in signals:
             return None if source.message.is_multiplexed() else WheelRefusal.SHORT
-        value: float = signals[source.signal]
-        return value if math.isfinite(value) else WheelRefusal.NOT_FINITE
+        value = signals[source.signal]
+        if self._section.measures == "counts":
+            return int(value)  # a float would lose the last bits of a wide counter
+        return speed if math.isfinite(speed := _as_float(value)) else WheelRefusal.NOT_FINITE
 
     def _sample(self, pair: Pair) -> WheelSample:
         utime, first, second = pair
@@ -124,8 +126,18 @@ def _decoded(message: Message, data: bytes, scaled: bool) -> dict[str, Any] | Wh
         )
     except DecodeError:
         return WheelRefusal.MALFORMED
+    except OverflowError:  # a factor or an offset in the file that no float can hold
+        return WheelRefusal.NOT_FINITE
     assert isinstance(signals, dict)  # only containers decode to anything else
     return signals
+
+
+def _as_float(value: float) -> float:
+    """A whole number that no float can hold is infinite."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
 
 
 def _node_shift(section: DbcSection) -> int:

@@ -20,6 +20,10 @@ silence     speeds: longer than `MAX_SILENCE_US`. Counters: longer than `MAX_BRI
             path than `BRIDGE_PATH_M`: how long the path was is known, what shape it had is not.
 
 Motions have strictly increasing times. Of readings with the same stamp the last one counts.
+
+This is the border for numbers: every sample of every base passes `WheelBase.add`, which refuses
+what is not finite, also where only a product is not, and what is finite but absurd. A `Motion` is
+finite and no longer than the base can drive in its time.
 """
 
 from __future__ import annotations
@@ -53,12 +57,16 @@ STAMP_JITTER_US: Final = SECOND_US // 10
 """Stamps of arrival may bunch up by this much without a counter being suspected."""
 NEAR_ZERO_M: Final = 0.05
 """How far wheels may have turned before the first reading after a power cycle."""
+MAX_TURNED_M: Final = 0.05 * 2**23
+"""Turns come as 32-bit floats. 419 km from zero their steps are 5 cm long, and further on they
+would stand still while the base drives."""
 
 
 class ReadingRefusal(Enum):
     """Why a sample gives no motion of its own."""
 
     NOT_FINITE = "a value that is not a finite number"
+    TOO_FAR = "more turns than a 32-bit float can tell apart"
     OUT_OF_ORDER = "older than the one before"
     SAME_STAMP = "same time as the one before, replaces it"
     TOO_FAST = "a speed above max_speed_mps, or a turn of more than one round a second"
@@ -180,6 +188,8 @@ class WheelBase:
         last = self._last
         if not math.isfinite(now.left) or not math.isfinite(now.right):
             return ReadingRefusal.NOT_FINITE
+        if isinstance(now, _Position) and self._is_too_far(now):
+            return ReadingRefusal.TOO_FAR
         if isinstance(now, _Speed) and self._is_too_fast(_Path(now.left, now.right), SECOND_US):
             return ReadingRefusal.TOO_FAST
         if last is None:
@@ -210,6 +220,10 @@ class WheelBase:
         left = _moved(last.left, now.left, now.bits) / self._geometry.per_metre
         right = _moved(last.right, now.right, now.bits) / self._geometry.per_metre
         return _Path(self._left_sign * left, self._right_sign * right)
+
+    def _is_too_far(self, now: _Position) -> bool:
+        turned_m = max(abs(now.left), abs(now.right)) / self._geometry.per_metre
+        return now.bits is None and turned_m > MAX_TURNED_M
 
     def _is_too_fast(self, path: _Path, elapsed_us: int) -> bool:
         elapsed_s = elapsed_us / SECOND_US

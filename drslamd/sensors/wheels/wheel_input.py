@@ -31,7 +31,12 @@ from drslamd.sensors.wheels.kobuki import KobukiDriver
 from drslamd.sensors.wheels.odrive import OdriveDriver
 from drslamd.sensors.wheels.roboteq import RoboteqDriver
 from drslamd.sensors.wheels.wheel_base import DriveGeometry, Gap, ReadingRefusal, WheelBase
-from drslamd.sensors.wheels.wheel_driver import CanDriver, PolledDriver, SerialDriver
+from drslamd.sensors.wheels.wheel_driver import (
+    CanDriver,
+    PolledDriver,
+    SerialDriver,
+    WheelRefusal,
+)
 
 SILENCE_US: Final = SECOND_US
 """The slowest base that is any use sends twice a second."""
@@ -88,9 +93,17 @@ _TOO_FAST: Final = (
 )
 _TOO_RARE: Final = "the wheel samples come too rarely: make the base send 20 or more a second"
 
+_NOT_FINITE: Final = (
+    "the wheels send values that are not finite numbers: does the base report a fault, are the "
+    "factors of its DBC file and wheels.unit right?"
+)
+
 _REMEDIES: Final[dict[Gap | ReadingRefusal | None, str]] = {
     ReadingRefusal.TOO_FAST: _TOO_FAST,
     ReadingRefusal.JUMP: _TOO_FAST,
+    ReadingRefusal.NOT_FINITE: _NOT_FINITE,
+    ReadingRefusal.TOO_FAR: "the wheels count more turns than a 32-bit float can tell apart: "
+    "switch the base off and on",
     Gap.JUMP: _TOO_FAST,
     Gap.WRAP: _TOO_RARE,
     Gap.SILENCE: _TOO_RARE,
@@ -130,6 +143,7 @@ class WheelInput:
         self._last_input: int | None = None
         self._trying_since = 0
         self._samples_before = 0
+        self._not_finite_before = 0
         self.last_motion_utime: int | None = None
 
     def feed(self, data: bytes, utime: int) -> list[Motion]:
@@ -192,6 +206,7 @@ class WheelInput:
         if any(not motion.gap for motion in motions):
             self.last_motion_utime = self._trying_since = utime
             self._samples_before = self.base.tally.received
+            self._not_finite_before = self.driver.tally.refused[WheelRefusal.NOT_FINITE]
         return motions
 
     def _silence(self, utime: int) -> str | None:
@@ -208,6 +223,8 @@ class WheelInput:
             return None
         if self.base.tally.received > self._samples_before:
             return _REMEDIES.get(self.base.trouble, "the wheel samples make no sense")
+        if self.driver.tally.refused[WheelRefusal.NOT_FINITE] > self._not_finite_before:
+            return _NOT_FINITE
         seconds = (utime - self._trying_since) // SECOND_US
         remedy = "is wheels.baud right?" if self._serial else "is this the bus of the base?"
         return f"input, but no {self.driver.expects} for {seconds} s: {remedy}"

@@ -47,26 +47,6 @@ class ClosureMeasurement:
 
 
 @dataclass(frozen=True)
-class RelativePoses:
-    """Relative poses a_T_b in double precision, one per place of these tuples.
-
-    Attributes:
-        chain: whose keyframes b_n are, those of a_n are the origin's.
-        x, y, theta: m and rad.
-        tau, kappa: information of one axis of the position, 1/m^2, and of the angle, 1/rad^2.
-    """
-
-    chain: Chain
-    a_n: tuple[int, ...]
-    b_n: tuple[int, ...]
-    x: tuple[float, ...]
-    y: tuple[float, ...]
-    theta: tuple[float, ...]
-    tau: tuple[float, ...]
-    kappa: tuple[float, ...]
-
-
-@dataclass(frozen=True)
 class GraphEntry:
     """One message of a robot's log."""
 
@@ -76,4 +56,3 @@ class GraphEntry:
     keyframes: tuple[Keyframe, ...] = ()
     ranges: tuple[RangeMeasurement, ...] = ()
     closures: tuple[ClosureMeasurement, ...] = ()
-    relative: tuple[RelativePoses, ...] = ()

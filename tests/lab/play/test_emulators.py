@@ -8,9 +8,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from lab.play.emulators import LinkTrackEmulator, WheelEmulator, as_heard_at
-from lab.play.playback import BASES, Hardware, equip, robot_config
-from lab.recordings import world
-from lab.recordings.recording import Recording, Trail, wheel_paths
+from lab.play.playback import BASES, Hardware, robot_config
+from lab.recordings.recording import Recording, Trail
 
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.samples import Motion
@@ -89,31 +88,6 @@ def test_wheels_that_go_backwards_come_back_negative(base: Callable[[], WheelEmu
     assert turn == pytest.approx(2 * 0.004 * 199 / device.track_m, rel=0.01)
     back = motions_of(base(), [-0.004 * k for k in range(200)], [-0.004 * k for k in range(200)])
     assert sum(m.distance_m for m in back) == pytest.approx(-0.004 * 199, rel=0.01)
-
-
-def test_wheel_paths_of_a_circle_are_those_of_both_wheels() -> None:
-    """Radius 2 m, wheels 0.4 m apart: the left one goes round 1.8 m, the right one 2.2 m."""
-    angle = np.linspace(0, 3.0, 61)
-    odometry = np.column_stack([2 * np.sin(angle), 2 - 2 * np.cos(angle), angle])
-    left, right = wheel_paths(Trail(0, angle, odometry, odometry), 0.4)
-    assert left == pytest.approx(1.8 * angle)
-    assert right == pytest.approx(2.2 * angle)
-
-
-def test_a_recording_becomes_everything_that_its_devices_print_in_order() -> None:
-    recording = world.simulate(world.Scene(robots=2, seconds=4.0), 3)
-    hardware = equip(recording, varied=True)[1]
-    chunks = hardware.chunks()
-    times = [c.t for c in chunks]
-    assert times == sorted(times)
-    daemon = LinkTrackInput(1, 120.0)
-    samples = [
-        sample for c in chunks if c.port == "uwb" for sample in daemon.feed(c.printed(), at(c.t))
-    ]
-    mine = recording.ranges[recording.ranges[:, 1] == 1]
-    assert len(samples) == len(mine) - 1
-    assert [s.range_m for s in samples] == pytest.approx(mine[1:, 3], abs=0.001)
-    assert sum(c.port == "wheels" for c in chunks) == len(recording.trails[1].t)
 
 
 def test_at_the_right_speed_every_byte_arrives() -> None:

@@ -92,10 +92,17 @@ def test_a_written_file_states_its_noise(tmp_path: Path) -> None:
         GOOD.replace("VERTEX_XY L0 5 6\n", ""),
         "# written by hand\n" + GOOD + "VERTEX_SE2:PRIOR 10.0 A0 1 2 0.5\n",
     ],
-    ids=["blank last line", "blank lines", "no last line feed", "DOS line feeds",
-         "standing node without a number", "standing node with a stamp", "standing node unplaced",
-         "lines of other kinds"],
-)  # fmt: skip
+    ids=[
+        "blank last line",
+        "blank lines",
+        "no last line feed",
+        "DOS line feeds",
+        "standing node without a number",
+        "standing node with a stamp",
+        "standing node unplaced",
+        "lines of other kinds",
+    ],
+)
 def test_how_others_write_it_is_read_too(tmp_path: Path, text: str) -> None:
     found, plain = from_text(tmp_path, text), from_text(tmp_path, GOOD)
     assert found.ranges.tolist() == plain.ranges.tolist()

@@ -48,6 +48,10 @@ BO_ 260 Muxed: 8 Base
  SG_ MuxL m1 : 8|16@1- (1,0) [0|0] "" Vector__XXX
  SG_ MuxR m1 : 24|16@1- (1,0) [0|0] "" Vector__XXX
  SG_ Other m2 : 8|16@1- (1,0) [0|0] "" Vector__XXX
+BO_ 262 WideLeft: 8 Base
+ SG_ Count : 0|64@1+ (1,0) [0|0] "" Vector__XXX
+BO_ 263 WideRight: 8 Base
+ SG_ Count : 0|64@1+ (1,0) [0|0] "" Vector__XXX
 SIG_VALTYPE_ 9 Turns : 1;
 SIG_VALTYPE_ 9 Rate : 1;
 """
@@ -115,6 +119,14 @@ def test_sides_in_two_messages_are_brought_to_a_common_time() -> None:
         WheelCounts(T0 + 15 * MS, 1010, 20, 32),
     ]
     assert driver.expects == "CAN id 0x102 and CAN id 0x103"
+
+
+def test_wide_counts_lose_no_bit() -> None:
+    driver = counts(left="WideLeft.Count", right="WideRight.Count", counter_bits=64)
+    far = (1 << 63) + 1
+    driver.on_frame(frame(0x106, struct.pack("<Q", far)))
+    samples = driver.on_frame(frame(0x107, struct.pack("<Q", far + 2)))
+    assert samples == [WheelCounts(T0, far, far + 2, 64)]
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ from drslamd.sensors.wheels.wheel_base import (
     MAX_BRIDGE_US,
     MAX_SILENCE_US,
     MAX_TURN_RADPS,
+    MAX_TURNED_M,
     NEAR_ZERO_M,
     STAMP_JITTER_US,
     DriveGeometry,
@@ -345,6 +346,18 @@ def test_values_that_are_not_finite_are_refused(kind: type, value: float) -> Non
     assert base.add(kind(T0 + MS, 0.0, value)) is None
     assert base.tally.refused == {ReadingRefusal.NOT_FINITE: 2}
     assert base.add(kind(T0 + 2 * MS, 0.0, 0.0)) == Motion(T0 + 2 * MS, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(("share", "believed"), [(1.0, True), (1.001, False), (1e30, False)])
+@pytest.mark.parametrize("sides", [(1, 0), (0, 1), (-1, 0), (0, -1)])
+def test_turns_have_an_end_where_floats_of_32_bits_become_coarse(
+    sides: tuple[int, int], share: float, believed: bool
+) -> None:
+    assert round(MAX_TURNED_M) == 419_430
+    base = WheelBase(BASE)
+    left, right = (side * share * MAX_TURNED_M * BASE.per_metre for side in sides)
+    assert (base.add(WheelTurns(T0, left, right)) is not None) == believed
+    assert base.tally.refused[ReadingRefusal.TOO_FAR] == (not believed)
 
 
 WILD = st.sampled_from([0.0, -0.0, 1.0, -1.0, 2.9, 1e308, -1e308, math.nan, math.inf, 5e-324])

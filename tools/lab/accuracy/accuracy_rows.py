@@ -61,12 +61,10 @@ class Row:
 
 def _median(figures: Iterable[list[Figure]]) -> list[Figure]:
     """Figure by figure the median over runs."""
-    columns = zip(*figures, strict=True)
     return [
-        Figure(f[0].recording, f[0].measure, float(np.median([x.reached for x in f])),
-               f[0].wanted, f[0].unit, f[0].is_least)
-        for f in columns
-    ]  # fmt: skip
+        replace(runs[0], reached=float(np.median([figure.reached for figure in runs])))
+        for runs in zip(*figures, strict=True)
+    ]
 
 
 # ---- TIERS ----
@@ -150,11 +148,14 @@ def _vub_broken(data: Path, setup: Setup) -> list[Figure]:
         ]
     name = f"VUB exp1-3, {len(found)} closures accepted while odometry is broken"
     chi2 = np.array(found or [0.0])
+    share, what = (
+        float(np.mean(chi2 <= CHI2_98)),
+        f"share with a squared error of at most {CHI2_98}",
+    )
     return [
-        Figure(name, f"share with a squared error of at most {CHI2_98}",
-               float(np.mean(chi2 <= CHI2_98)), 0.98, "", True),
+        Figure(name, what, share, 0.98, is_least=True),
         Figure(name, "largest squared error", float(chi2.max()), CHI2_NEVER),
-    ]  # fmt: skip
+    ]
 
 
 def _while_broken(recording: Recording, when: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -34,8 +34,16 @@ from lab.progress import Progress
 from lab.recordings.recording import BadRecording
 
 WORSE, NO_INPUT = 1, 66
-PARTS = {"1": module1, "sdp": sdp, "2": module2, "3": module3, "all": pipeline, "daemon": daemon,
-         "traffic": traffic, "growth": growth}  # fmt: skip
+PARTS = {
+    "1": module1,
+    "sdp": sdp,
+    "2": module2,
+    "3": module3,
+    "all": pipeline,
+    "daemon": daemon,
+    "traffic": traffic,
+    "growth": growth,
+}
 EXAMPLES = """\
 examples:
   tools/benchmark                              all of it, some minutes
@@ -113,8 +121,10 @@ def _run(parts: list[str], quick: bool) -> list[Row]:
 
 def _machine() -> str:
     versions: dict[str, Any] = {
-        "Python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__
-    }  # fmt: skip
+        "Python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+    }
     named = ", ".join(f"{name} {version}" for name, version in versions.items())
     return f"{platform.machine()}, one core, CPU time; {named}; graphs of {graphs.FOLDER.name}/"
 

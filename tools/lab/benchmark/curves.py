@@ -11,6 +11,9 @@ from matplotlib import pyplot as plt
 
 from lab.benchmark.rows import Row
 
+LABELS = {"ms": "ms for one update", "MB": "MB sent a minute"}
+"""By the unit of a curve's rows."""
+
 
 def draw(rows: list[Row], path: Path) -> None:
     """Write a picture of all rows that are points of a curve; none of no such rows."""
@@ -25,8 +28,7 @@ def draw(rows: list[Row], path: Path) -> None:
         points.sort(key=lambda point: point[0])
         panel.plot([x for x, _ in points], [row.value for _, row in points], "o-")
         panel.set_xlabel(axis)
-        panel.set_ylabel({"ms": "ms for one update", "MB": "MB sent a minute"}.get(
-            points[0][1].unit, "share of a core"))  # fmt: skip
+        panel.set_ylabel(LABELS.get(points[0][1].unit, "share of a core"))
         panel.set_xscale("log")
         panel.set_ylim(bottom=0)
         panel.grid(alpha=0.3)

@@ -22,9 +22,9 @@ TICK_S = os.sysconf("SC_CLK_TCK")
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """The vertex_cover of three daemons, in real time."""
+    """The busiest of three daemons, in real time."""
     share, memory, ready, lag = asyncio.run(_measured(SECONDS[quick]))
-    work = "daemon, vertex_cover of 3 robots at 50 Hz"
+    work = "daemon, busiest of 3 robots at 50 Hz"
     yield Row(0, f"{work}, share of a core", share, "ratio", GOALS["share"])
     yield Row(0, f"{work}, resident", memory, "MB", GOALS["MB"])
     yield Row(0, f"{work}, CPU until it answers", ready, "s", GOALS["s"])

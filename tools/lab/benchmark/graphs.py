@@ -89,11 +89,9 @@ class Graph:
     @cached_property
     def edges(self) -> ComplexFactors:
         """Between poses by their places."""
+        i, j = self.place[self.read.i], self.place[self.read.j]
         x, y, theta = self.read.measured.T
-        return ComplexFactors(
-            self.place[self.read.i], self.place[self.read.j],
-            np.exp(1j * theta), x + 1j * y, self.kappa, self.tau,
-        )  # fmt: skip
+        return ComplexFactors(i, j, np.exp(1j * theta), x + 1j * y, self.kappa, self.tau)
 
 
 def load(name: str, robots: int | None = None) -> Graph:
@@ -108,8 +106,6 @@ def load(name: str, robots: int | None = None) -> Graph:
     count, robots = len(read.ids), robots or known.robots
     each = count // robots
     robot = np.minimum(np.arange(count) // each, robots - 1)
-    spread = np.trace(np.linalg.inv(read.information[:, :2, :2]), axis1=1, axis2=2)
-    return Graph(
-        name, known, read, robot, np.arange(count) - robot * each,
-        2 / spread, 2 * read.information[:, 2, 2],
-    )  # fmt: skip
+    n = np.arange(count) - robot * each
+    tau = 2 / np.trace(np.linalg.inv(read.information[:, :2, :2]), axis1=1, axis2=2)
+    return Graph(name, known, read, robot, n, tau, kappa=2 * read.information[:, 2, 2])

@@ -51,8 +51,8 @@ def by_hours(quick: bool) -> Iterator[Row]:
         first = first or ms
         work = f"one more second after {name} of driving, {held} keyframes held"
         yield Row(3, work, ms, "ms", curve=("hours of driving", marks[name] / 3600))
-    yield Row(3, f"the same, {list(marks)[-1]} over {next(iter(marks))}", ms / first, "ratio",
-              GOAL_RATIO)  # fmt: skip
+    work = f"the same, {list(marks)[-1]} over {next(iter(marks))}"
+    yield Row(3, work, ms / first, "ratio", GOAL_RATIO)
 
 
 def _driven(marks: dict[str, int]) -> dict[str, tuple[float, int]]:
@@ -99,20 +99,18 @@ def _entry(
     """What one robot adds in one second: a keyframe, ranges, now and then a closure."""
     robot, n = chain.robot, 10 * second
     x, y, theta = odometry[robot][second]
-    frame = Keyframe(n, 0, round(x / TRANSLATION_STEP_M), round(y / TRANSLATION_STEP_M),
-                     round(theta / ROTATION_STEP_RAD))  # fmt: skip
+    x, y = round(x / TRANSLATION_STEP_M), round(y / TRANSLATION_STEP_M)
+    frame = Keyframe(n, 0, x, y, round(theta / ROTATION_STEP_RAD))
     ranges, closures = [], []
     for peer in chains[robot + 1 :]:
         here, there = truth[robot][second], truth[peer.robot][second]
         distance = float(np.hypot(*(here - there)[:2])) + rng.normal(0, 0.07)
         ranges.append(RangeMeasurement(n, peer, n, (0.0, 0.0), (0.0, 0.0), distance, 0.1))
         if second % 10 == 0:
-            a_T_b = se2.between(here, there) + rng.normal(0, 0.1, 3)
-            closures.append(
-                ClosureMeasurement(len(chains) * second + peer.robot, True, n, peer, n,
-                            (float(a_T_b[0]), float(a_T_b[1]), float(a_T_b[2])),
-                            (0.01, 0.0, 0.0, 0.01, 0.0, 0.01))
-            )  # fmt: skip
+            x, y, theta = (se2.between(here, there) + rng.normal(0, 0.1, 3)).tolist()
+            number = len(chains) * second + peer.robot
+            covariance = (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)
+            closures.append(ClosureMeasurement(number, True, n, peer, n, (x, y, theta), covariance))
     return GraphEntry(second, None, (frame,), tuple(ranges), tuple(closures))
 
 
@@ -166,17 +164,24 @@ def by_team_size(quick: bool) -> Iterator[Row]:
             for _, channel, payload in member.traces.sent
         )
         of = f"one of {robots} robots with {neighbours:.1f} neighbours each"
-        yield Row(0, f"{of}, share of a core", share, "ratio", MOST_OF_A_CORE,
-                  curve=("robots", robots))  # fmt: skip
-        yield Row(0, f"{of}, sent in a minute", sent / 1e6 / robots, "MB",
-                  curve=("robots in the team", robots))  # fmt: skip
+        work, curve = f"{of}, share of a core", ("robots", robots)
+        yield Row(0, work, share, "ratio", MOST_OF_A_CORE, curve=curve)
+        work, curve = f"{of}, sent in a minute", ("robots in the team", robots)
+        yield Row(0, work, sent / 1e6 / robots, "MB", curve=curve)
 
 
 def crowd(robots: int) -> Recording:
     """A team on an area that grows with it, whose radios do not."""
     side = SQUARE_M * float(np.sqrt(robots))
-    scene = world.Scene(robots=robots, seconds=TEAM_S, speed=SPEED_MPS, width=side, height=side,
-                        odometry_hz=10, range_hz=10)  # fmt: skip
+    scene = world.Scene(
+        robots=robots,
+        seconds=TEAM_S,
+        speed=SPEED_MPS,
+        width=side,
+        height=side,
+        odometry_hz=10,
+        range_hz=10,
+    )
     recording = world.simulate(scene, 3)
     return replace(recording, ranges=recording.ranges[recording.ranges[:, 3] < RANGE_M])
 

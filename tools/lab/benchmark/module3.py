@@ -11,8 +11,9 @@ import numpy as np
 from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.optimizer.rbcd import riemannian_descent
-from lab.benchmark import distributed, graphs, timing
+from lab.benchmark import graphs, timing
 from lab.benchmark.graphs import Graph
+from lab.benchmark.over_messages import distributed
 from lab.benchmark.rows import Peer, Row
 from lab.recordings.recording import Array
 
@@ -57,10 +58,9 @@ def central(graph: Graph, quick: bool) -> Iterator[Row]:
     }
     times = timing.in_turns(programs, 15 if quick else 60, 4 if quick else 20)
     peers = _gtsam(times)
-    quoted = Peer("SE-Sync", SE_SYNC_MS[graph.name], False)
+    all_peers = (*peers, Peer("SE-Sync", SE_SYNC_MS[graph.name], False))
     found = times["whole"]
-    yield Row(3, f"{graph.name}, whole graph", found.median, "ms", whole, found.p99,
-              (*peers, quoted))  # fmt: skip
+    yield Row(3, f"{graph.name}, whole graph", found.median, "ms", whole, found.p99, all_peers)
     for peer in peers:
         yield Row(3, f"{graph.name}, ours / GTSAM", found.median / peer.value, "ratio", 0.2)
     found = times["more"]
@@ -100,10 +100,8 @@ def gtsam_solver(graph: Graph, start: Array) -> dict[str, Callable[[], object]]:
 
     read, place = graph.read, graph.place
     factors = gtsam.NonlinearFactorGraph()
-    for i, j, pose, information in zip(
-        place[read.i].tolist(), place[read.j].tolist(), read.measured, read.information,
-        strict=True,
-    ):  # fmt: skip
+    ends = place[read.i].tolist(), place[read.j].tolist()
+    for i, j, pose, information in zip(*ends, read.measured, read.information, strict=True):
         noise = gtsam.noiseModel.Gaussian.Information(information)
         factors.add(gtsam.BetweenFactorPose2(i, j, gtsam.Pose2(*pose), noise))
     prior = gtsam.noiseModel.Isotropic.Sigma(3, 1e-3)
@@ -129,25 +127,26 @@ def gtsam_solver(graph: Graph, start: Array) -> dict[str, Callable[[], object]]:
 def shared(graph: Graph, quick: bool) -> Iterator[Row]:
     """Rounds, bytes and CPU until every robot holds the optimum, without loss and with it."""
     clean = distributed.run(graph, 0.0, SHARED_GAP, ROUNDS)
-    team = graph.name.startswith("team")
-    robots = f"{graph.name} over {graph.known.robots} robots"
-    dpgo = DPGO_ROUNDS.get(graph.name)
-    quoted = () if dpgo is None else (Peer("DPGO", dpgo, False),)
+    name, team = f"{graph.name} over {graph.known.robots} robots", graph.name.startswith("team")
     never = float("inf")
-    goal = 5 if team else ROUNDS
-    yield Row(3, f"{robots}", clean.rounds or never, "rounds", goal, None, quoted)
-    dpgo_mb, dpgo_s = (Peer("DPGO", value, False) for value in (51.0, 22.0))
-    yield Row(3, f"{robots}, sent by all", clean.megabytes, "MB", 0.25 if team else None, None,
-              (dpgo_mb,) if team else ())  # fmt: skip
-    yield Row(3, f"{robots}, CPU of all", clean.cpu_s, "s", 0.1 if team else None, None,
-              (dpgo_s,) if team else ())  # fmt: skip
+    rounds = clean.rounds or never
+    peers = _dpgo(DPGO_ROUNDS.get(graph.name))
+    yield Row(3, name, rounds, "rounds", 5 if team else ROUNDS, peers=peers)
+    goal_mb, goal_s = (0.25, 0.1) if team else (None, None)
+    dpgo_mb, dpgo_s = (_dpgo(value if team else None) for value in (51.0, 22.0))
+    yield Row(3, f"{name}, sent by all", clean.megabytes, "MB", goal_mb, peers=dpgo_mb)
+    yield Row(3, f"{name}, CPU of all", clean.cpu_s, "s", goal_s, peers=dpgo_s)
     seeds = range(1 if quick else 10)
     lossy = [distributed.run(graph, LOSS, SHARED_GAP, ROUNDS, seed) for seed in seeds]
-    rounds = [outcome.rounds or never for outcome in lossy]
-    yield Row(3, f"{robots}, {LOSS:.0%} lost, median of {len(lossy)}", float(np.median(rounds)),
-              "rounds", 2 * (clean.rounds or never))  # fmt: skip
-    yield Row(3, f"{robots}, {LOSS:.0%} lost, sent by all",
-              float(np.median([outcome.megabytes for outcome in lossy])), "MB")  # fmt: skip
+    lost = f"{name}, {LOSS:.0%} lost"
+    median = float(np.median([outcome.rounds or never for outcome in lossy]))
+    yield Row(3, f"{lost}, median of {len(lossy)}", median, "rounds", 2 * rounds)
+    megabytes = float(np.median([outcome.megabytes for outcome in lossy]))
+    yield Row(3, f"{lost}, sent by all", megabytes, "MB")
+
+
+def _dpgo(value: float | None) -> tuple[Peer, ...]:
+    return () if value is None else (Peer("DPGO", value, False),)
 
 
 def plain_block_descent(graph: Graph, rounds: int) -> Iterator[Row]:
@@ -191,8 +190,9 @@ def _descended(graph: Graph, lifted: Array, robot: Array, number: int) -> Array:
         numbered(inside_i & inside_j, True, True),
         numbered(inside_i & ~inside_j, True, False),
         numbered(~inside_i & inside_j, False, True),
-        lifted, len(mine),
-    )  # fmt: skip
+        lifted,
+        len(mine),
+    )
     out = lifted.copy()
     out[mine] = riemannian_descent.rows(
         riemannian_descent.descend(block, riemannian_descent.stacked(lifted[mine]))

@@ -71,10 +71,7 @@ def markdown(rows: list[Row]) -> str:
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for row in rows:
-        here = "; ".join(
-            f"{p.name} {_number(p.value)} ({p.value / row.value:.1f} x)" if row.value else p.name
-            for p in row.peers if p.here
-        )  # fmt: skip
+        here = "; ".join(_beside(row.value, p) for p in row.peers if p.here)
         there = "; ".join(f"{p.name} {_number(p.value)}" for p in row.peers if not p.here)
         goal = "" if row.goal is None else f"{_number(row.goal)} {'✓' if row.is_met else 'MISSED'}"
         p99 = "" if row.p99 is None else _number(row.p99)
@@ -83,6 +80,11 @@ def markdown(rows: list[Row]) -> str:
             f"| {row.module or 'all'} | {row.work} | {value} | {p99} | {goal} | {here} | {there} |"
         )
     return "\n".join(lines)
+
+
+def _beside(value: float, peer: Peer) -> str:
+    times = f" {_number(peer.value)} ({peer.value / value:.1f} x)" if value else ""
+    return peer.name + times
 
 
 def _number(value: float) -> str:

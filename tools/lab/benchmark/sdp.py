@@ -61,20 +61,18 @@ def relaxed(window: Window) -> Relaxed:
     unit = float(window.ranges.mean())
     a, b, r = window.a_points / unit, window.b_points / unit, window.ranges / unit
     cross = a[:, 1] * b[:, 0] - a[:, 0] * b[:, 1]
-    h = np.column_stack([
-        (a**2).sum(axis=1) + (b**2).sum(axis=1) - r**2, -2 * (a * b).sum(axis=1), -2 * cross,
-        -2 * a, 2 * b, np.ones(len(r)),
-    ]) / (2 * r)[:, None]  # fmt: skip
+    squares, dot = (a**2 + b**2).sum(axis=1) - r**2, (a * b).sum(axis=1)
+    h = np.column_stack([squares, -2 * dot, -2 * cross, -2 * a, 2 * b, np.ones(len(r))])
+    h /= (2 * r)[:, None]
     rows, columns, cone = _triangle()
     cost = (h.T @ h)[rows, columns] * np.where(rows == columns, 1.0, 2.0)
     ties, right = _ties()
     settings = clarabel.DefaultSettings()
     settings.verbose = False
-    solution = clarabel.DefaultSolver(
-        sparse.csc_matrix((len(cost), len(cost))), cost,
-        sparse.vstack([ties, -cone]).tocsc(), np.concatenate([right, np.zeros(len(cost))]),
-        [clarabel.ZeroConeT(len(right)), clarabel.PSDTriangleConeT(SIZE)], settings,
-    ).solve()  # fmt: skip
+    quadratic = sparse.csc_matrix((len(cost), len(cost)))
+    left, held = sparse.vstack([ties, -cone]).tocsc(), np.concatenate([right, 0 * cost])
+    cones = [clarabel.ZeroConeT(len(right)), clarabel.PSDTriangleConeT(SIZE)]
+    solution = clarabel.DefaultSolver(quadratic, cost, left, held, cones, settings).solve()
     full = np.zeros((SIZE, SIZE))
     full[rows, columns] = full[columns, rows] = solution.x
     values, vectors = np.linalg.eigh(full)

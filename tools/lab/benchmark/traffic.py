@@ -53,7 +53,7 @@ def rows(quick: bool) -> Iterator[Row]:
         work = f"paper's experiment at {rate_hz} Hz, sent by all robots"
         if quick:
             work += ", its first quarter"
-        peer = Peer(f"paper; ours by kind: {parts}; joint ATE {ate:.3f} m",
-                    share * PAPER_MB[rate_hz], False)  # fmt: skip
+        said = f"paper; ours by kind: {parts}; joint ATE {ate:.3f} m"
+        peer = Peer(said, share * PAPER_MB[rate_hz], False)
         goal = None if quick else GOAL_MB[rate_hz]
         yield Row(0, work, sum(kinds.values()) / 1e6, "MB", goal, peers=(peer,))

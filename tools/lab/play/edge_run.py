@@ -128,9 +128,11 @@ def _covariance(recording: EdgeRecording) -> Array:
 
 
 def _logs(
-    recording: EdgeRecording, chains: dict[int, Chains], kept: NDArray[np.bool_],
+    recording: EdgeRecording,
+    chains: dict[int, Chains],
+    kept: NDArray[np.bool_],
     noise: OdometryNoise,
-) -> dict[int, list[GraphEntry]]:  # fmt: skip
+) -> dict[int, list[GraphEntry]]:
     """What each robot would have told the others."""
     covariance = se2.packed(_covariance(recording))
     logs = {}

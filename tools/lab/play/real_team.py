@@ -110,11 +110,11 @@ class RealRobot:
             "PYTHONPATH": os.pathsep.join(sys.path),
         }
         with self.log.open("ab") as log:
+            program = (sys.executable, "-m", "lab.play.skewed_daemon")
+            arguments = (str(self.config), str(self.clock.offset_us), str(self.clock.ppm))
             self.process = await asyncio.create_subprocess_exec(
-                sys.executable, "-m", "lab.play.skewed_daemon", str(self.config),
-                str(self.clock.offset_us), str(self.clock.ppm),
-                stderr=log, env=environment,
-            )  # fmt: skip
+                *program, *arguments, stderr=log, env=environment
+            )
 
     async def ready(self) -> None:
         """
@@ -253,9 +253,8 @@ class RealTeam:
             clock = self.clock(robot)
             answers = [await ask(robot.socket, q) for q in ("trajectory", "closures", "status")]
             add_answers(out, number, clock, *answers)
-            out.live[number] = live_path([
-                [clock.world(m.pose_utime) / 1e6, *m.pose, m.frame] for m in self._live[number]
-            ])  # fmt: skip
+            rows = [[clock.world(m.pose_utime) / 1e6, *m.pose, m.frame] for m in self._live[number]]
+            out.live[number] = live_path(rows)
             for name, ms in answers[2]["ms"].items():
                 out.ms[name] += ms["all"]
         return out

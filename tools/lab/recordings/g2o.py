@@ -64,10 +64,10 @@ def read(path: Path) -> G2o:
     if not ends:
         raise BadRecording(f"{path.name}: no EDGE_SE2 line")
     named = np.array(ends, dtype=np.int64)
-    build_problem = np.array(list(vertices), dtype=np.int64)
-    ids = np.unique(np.concatenate([named.ravel(), build_problem]))
+    stated = np.array(list(vertices), dtype=np.int64)
+    ids = np.unique(np.concatenate([named.ravel(), stated]))
     poses = np.full((len(ids), 3), np.nan)
-    poses[np.searchsorted(ids, build_problem)] = np.array(list(vertices.values())).reshape(-1, 3)
+    poses[np.searchsorted(ids, stated)] = np.array(list(vertices.values())).reshape(-1, 3)
     i, j = np.searchsorted(ids, named).T
     table = np.array(values)
     information = table[:, [3, 4, 5, 4, 6, 7, 5, 7, 8]].reshape(-1, 3, 3)

@@ -65,10 +65,9 @@ def read(path: Path, seed: int = 0) -> Recording:
     metres = table[f"{TAG}_{TAG}"]
     who = np.tile(np.array(robots, dtype=float), (len(t), 1))
     antennas = mounted(table, poses[robots[0]], poses[robots[1]])
-    return Recording(
-        path.name, trails, np.column_stack([t, who, metres]),
-        antennas=dict(zip(robots, antennas, strict=True)),
-    )  # fmt: skip
+    ranges = np.column_stack([t, who, metres])
+    named = dict(zip(robots, antennas, strict=True))
+    return Recording(path.name, trails, ranges, antennas=named)
 
 
 def _poses(table: dict[str, Array], side: str) -> Array:

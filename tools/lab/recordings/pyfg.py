@@ -132,8 +132,8 @@ def write(path: Path, recording: Recording, range_sigma: float, odometry_sigmas:
     """Write a recording so that `read` gives it back.
 
     Args:
-        range_sigma: m, build_problem in the file.
-        odometry_sigmas: (3,) of one edge, build_problem in the file.
+        range_sigma: m, stated in the file.
+        odometry_sigmas: (3,) of one edge, stated in the file.
     """
     lines, edges = [], []
     xx, yy, tt = (f"{s * s:.9g}" for s in odometry_sigmas)

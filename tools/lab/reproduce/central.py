@@ -77,10 +77,11 @@ class Measured:
 def solve(trial: Trial) -> dict[int, Array]:
     """Poses (n, 3) of each robot at the pose times, in the frame of the truth."""
     data, size = measured(trial), len(POSE_TIMES)
-    poses = np.concatenate([
+    reckoned = [
         metrics.compose(trial.truth[r][:1], metrics.relative(o[:1], o))
         for r, o in sorted(trial.odometry.items())
-    ])  # fmt: skip
+    ]
+    poses = np.concatenate(reckoned)
     damping = 1e-6
     error, slope = _linearised(data, poses)
     for _ in range(STEPS):

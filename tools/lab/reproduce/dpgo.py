@@ -120,11 +120,14 @@ def _linearised(problem: Graph, poses: Array) -> tuple[Array, csc_array]:
     error = np.concatenate([kappa * (z[e.j] - turned), tau * (p[e.j] - p[e.i] - shifted)])
     one, m = np.ones(len(rows), dtype=complex), len(rows)
     parts = [
-        (rows, 3 * e.j + 2, 1j * kappa * z[e.j]), (rows, 3 * e.i + 2, -1j * kappa * turned),
-        (rows + m, 3 * e.j, tau * one), (rows + m, 3 * e.i, -tau * one),
-        (rows + m, 3 * e.j + 1, 1j * tau), (rows + m, 3 * e.i + 1, -1j * tau),
+        (rows, 3 * e.j + 2, 1j * kappa * z[e.j]),
+        (rows, 3 * e.i + 2, -1j * kappa * turned),
+        (rows + m, 3 * e.j, tau * one),
+        (rows + m, 3 * e.i, -tau * one),
+        (rows + m, 3 * e.j + 1, 1j * tau),
+        (rows + m, 3 * e.i + 1, -1j * tau),
         (rows + m, 3 * e.i + 2, -1j * tau * shifted),
-    ]  # fmt: skip
+    ]
     row, column, value = (np.concatenate(c) for c in zip(*parts, strict=True))
     places = (np.concatenate([row, row + 2 * m]), np.concatenate([column, column]))
     values = np.concatenate([value.real, value.imag])

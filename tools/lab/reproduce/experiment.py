@@ -180,10 +180,10 @@ def calibrated(seeds: Sequence[int]) -> world.OdometryModel:
         return float(np.mean(errors))
 
     def solved(name: str, which: int, model: world.OdometryModel, most: float) -> float:
-        return float(brentq(
-            lambda value: mean(replace(model, **{name: value}), which) - PRINTED_ODOMETRY[which],
-            0.0, most, xtol=1e-3,
-        ))  # fmt: skip
+        def above(value: float) -> float:
+            return mean(replace(model, **{name: value}), which) - PRINTED_ODOMETRY[which]
+
+        return float(brentq(above, 0.0, most, xtol=1e-3))
 
     model = replace(WHEELS, yaw_deg_per_m=solved("yaw_deg_per_m", 1, WHEELS, 1.0))
     return replace(model, scale=solved("scale", 0, model, 0.3))

@@ -28,12 +28,13 @@ from lab.reproduce.experiment import WHEELS, Trial
 SIGMA_R = RelativePoseSection().range_sigma_m
 DELTA = RelativePoseSection().delta
 EPSILON = ConsistencySection().epsilon
-NOISE = settings.odometry_noise(OdometrySection(
+TOLD = OdometrySection(
     scale_sigma=WHEELS.scale,
     yaw_sigma_deg_per_m=WHEELS.yaw_deg_per_m,
     random_translation_per_sqrt_m=WHEELS.translation_per_sqrt_m,
     random_yaw_deg_per_sqrt_m=WHEELS.yaw_deg_per_sqrt_m,
-))  # fmt: skip
+)
+NOISE = settings.odometry_noise(TOLD)
 """The sigmas that the simulated wheels have: the authors knew their robots. The column "drslamd" is
 not told."""
 
@@ -103,9 +104,8 @@ def consistency(trial: Trial, pair: tuple[int, int], found: Closures) -> list[Ar
     # an epsilon near one makes no edges: only the lengths are wanted here
     checked = PairConsistency(NOISE, NOISE, 1 - 1e-9)
     for number, k in enumerate(found.k.tolist()):
-        checked.add(Candidate(
-            number, found.poses[number], found.covariances[number], a[k], b[k], a_sums[k], b_sums[k]
-        ))  # fmt: skip
+        pose, covariance = found.poses[number], found.covariances[number]
+        checked.add(Candidate(number, pose, covariance, a[k], b[k], a_sums[k], b_sums[k]))
     return [checked.distances(k) for k in range(len(found.k))]
 
 

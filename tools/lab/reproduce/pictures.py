@@ -63,8 +63,9 @@ def rivalry(cost: Array) -> float:
 
 def heat_maps(data: Trial, path: Path) -> None:
     """The easiest and the most ambiguous of some windows: both paths, and the residual."""
-    windows = [w for pair in PAIRS for k in range(0, len(data.truth[0]), 20)
-               if (w := data.window(pair, k, SHOWN_TAU)) is not None]  # fmt: skip
+    some = range(0, len(data.truth[0]), 20)
+    all_of_them = (data.window(pair, k, SHOWN_TAU) for pair in PAIRS for k in some)
+    windows = [window for window in all_of_them if window is not None]
     maps = [mean_residuals(window) for window in windows]
     order = np.argsort([rivalry(cost) for _, cost in maps])
     figure, axes = plt.subplots(2, 2, figsize=(9, 8), dpi=110)

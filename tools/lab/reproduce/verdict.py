@@ -56,11 +56,12 @@ def checks(total: Tally) -> list[Check]:
 
 def _data(total: Tally) -> list[Check]:
     """Is odometry as wrong as the paper's?"""
-    return [
-        within(f"odometry alone, {unit}", total[f"odometry/{unit}"].mean,
-               wanted * (1 - CALIBRATED), wanted * (1 + CALIBRATED))
-        for unit, wanted in zip(("m", "deg"), printed.TABLE_3["odometry"], strict=True)
-    ]  # fmt: skip
+    out = []
+    for unit, (wanted, _) in zip(("m", "deg"), printed.TABLE_3["odometry"], strict=True):
+        low, high = wanted * (1 - CALIBRATED), wanted * (1 + CALIBRATED)
+        reached = total[f"odometry/{unit}"].mean
+        out.append(within(f"odometry alone, {unit}", reached, low, high))
+    return out
 
 
 def _shape(total: Tally) -> list[Check]:
@@ -71,10 +72,8 @@ def _shape(total: Tally) -> list[Check]:
             both = total[f"table1/{tau}/both/{unit}"].mean
             for part in ("nls", "coarse"):
                 alone = total[f"table1/{tau}/{part}/{unit}"].mean
-                out.append(at_most(
-                    f"paper, tau {tau}: coarse + NLS against {part} alone, {unit}",
-                    both, alone,
-                ))  # fmt: skip
+                words = f"paper, tau {tau}: coarse + NLS against {part} alone, {unit}"
+                out.append(at_most(words, both, alone))
     for one, more in pairwise(WINDOW_TAUS):
         for unit in ("m", "deg"):
             short, long = (total[f"table1/{tau}/both/{unit}"].mean for tau in (one, more))
@@ -85,20 +84,17 @@ def _shape(total: Tally) -> list[Check]:
             before, there, after = (
                 total[f"{name}/{when}/{unit}"].mean for when in ("before", "there", "after")
             )
+            row = f"paper, tau {tau}, epsilon {epsilon}"
             if epsilon is not None:
-                out.append(at_most(
-                    f"paper, tau {tau}, epsilon {epsilon}: PCM lowers the error, {unit}",
-                    before, total[f"table2/{tau}/None/before/{unit}"].mean,
-                ))  # fmt: skip
-            words = f"paper, tau {tau}, epsilon {epsilon}: DPGO lowers it again"
+                raw = total[f"table2/{tau}/None/before/{unit}"].mean
+                out.append(at_most(f"{row}: PCM lowers the error, {unit}", before, raw))
+            words = f"{row}: DPGO lowers it again"
             out.append(at_most(f"{words}, where closures were kept, {unit}", there, before))
             out.append(at_most(f"{words}, at all pose times, {unit}", after, before))
     for unit, wanted in zip(("m", "deg"), printed.TABLE_2[BEST_ROW][3:], strict=True):
-        out.append(within(
-            f"paper, DPGO at tau 50, epsilon 0.5, {unit}",
-            total[f"table2/{BEST_ROW[0]}/{BEST_ROW[1]}/after/{unit}"].mean,
-            wanted / LIKE_PRINTED, wanted * LIKE_PRINTED,
-        ))  # fmt: skip
+        words = f"paper, DPGO at tau 50, epsilon 0.5, {unit}"
+        reached = total[f"table2/{BEST_ROW[0]}/{BEST_ROW[1]}/after/{unit}"].mean
+        out.append(within(words, reached, wanted / LIKE_PRINTED, wanted * LIKE_PRINTED))
     return out
 
 
@@ -113,15 +109,16 @@ def _computed(total: Tally) -> list[tuple[int, float | None]]:
 
 def _beaten(total: Tally) -> list[Check]:
     """Is this system at most half as wrong, at every row?"""
-    out = [at_least("drslamd, share of poses localised in one frame",
-                    total["drslamd/localised"].mean, 1.0)]  # fmt: skip
+    localised = total["drslamd/localised"].mean
+    out = [at_least("drslamd, share of poses localised in one frame", localised, 1.0)]
     for tau, epsilon in _computed(total):
         for unit in ("m", "deg"):
             paper = total[f"table2/{tau}/{epsilon}/after/{unit}"].mean
-            out.append(at_most(
-                f"drslamd against half of the paper's row tau {tau}, epsilon {epsilon}, {unit}",
-                total[f"drslamd/after/{unit}"].mean, HALF * paper,
-            ))  # fmt: skip
+            ours = total[f"drslamd/after/{unit}"].mean
+            row = f"tau {tau}, epsilon {epsilon}, {unit}"
+            out.append(
+                at_most(f"drslamd against half of the paper's row {row}", ours, HALF * paper)
+            )
     for unit, limit in (("m", BEST_M), ("deg", BEST_DEG)):
         out.append(at_most(f"drslamd, final, {unit}", total[f"drslamd/after/{unit}"].mean, limit))
     return out
@@ -130,29 +127,29 @@ def _beaten(total: Tally) -> list[Check]:
 def _honest(total: Tally) -> list[Check]:
     """Are claimed covariances true?"""
     short = f"table1/{WINDOW_TAUS[0]}/drslamd"
-    out = []
-    answers = total[f"{short}/claim/below"]
-    if answers.n:
-        out += [
-            at_least("closures at tau 10 not marked ambiguous: squared Mahalanobis <= 14.2",
-                     answers.mean, 0.98),
-            at_most("closures at tau 10 not marked ambiguous: squared Mahalanobis > 50",
-                    total[f"{short}/claim/wild"].mean, 0.0),
-        ]  # fmt: skip
+    words = "closures at tau 10 not marked ambiguous"
+    if total[f"{short}/claim/below"].n:
+        out = _claims(total, f"{short}/claim", words)
     else:
         asked = total[f"{short}/unique"].n
-        name = f"closures at tau 10 not marked ambiguous: none among {asked} windows"
-        out.append(Check(name, None, "98 % of them honest", asked > 0))
-    claim = "drslamd/claim"
+        name = f"{words}: none among {asked} windows"
+        out = [Check(name, None, "98 % of them honest", asked > 0)]
+    nees, published = total["drslamd/claim/nees"].mean, "drslamd/published"
+    published_nees = total[f"{published}/nees"].mean
+    inside = total[f"{published}/inside"].mean
     return [
         *out,
-        at_least("closures of the daemon's windows: squared Mahalanobis <= 14.2",
-                 total[f"{claim}/below"].mean, 0.98),
-        at_most("closures of the daemon's windows: squared Mahalanobis > 50",
-                total[f"{claim}/wild"].mean, 0.0),
-        within("closures: NEES per degree of freedom", total[f"{claim}/nees"].mean, 0.8, 1.25),
-        within("published poses: NEES per degree of freedom",
-               total["drslamd/published/nees"].mean, 0.8, 1.25),
-        within("published poses: share inside the 95 % ellipse",
-               total["drslamd/published/inside"].mean, 0.90, 0.99),
-    ]  # fmt: skip
+        *_claims(total, "drslamd/claim", "closures of the daemon's windows"),
+        within("closures: NEES per degree of freedom", nees, 0.8, 1.25),
+        within("published poses: NEES per degree of freedom", published_nees, 0.8, 1.25),
+        within("published poses: share inside the 95 % ellipse", inside, 0.90, 0.99),
+    ]
+
+
+def _claims(total: Tally, name: str, words: str) -> list[Check]:
+    """Squared errors of closures against what they claim."""
+    below, wild = total[f"{name}/below"].mean, total[f"{name}/wild"].mean
+    return [
+        at_least(f"{words}: squared Mahalanobis <= 14.2", below, 0.98),
+        at_most(f"{words}: squared Mahalanobis > 50", wild, 0.0),
+    ]

@@ -1,0 +1,45 @@
+"""The robot's clock is one that nobody can set; the wall clock only numbers starts."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from drslamd.io.clock import MonotonicClock, wall_epoch
+
+
+def test_the_clock_is_the_kernels_monotonic_one() -> None:
+    before = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1_000
+    now = MonotonicClock().now()
+    after = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1_000
+    assert before <= now <= after
+    assert isinstance(now, int)
+
+
+def test_two_clocks_of_one_host_agree_and_grow() -> None:
+    clocks = [MonotonicClock(), MonotonicClock()]
+    read = [clocks[k % 2].now() for k in range(1_000)]
+    assert read == sorted(read)
+    time.sleep(0.01)
+    assert clocks[0].now() - read[-1] >= 10_000
+
+
+def test_setting_the_wall_clock_moves_the_clock_by_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock = MonotonicClock()
+    before = clock.now()
+    for name, value in (("time", 4e9), ("time_ns", 4 * 10**18)):
+        monkeypatch.setattr(time, name, lambda value=value: value)
+    assert 0 <= clock.now() - before < 60_000_000
+
+
+@pytest.mark.parametrize(
+    ("ns", "epoch"), [(1_764_000_000_123_999_999, 1_764_000_000_123), (0, 0), (999_999, 0)]
+)
+def test_an_epoch_is_the_wall_clock_in_milliseconds(
+    ns: int, epoch: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(time, "time_ns", lambda: ns)
+    assert wall_epoch() == epoch

@@ -1,0 +1,29 @@
+"""What grows, on small inputs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from lab.benchmark import growth
+
+
+def test_time_by_hours_is_a_row_for_each_mark_and_their_ratio(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(growth, "HOURS", {"1 min": 60, "2 min": 120, "1 h": 120})
+    monkeypatch.setattr(growth, "AT_A_MARK", 2)
+    rows = list(growth.by_hours(quick=True))
+    assert [row.unit for row in rows] == ["ms", "ms", "ms", "ratio"]
+    assert "186 keyframes" in rows[0].work
+    assert rows[-1].value == pytest.approx(rows[2].value / rows[0].value)
+
+
+def test_in_a_crowd_nobody_measures_beyond_the_reach_of_the_radio(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(growth, "TEAM_S", 5.0)
+    monkeypatch.setattr(growth, "RANGE_M", 6.0)
+    recording = growth.crowd(6)
+    assert recording.ranges[:, 3].max() < 6.0
+    ends = np.array([trail.truth[0, :2] for trail in recording.trails.values()])
+    assert np.abs(ends).max() < growth.SQUARE_M * np.sqrt(6)

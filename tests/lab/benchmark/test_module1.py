@@ -1,0 +1,21 @@
+"""The peers of module 1 find what is to be found."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from lab.benchmark import module1, windows
+
+from drslamd.slam import se2
+
+
+def test_the_peers_of_module_1_find_the_pose() -> None:
+    rng = np.random.default_rng(2)
+    for _ in range(3):
+        window, a_T_b = windows.window(rng, 200)
+        for found in (module1.grid(window), module1.one_seed(window)[0]):
+            error = se2.between(a_T_b, found)
+            assert np.hypot(*error[:2]) < 1.0
+        minimum, cost = module1.polished(window, a_T_b)
+        nudged = [module1.polished(window, minimum + step)[1] for step in np.eye(3) * 0.01]
+        assert cost == pytest.approx(min(nudged), rel=1e-6)

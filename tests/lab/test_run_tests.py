@@ -1,0 +1,84 @@
+"""tools/test: which steps there are, and when it fails."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+from lab import run_tests
+from places import REPOSITORY
+
+STEPS = ["lint", "format", "types", "quick tests", "slow tests"]
+
+
+class Steps:
+    """What would have been run; the named ones fail."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.names: list[str] = []
+        self.commands: dict[str, tuple[str, ...]] = {}
+        self.failing: set[str] = set()
+        self.others: list[str] = []
+        monkeypatch.setattr(run_tests, "_run", self._run)
+        monkeypatch.setattr(run_tests, "_other_interpreters", lambda: self.others)
+
+    def _run(self, name: str, *command: str) -> int:
+        self.names.append(name)
+        self.commands[name] = command
+        return int(name in self.failing)
+
+
+@pytest.fixture
+def steps(monkeypatch: pytest.MonkeyPatch) -> Steps:
+    return Steps(monkeypatch)
+
+
+def test_everything_is_run_and_quick_leaves_the_slow_out(steps: Steps) -> None:
+    assert run_tests.main([]) == 0
+    assert steps.names == STEPS
+    steps.names.clear()
+    assert run_tests.main(["--quick"]) == 0
+    assert steps.names == STEPS[:-1]
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_one_step_that_fails_does_not_stop_the_others(
+    steps: Steps, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    steps.failing = {name}
+    assert run_tests.main([]) == 1
+    assert steps.names == STEPS
+    assert f"FAILED: {name}\n" in capsys.readouterr().out
+
+
+def test_another_interpreter_that_fails_counts_unless_it_is_quick(steps: Steps) -> None:
+    steps.others = ["Python 3.10"]
+    assert run_tests.main([]) == 1
+    assert run_tests.main(["--quick"]) == 0
+
+
+def test_arguments_go_to_pytest_alone(steps: Steps) -> None:
+    assert run_tests.main(["--", "-k", "clock"]) == 0
+    assert steps.commands == {"tests": (sys.executable, "-m", "pytest", "-k", "clock")}
+
+
+def test_types_are_checked_of_every_test_file(steps: Steps) -> None:
+    run_tests.main(["--quick"])
+    files = {str(p.relative_to(REPOSITORY)) for p in (REPOSITORY / "tests").rglob("*.py")}
+    assert files <= set(steps.commands["types"])
+
+
+def test_an_interpreter_is_found_when_it_says_its_version(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path) + os.pathsep + "/nowhere")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert run_tests._find("3.12") is None
+    for version, answer in (("3.12", "3.12"), ("3.13", "3.11")):
+        program = tmp_path / f"python{version}"
+        program.write_text(f"#!/bin/sh\necho {answer}\n")
+        program.chmod(0o755)
+    assert run_tests._find("3.12") == str(tmp_path / "python3.12")
+    assert run_tests._find("3.13") is None

@@ -1,0 +1,155 @@
+"""Every value of a kind that a key does not take: one plain sentence, in words of the file."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+import tomli
+from deploy_helpers import EXAMPLE
+from pydantic import BaseModel
+
+from drslamd import config
+from drslamd.config import SOURCES, CanWheelSection, Config, ConfigError, parse
+
+WRONG = [
+    *("3", "3.5", "nan", "-1e300", "true", '"magic"', "''", "[1]", "[[1]]", "{x = 1}"),
+    *("2026-01-31", "07:30:00", "2026-01-31T07:30:00Z"),
+]
+"""One value of each kind that TOML knows, and some that fit no bounds."""
+
+BASE: dict[str, str] = {
+    "robot": "id = 3",
+    "team": "insecure = true",
+    "uwb": 'port = "/dev/uwb"',
+    "wheels": 'source = "kobuki"\nport = "/dev/wheels"',
+}
+CLASSES = {name for name, of in vars(config).items() if isinstance(of, type)}
+FOREIGN = {"Input", "instance", "dictionary", "object", "pydantic", "tomli", "sys", "datetime"}
+"""Words of Python and its libraries."""
+
+
+def faults(text: str) -> list[str]:
+    """What is said about a file; nothing when it can be used."""
+    try:
+        parse(text)
+    except ConfigError as error:
+        return error.faults
+    return []
+
+
+def file_with(section: str, lines: str) -> str:
+    sections = {**BASE, section: lines}
+    return "\n".join(f"[{name}]\n{text}" for name, text in sections.items())
+
+
+def plain_sections() -> dict[str, type[BaseModel]]:
+    """Sections of one kind, by their names in the file."""
+    found: dict[str, Any] = {
+        name: field.annotation for name, field in Config.model_fields.items() if name != "wheels"
+    }
+    return found
+
+
+def keys() -> list[tuple[str, str, str]]:
+    """Section, key, and what else stands there, for each key that there is."""
+    plain = plain_sections().items()
+    found = [(name, key, "") for name, model in plain for key in model.model_fields]
+    for source, model in SOURCES.items():
+        tag = f'source = "{source}"\n'
+        found += [("wheels", key, tag) for key in model.model_fields if key != "source"]
+        if issubclass(model, CanWheelSection):
+            can = type(model.model_fields["can"].default).model_fields
+            found += [("wheels", f"can.{key}", tag) for key in can]
+    return found
+
+
+def is_plain(sentence: str) -> bool:
+    words = set(sentence.replace(":", " ").replace(",", " ").replace(".", " ").split())
+    return sentence.isprintable() and not words & (CLASSES | FOREIGN)
+
+
+@pytest.mark.parametrize("value", WRONG)
+def test_a_value_of_another_kind_is_told_what_the_key_takes(value: str) -> None:
+    refused = 0
+    for section, key, rest in keys():
+        said = faults(file_with(section, f"{rest}{key} = {value}"))
+        about = [sentence for sentence in said if sentence.startswith(f"{section}.{key} = ")]
+        assert all(map(is_plain, said)), said
+        for sentence in about:
+            assert sentence.partition(": ")[2]
+        refused += bool(about)
+    assert refused > len(keys()) / 4
+
+
+@pytest.mark.parametrize("value", ["3", '"rbcd"', "true", "[1]", "2026-01-31", "[]"])
+@pytest.mark.parametrize("section", Config.model_fields)
+def test_a_value_in_the_place_of_a_section_is_told_what_stands_there(
+    section: str, value: str
+) -> None:
+    others = "\n".join(f"[{k}]\n{text}" for k, text in BASE.items() if k != section)
+    (sentence,) = faults(f"{section} = {value}\n{others}")
+    first = next(iter(plain_sections()[section].model_fields)) if section != "wheels" else "source"
+    assert sentence.startswith(f"{section} = ")
+    assert f": a section, [{section}], with {first}" in sentence
+    assert is_plain(sentence)
+
+
+def test_what_belongs_to_a_section_inside_a_section_is_told_as_well() -> None:
+    (sentence,) = faults(file_with("wheels", 'source = "agilex"\ntrack_m = 0.5\ncan = "can0"'))
+    assert sentence == (
+        "wheels.can = 'can0': a section, [wheels.can], with interface, channel, bitrate"
+    )
+
+
+def test_a_missing_section_and_a_missing_key_are_told_what_they_are() -> None:
+    robot, team, uwb, wheels = faults("")
+    assert robot == "robot: missing; a section, [robot], with id"
+    assert team == "team: missing; a section, [team], with key_file, insecure"
+    assert uwb.startswith("uwb: missing; a section, [uwb], with port, baud, id, max_range_m, ")
+    assert wheels == "wheels: missing; a section, [wheels], with source and what belongs to it"
+    (sentence,) = faults(file_with("robot", ""))
+    assert sentence == "robot.id: missing; a whole number, at least 0 and at most 254"
+
+
+@pytest.mark.parametrize(
+    ("section", "line", "allowed"),
+    [
+        ("optimizer", "rate_hz = 0", "a number, above 0 and at most 50"),
+        ("consistency", "epsilon = 1.0", "a number, above 0 and below 1"),
+        ("uwb", 'port = "x"\nid = -1', "a whole number, at least 0 and at most 4294967295"),
+        ("daemon", 'log_level = "loud"', 'allowed are "debug", "info", "warning", "error"'),
+        ("daemon", "log_level = 3", 'allowed are "debug", "info", "warning", "error"'),
+    ],
+)
+def test_the_bounds_are_those_of_the_key(section: str, line: str, allowed: str) -> None:
+    (sentence,) = faults(file_with(section, line))
+    assert sentence.endswith(f": {allowed}")
+
+
+def test_no_value_and_no_key_makes_a_sentence_long() -> None:
+    long = "x" * 10_000
+    for line in (f'id = "{long}"', f"id = 3\n{long} = 1", f'id = 3\n"\\n{long}" = 1'):
+        assert max(map(len, faults(file_with("robot", line)))) < 200
+
+
+def test_whole_numbers_serve_as_numbers_and_no_other_kind_serves_as_another() -> None:
+    assert parse(file_with("optimizer", "rate_hz = 2")).optimizer.rate_hz == 2.0
+    for line in ("id = 3.0", "id = true", 'id = "3"'):
+        assert faults(file_with("robot", line))
+    for line in ("insecure = 1", 'insecure = "true"'):
+        assert faults(file_with("team", line))
+
+
+@pytest.mark.parametrize("value", ["inf", "-inf", "nan"])
+def test_no_key_takes_a_number_that_is_not_finite(value: str) -> None:
+    for section, key, rest in keys():
+        said = faults(file_with(section, f"{rest}{key} = {value}"))
+        assert any(sentence.startswith(f"{section}.{key} = {value}: ") for sentence in said), key
+
+
+def test_every_kind_of_value_is_tried() -> None:
+    tried = {type(tomli.loads(f"x = {value}")["x"]) for value in WRONG}
+    example = tomli.loads(EXAMPLE.read_text())
+    assert len(tried) == 9
+    assert {type(v) for section in example.values() for v in section.values()} <= tried
