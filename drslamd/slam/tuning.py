@@ -20,17 +20,13 @@ class Tuning:
     Attributes:
         ranges: the model of a range.
         confirm_us: see `WindowRule.confirm_us`.
-        learns_scatter: do closures claim what ranges were seen to scatter, or what is configured?
         scale_tails: see `banded_optimizer.SCALE_TAILS`.
-        has_cauchy_priors: have biases and scales heavy tails, or those of Gauss?
         believable: see `gnc.BELIEVABLE`.
     """
 
     ranges: RangeModel = LINKTRACK
     confirm_us: int = CONFIRM_US
-    learns_scatter: bool = True
     scale_tails: float = SCALE_TAILS
-    has_cauchy_priors: bool = True
     believable: float = BELIEVABLE
 
 

@@ -14,7 +14,6 @@ from drslamd.slam.calibration.sensor_calibration import (
     MOST_YAW_RATE,
     NOTHING,
     UNLEARNED,
-    WIDENED,
     SensorCalibration,
     is_value,
 )
@@ -90,8 +89,7 @@ class CalibrationStore:
 
 def _is_better(now: Learned, kept: Learned, change: float, most: float) -> bool:
     """Does this start know more than the one before it did, seen from now?"""
-    widened = math.hypot(WIDENED * kept.sigma, change)
-    return is_value(now, most) and WIDENED * now.sigma < widened
+    return is_value(now, most) and now.sigma < math.hypot(kept.sigma, change)
 
 
 def _has_moved(before: Learned, now: Learned, step: float) -> bool:

@@ -63,7 +63,7 @@ def scatter_ratios(
 def inlier_scatter(
     errors: Array, sigmas: Array, pair: Index, *, pairs: int, sigmas_cut: float
 ) -> Array:
-    """(pairs,) the same of those ranges that are no outliers, over the sigma that each was sent with.
+    """(pairs,) the same of ranges that are no outliers, over the sigma that each was sent with.
 
     Weights fall with the square of Cauchy's, so bursts leave no trace; never more than 1, because
     what is configured must be allowed for.

@@ -22,7 +22,6 @@ from drslamd.sensors.samples import Motion
 from drslamd.slam.calibration.window_calibration import remaining
 from drslamd.slam.graph.estimate import Learned
 from drslamd.slam.odometry.noise import OdometryNoise
-from drslamd.slam.range_model import LINKTRACK
 
 CHANGED_BIAS_M = 0.15
 """Modules and antennas are swapped, and recorded pairs differ by some decimetres."""
@@ -38,8 +37,6 @@ MOST_YAW_RATE = math.radians(20)
 """Likewise, rad/m."""
 MAX_BIASES = MAX_ROBOT_ID
 """As many peers as there are ids."""
-WIDENED = LINKTRACK.shared
-"""Learned sigmas count every range as if it were independent."""
 
 NOTHING = Learned()
 
@@ -85,13 +82,13 @@ class SensorCalibration:
         """What is left of the noise of our odometry."""
         return replace(
             noise,
-            scale=remaining(self.scale, noise.scale, CHANGED_SCALE, WIDENED),
-            yaw_rad_per_m=remaining(self.yaw, noise.yaw_rad_per_m, CHANGED_YAW, WIDENED),
+            scale=remaining(self.scale, noise.scale, CHANGED_SCALE),
+            yaw_rad_per_m=remaining(self.yaw, noise.yaw_rad_per_m, CHANGED_YAW),
         )
 
     def bias_sigma(self, peer: int, before: float) -> float:
         """What is left of the bias of a pair, one sigma, m."""
-        return remaining(self.bias_to(peer), before, CHANGED_BIAS_M, WIDENED)
+        return remaining(self.bias_to(peer), before, CHANGED_BIAS_M)
 
 
 UNLEARNED = SensorCalibration()

@@ -6,10 +6,10 @@ each robot's odometry as unknowns. Here a window is rid of what is known of them
 what is still unknown:
 
     r' = r - bias - near_bias exp(-r / L)     p' = (1 - scale) p
-    sigma'^-2 = sigma^-2 + (k s sigma_measured)^-2
+    sigma'^2 = sigma_measured^2 + least^2
 
-k accounts for ranges that share their errors (`RangeModel.shared`), s is how much those of the pair
-scatter (`range_scatter`); nothing falls below what no constant can describe.
+Module 3's sigmas are those of all that it knows, its priors included. Nothing falls below what no
+constant can describe, nor rises above what was believed before.
 """
 
 from __future__ import annotations
@@ -61,16 +61,14 @@ class PairCalibration(NamedTuple):
         )
 
 
-def remaining(learned: Learned, before: float, least: float, widened: float) -> float:
+def remaining(learned: Learned, before: float, least: float) -> float:
     """Sigma of what is left of a constant when its learned value is taken out.
 
     Args:
         before: its sigma before anything was measured.
         least: what no constant can describe.
-        widened: how many times the learned sigma it is really as wrong by.
     """
-    spread = float(np.hypot(widened * learned.sigma, least))
-    return float((before**-2.0 + spread**-2.0) ** -0.5)
+    return float(min(before, np.hypot(learned.sigma, least)))
 
 
 def calibrated_window(
@@ -85,12 +83,11 @@ def calibrated_window(
         a_poses=_scaled(window.a_poses, known.scale_a),
         b_poses=_scaled(window.b_poses, known.scale_b),
     )
-    widened = model.shared * known.scatter
-    bias = remaining(known.bias, noise.ranges.bias_sigma, model.least_bias_m, widened)
+    bias = remaining(known.bias, noise.ranges.bias_sigma, model.least_bias_m)
     return better, PairNoise(
         RangeNoise(noise.ranges.sigma, bias, known.scatter),
-        _narrowed(noise.a, known.scale_a, widened),
-        _narrowed(noise.b, known.scale_b, widened),
+        _narrowed(noise.a, known.scale_a),
+        _narrowed(noise.b, known.scale_b),
         model,
     )
 
@@ -99,6 +96,5 @@ def _scaled(poses: Array, scale: Learned) -> Array:
     return np.asarray(poses * [1 - scale.value, 1 - scale.value, 1.0])
 
 
-def _narrowed(noise: OdometryNoise, scale: Learned, widened: float) -> OdometryNoise:
-    """As if the ranges of this pair alone had taught the scale, which those of all pairs did."""
-    return replace(noise, scale=remaining(scale, noise.scale, LEAST_SCALE, widened))
+def _narrowed(noise: OdometryNoise, scale: Learned) -> OdometryNoise:
+    return replace(noise, scale=remaining(scale, noise.scale, LEAST_SCALE))

@@ -59,7 +59,7 @@ class BandFactor:
 
     def joint_covariance(self, unknowns: Index) -> Array | None:
         """(k, k) block of the inverse for some unknowns (k,); None where there is none."""
-        n, b = self.halfway.shape
+        n = len(self.halfway)
         columns = np.arange(len(unknowns))
         inside = unknowns < n
         unit = np.zeros((n, len(unknowns)))

@@ -88,7 +88,8 @@ def _squares(problem: Problem, point: Point) -> tuple[Array, Array]:
     odometry = problem.odometry
     error = pose_errors(point.poses, odometry, corrected(odometry, point.calibration))
     information = odometry.information
-    return np.einsum("ki,kij,kj->k", error, information, error), information
+    squares: Array = np.einsum("ki,kij,kj->k", error, information, error)
+    return squares, information
 
 
 def outliers(problem: Problem, point: Point) -> NDArray[np.bool_]:

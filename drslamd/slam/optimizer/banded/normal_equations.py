@@ -135,9 +135,7 @@ class Equations:
         self._add_pull_of_priors(gradient, poses, calibration)
         return gradient
 
-    def at(
-        self, poses: Array, calibration: Calibration, threshold: Array
-    ) -> tuple[System, Array]:
+    def at(self, poses: Array, calibration: Calibration, threshold: Array) -> tuple[System, Array]:
         """A matrix close to half the second derivative of the cost, and the gradient."""
         layout = self.layout
         system, gradient = System.empty(layout), np.zeros(layout.band + layout.border)
@@ -210,9 +208,7 @@ class Equations:
         system.add_prior(layout.near_bias, priors.near_bias**-2.0)
         system.add_prior(layout.poses[self.problem.gauge], GAUGE_SIGMA**-2)
 
-    def _add_pull_of_priors(
-        self, gradient: Array, poses: Array, calibration: Calibration
-    ) -> None:
+    def _add_pull_of_priors(self, gradient: Array, poses: Array, calibration: Calibration) -> None:
         layout, problem = self.layout, self.problem
         priors, gauge = problem.priors, problem.gauge
         team = float(calibration.team_bias[0])

@@ -170,7 +170,8 @@ def _wanted(now: Misfit, variance: Array, cell: Index) -> Array:
     had = np.zeros(len(s))
     had[cell] = variance
     ratio = (s / TARGET + DOUBT_OF_CELL / had) / (g + DOUBT_OF_CELL)
-    return np.asarray(np.clip(had * ratio, 1.0, MOST_LEVEL**2)[cell])
+    wanted: Array = np.clip(had * ratio, 1.0, MOST_LEVEL**2)
+    return wanted[cell]
 
 
 def _lingering(problem: Problem, variance: Array) -> Array:
@@ -183,7 +184,8 @@ def _lingering(problem: Problem, variance: Array) -> Array:
         n, sums = problem.n[odometry.j[mine]], np.append(0.0, np.cumsum(variance[mine]))
         first = np.searchsorted(n, n - MEMORY)
         after = np.arange(len(mine)) + 1
-        feared[mine] = np.maximum(variance[mine], (sums[after] - sums[first]) / (after - first))
+        lately: Array = (sums[after] - sums[first]) / (after - first)
+        feared[mine] = np.maximum(variance[mine], lately)
     return feared
 
 
