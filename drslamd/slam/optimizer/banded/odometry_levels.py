@@ -177,7 +177,7 @@ def _wanted(now: Misfit, variance: Array, cell: Index) -> Array:
 def _lingering(problem: Problem, variance: Array) -> Array:
     """(m,) what was seen, and what went on before: it takes time until it is seen."""
     odometry = problem.odometry
-    feared = variance.copy()
+    feared: Array = variance.copy()
     for robot in range(len(problem.priors.scale)):
         mine = np.flatnonzero(odometry.robot == robot)
         mine = mine[np.argsort(problem.n[odometry.j[mine]])]
