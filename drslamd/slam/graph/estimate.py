@@ -63,6 +63,8 @@ class TeamEstimate:
         scale, yaw: of each robot's odometry, fraction and rad/m.
         near_bias_m: of the team, at range 0 (`RangeModel.near_range_shape`).
         team_bias_m: what the biases of all pairs have in common.
+        turn: by which fraction turns are longer than odometry says; antenna_m: where the antenna is
+            beside its place, x and y; both of robots that are not mounted as configured.
         scatter: how many times the configured sigma the ranges of a pair scatter.
         lifted: state of the relaxation, with `rbcd`.
     """
@@ -75,6 +77,8 @@ class TeamEstimate:
     yaw: dict[int, Learned] = field(default_factory=dict)
     near_bias_m: Learned = field(default_factory=Learned)
     team_bias_m: Learned = field(default_factory=Learned)
+    turn: dict[int, Learned] = field(default_factory=dict)
+    antenna_m: dict[int, tuple[Learned, Learned]] = field(default_factory=dict)
     scatter: dict[tuple[int, int], float] = field(default_factory=dict)
     cost: float = 0.0
     iterations: int = 0

@@ -211,6 +211,28 @@ def ranges(graph: PoseGraph, numbers: Numbering) -> tuple[RangeFactors, list[tup
     table = RangeTable(np.concatenate([np.zeros((0, RANGE_COLUMNS)), *(r for _, _, r in found)]))
     index = [np.full(len(rows), names.index(name)) for name, _, rows in found]
     pair_of = np.concatenate([np.zeros(0, dtype=np.int64), *index])
+
+    def heading(end: Index, q: Array) -> Array:
+        h = np.zeros(len(end))
+        robots = numbers.robot[end]
+        for robot in set(robots.tolist()):
+            key = graph.chains[robot].keyframes
+            at = np.flatnonzero(robots == robot)
+            k = np.searchsorted(key.n, numbers.n[end[at]])
+            best = np.full(len(at), np.inf)
+            for step in (-1, 1):
+                o = np.clip(k + step, 0, len(key.n) - 1)
+                d = se2.between(key.poses[k], key.poses[o])
+                L = np.maximum((d[:, :2] ** 2).sum(1), 1e-9)
+                f = np.clip((d[:, :2] * q[at]).sum(1) / L, 0, 0.6)
+                miss = np.hypot(*(q[at] - f[:, None] * d[:, :2]).T) + (o == k) * 9
+                better = miss < best
+                h[at[better]] = (f * d[:, 2])[better]
+                best = np.minimum(best, miss)
+        return h
+
+    rob = sorted(set(numbers.robot.tolist()))
+    r_i, r_j = np.searchsorted(rob, numbers.robot[i]), np.searchsorted(rob, numbers.robot[j])
     ranges = RangeFactors(
         i=i,
         j=j,
@@ -219,6 +241,8 @@ def ranges(graph: PoseGraph, numbers: Numbering) -> tuple[RangeFactors, list[tup
         measured=table.range_m,
         sigma=table.sigma_m,
         pair=pair_of,
+        robots=np.stack([r_i, r_j], axis=-1).reshape(-1, 2),
+        turned=np.stack([heading(i, table.q_a), heading(j, table.q_b)], axis=-1).reshape(-1, 2),
     )
     return ranges, names
 

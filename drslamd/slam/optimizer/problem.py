@@ -10,7 +10,7 @@ that number. Errors are defined here once, so that every optimiser minimises the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from drslamd.slam import range_model, se2
 from drslamd.slam.optimizer.bias_prior import BiasPrior, cauchy_curvature
+from drslamd.slam.optimizer.mounting_prior import ANTENNA, TRACK
 from drslamd.slam.range_model import LINKTRACK, RangeModel
 from drslamd.slam.se2 import Array, Index
 
@@ -75,6 +76,8 @@ class RangeFactors:
         q_i, q_j: (m, 2) between which points, in the frames of poses i and j, m.
         measured, sigma: (m,) m.
         pair: (m,) the pair of robots whose bias applies, as the problem numbers them.
+        robots: (m, 2) whose poses i and j are, as the problem numbers them.
+        turned: (m, 2) by how much both robots stood turned against those poses, rad.
     """
 
     i: Index
@@ -84,12 +87,14 @@ class RangeFactors:
     measured: Array
     sigma: Array
     pair: Index
+    robots: Index
+    turned: Array
 
     def __len__(self) -> int:
         return len(self.i)
 
     def chosen(self, which: NDArray[np.bool_]) -> RangeFactors:
-        columns = (self.i, self.j, self.q_i, self.q_j, self.measured, self.sigma, self.pair)
+        columns = (getattr(self, field.name) for field in fields(self))
         return RangeFactors(*(column[which] for column in columns))
 
 
@@ -136,7 +141,24 @@ class Priors:
             self.bias.cost(calibration.bias - team, team)
             + float(np.log1p(scale**2).sum())
             + float(gaussian @ gaussian)
+            + TRACK.cost(calibration.turn[:, None])
+            + ANTENNA.cost(calibration.antenna)
         )
+
+
+@dataclass(frozen=True)
+class Doubted:
+    """Mountings that are unknowns of a problem: those of track and antenna, (robots,) each."""
+
+    track: NDArray[np.bool_]
+    antenna: NDArray[np.bool_]
+
+    @staticmethod
+    def none(robots: int) -> Doubted:
+        return Doubted(np.zeros(robots, dtype=bool), np.zeros(robots, dtype=bool))
+
+    def any(self) -> bool:
+        return bool(self.track.any() or self.antenna.any())
 
 
 @dataclass(frozen=True)
@@ -149,6 +171,7 @@ class Problem:
         gauge: the pose that is held where `initial` has it.
         pairs: how many pairs of robots have ranges.
         range_sigma: of a range, as configured, m.
+        doubted: whose mountings are unknowns; those of the others are as configured.
         model: of its ranges.
     """
 
@@ -161,6 +184,7 @@ class Problem:
     closures: BetweenFactors
     ranges: RangeFactors
     priors: Priors
+    doubted: Doubted
     range_sigma: float = 0.1
     model: RangeModel = LINKTRACK
 
@@ -173,6 +197,9 @@ class Calibration:
         bias: (pairs,) m; team_bias: (1,) what they have in common.
         scale, yaw: (robots,) fraction and rad/m.
         near_bias: (1,) m.
+        turn: (robots,) by which fraction turns are longer than odometry says ...
+        antenna: (robots, 2) ... and where the antenna is beside its place, m, where mountings are
+            in doubt.
     """
 
     bias: Array
@@ -180,10 +207,13 @@ class Calibration:
     yaw: Array
     near_bias: Array
     team_bias: Array
+    turn: Array
+    antenna: Array
 
     @staticmethod
     def zero(pairs: int, robots: int) -> Calibration:
-        return Calibration(*(np.zeros(count) for count in (pairs, robots, robots, 1, 1)))
+        shapes = (pairs, robots, robots, 1, 1, robots, (robots, 2))
+        return Calibration(*(np.zeros(shape) for shape in shapes))
 
     def plus(self, step: Calibration) -> Calibration:
         return Calibration(
@@ -192,6 +222,8 @@ class Calibration:
             yaw=self.yaw + step.yaw,
             near_bias=self.near_bias + step.near_bias,
             team_bias=self.team_bias + step.team_bias,
+            turn=self.turn + step.turn,
+            antenna=self.antenna + step.antenna,
         )
 
 
@@ -204,6 +236,7 @@ class Solution:
         joint: (3 k, 3 k) covariance of x, y, theta in w of the k poses that were asked for.
         spread: sigmas of the calibration.
         odometry_level: (m,) sigmas of the links of odometry over what was configured.
+        doubted: whose mountings were let go.
         is_explained: is the model, with these levels, one of what was measured?
     """
 
@@ -217,6 +250,7 @@ class Solution:
     spread: Calibration | None = None
     odometry_level: Array = field(default_factory=lambda: np.zeros(0))
     is_explained: bool = True
+    doubted: Doubted = field(default_factory=lambda: Doubted.none(0))
 
 
 def pose_errors(poses: Array, factors: BetweenFactors, measured: Array) -> Array:
@@ -231,6 +265,7 @@ def corrected(odometry: OdometryFactors, calibration: Calibration) -> Array:
     x, y, theta = odometry.measured.T
     keep = 1 - calibration.scale[odometry.robot]
     bend = calibration.yaw[odometry.robot] * odometry.path
+    bend -= calibration.turn[odometry.robot] * theta
     return np.stack([keep * x + bend / 2 * y, keep * y - bend / 2 * x, theta - bend], axis=-1)
 
 
@@ -238,9 +273,11 @@ def range_errors(
     poses: Array, ranges: RangeFactors, calibration: Calibration, model: RangeModel
 ) -> tuple[Array, Array, Array, Array]:
     """Errors (m,), unit line of sight from i to j in w (m,), and both arms in w (m,); x + iy."""
+    beside = calibration.antenna @ [1, 1j]
+    moved = beside[ranges.robots] * np.exp(1j * ranges.turned)
     arm_i, arm_j = (
-        np.exp(1j * poses[k, 2]) * (q[:, 0] + 1j * q[:, 1])
-        for k, q in ((ranges.i, ranges.q_i), (ranges.j, ranges.q_j))
+        np.exp(1j * poses[k, 2]) * (q @ [1, 1j] + moved[:, end])
+        for end, (k, q) in enumerate(((ranges.i, ranges.q_i), (ranges.j, ranges.q_j)))
     )
     place = poses[:, 0] + 1j * poses[:, 1]
     sight = place[ranges.j] + arm_j - place[ranges.i] - arm_i

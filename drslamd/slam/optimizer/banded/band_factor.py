@@ -8,6 +8,7 @@ import numpy as np
 from scipy.linalg import cholesky_banded
 from scipy.linalg.lapack import dtbtrs
 
+from drslamd.slam.optimizer.banded.layout import NOWHERE
 from drslamd.slam.optimizer.banded.normal_equations import System
 from drslamd.slam.se2 import Array, Index
 
@@ -76,20 +77,20 @@ class BandFactor:
     def covariance_blocks(self, unknowns: Index) -> Array:
         """(m, c, c) blocks of the inverse, for m factors that depend on unknowns (m, c) each.
 
-        Those that are in the band are no farther apart than its width.
+        Those that are in the band are no farther apart than its width; `NOWHERE` is known.
         """
         n = len(self.halfway)
         across, _ = dtbtrs(self.lower, self.halfway, uplo="L", trans="T")
         outer = np.linalg.inv(self.schur)
         rows = np.zeros((*unknowns.shape, len(outer)))
-        inside = unknowns < n
+        inside, outside = (unknowns < n) & (unknowns != NOWHERE), unknowns >= n
         rows[inside] = -across[unknowns[inside]]
-        rows[~inside] = np.eye(len(outer))[unknowns[~inside] - n]
+        rows[outside] = np.eye(len(outer))[unknowns[outside] - n]
         blocks = rows @ outer @ np.swapaxes(rows, 1, 2)
         shape = (*unknowns.shape, unknowns.shape[1])
         row = np.maximum(*np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :]))
         column = np.minimum(*np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :]))
-        both = (row < n).reshape(shape)
+        both = ((row < n) & (column != NOWHERE)).reshape(shape)
         blocks[both] += selected_inverse(self.lower)[(row - column)[both], column[both]]
         return np.asarray(blocks)
 

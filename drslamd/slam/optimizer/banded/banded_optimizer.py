@@ -24,7 +24,7 @@ from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.factors import Numbering
-from drslamd.slam.optimizer.problem import Calibration, Priors, Problem
+from drslamd.slam.optimizer.problem import Calibration, Doubted, Priors, Problem
 from drslamd.slam.range_model import LINKTRACK, RangeModel
 from drslamd.slam.se2 import Array
 
@@ -36,6 +36,8 @@ SCALE_TAILS = 3.0
 """The prior of the scale is Cauchy's, so many times narrower than its sigma: four of five values of
 that distribution lie within three half widths. Most wheels are measured to a percent, some not at
 all."""
+AS_CONFIGURED = (Learned(), Learned())
+"""An antenna that is where it is said to be."""
 HINT = 10.0**2
 """Variance, m^2 and rad^2, that closures get here. What they say is said better by the ranges that
 they came from; but where those are missing nothing else holds the group together."""
@@ -112,6 +114,7 @@ def build_problem(
         closures=hints.chosen(factors.sensible(hints.i, hints.j)),
         ranges=ranges.chosen(factors.sensible(ranges.i, ranges.j)),
         priors=priors,
+        doubted=_doubted(previous, robots),
         range_sigma=numbers.range_sigma,
         model=numbers.model,
     )
@@ -129,6 +132,20 @@ def _start(previous: TeamEstimate, pairs: list[tuple[int, int]], robots: list[in
         yaw=np.array([previous.yaw.get(robot, Learned()).value for robot in robots]),
         near_bias=np.array([previous.near_bias_m.value]),
         team_bias=np.array([previous.team_bias_m.value]),
+        turn=np.array([previous.turn.get(robot, Learned()).value for robot in robots]),
+        antenna=np.array(
+            [[c.value for c in previous.antenna_m.get(robot, AS_CONFIGURED)] for robot in robots]
+        ),
+    )
+
+
+def _doubted(previous: TeamEstimate | None, robots: list[int]) -> Doubted:
+    """What the last solution let go."""
+    if previous is None:
+        return Doubted.none(len(robots))
+    return Doubted(
+        np.array([robot in previous.turn for robot in robots]),
+        np.array([robot in previous.antenna_m for robot in robots]),
     )
 
 
@@ -153,6 +170,22 @@ def _solve(team: TeamProblem, group: Group) -> TeamEstimate:
         yaw=_named(list(mine), learned.yaw, spread.yaw),
         near_bias_m=Learned(float(learned.near_bias[0]), float(spread.near_bias[0])),
         team_bias_m=Learned(float(learned.team_bias[0]), float(spread.team_bias[0])),
+        turn={
+            robot: learned_turn
+            for robot, learned_turn in _named(list(mine), learned.turn, spread.turn).items()
+            if solution.doubted.track[list(mine).index(robot)]
+        },
+        antenna_m={
+            robot: (Learned(v[0], s[0]), Learned(v[1], s[1]))
+            for robot, v, s, let_go in zip(
+                mine,
+                learned.antenna.tolist(),
+                spread.antenna.tolist(),
+                solution.doubted.antenna,
+                strict=True,
+            )
+            if let_go
+        },
         scatter=dict(zip(team.pairs, solution.scatter.tolist(), strict=True)),
         cost=solution.cost,
         iterations=solution.iterations,

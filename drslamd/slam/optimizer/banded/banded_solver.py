@@ -15,8 +15,9 @@ import numpy as np
 from drslamd.slam import se2
 from drslamd.slam.optimizer.banded import claims
 from drslamd.slam.optimizer.banded.descent import TOLERANCE, descend
+from drslamd.slam.optimizer.banded.explanation import explain
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.banded.odometry_levels import explain, raised
+from drslamd.slam.optimizer.banded.odometry_levels import raised
 from drslamd.slam.optimizer.problem import Calibration, Problem, Solution
 from drslamd.slam.se2 import Array
 
@@ -44,24 +45,25 @@ def solve(
     start = start or Calibration.zero(problem.pairs, len(problem.priors.scale))
     nominal = descend(equations, start, most, tolerance)
     explained = explain(equations, nominal, most, tolerance)
-    point = explained.point if explained.is_odometry else nominal
+    problem, point = explained.problem, explained.point
     poses: Array = point.poses.copy()
     poses[:, 2] = se2.wrap(poses[:, 2])
     scatter = claims.scatter_of(problem, point)
     feared = Equations(raised(problem, explained.feared, point))
     wanted = np.array(marginals, dtype=int)
     joint, spread = claims.covariances(feared, point, scatter, wanted)
-    if not explained.is_odometry:
-        joint += claims.between(nominal, explained.point, wanted)
+    if explained.other is not None:
+        joint += claims.between(point, explained.other, wanted)
     return Solution(
         poses,
         point.calibration,
-        cost=equations.cost(point.poses, point.calibration, point.threshold),
+        cost=Equations(problem).cost(point.poses, point.calibration, point.threshold),
         iterations=nominal.steps,
         converged=nominal.converged,
         scatter=scatter,
         joint=joint,
         spread=spread,
-        odometry_level=np.sqrt(explained.seen),
-        is_explained=explained.is_odometry,
+        odometry_level=explained.level,
+        is_explained=explained.other is None,
+        doubted=claims.still_doubted(problem.doubted, point.calibration, spread),
     )

@@ -9,11 +9,13 @@ from drslamd.slam.calibration.range_scatter import LEAST_SCATTER, scatter_ratios
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.descent import Point
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.problem import Calibration, Problem, range_errors
+from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem, range_errors
 from drslamd.slam.se2 import Array, Index
 
 UNKNOWN = 1e6
 """m^2 and rad^2: the covariance of a pose that nothing holds."""
+CERTAIN = 3.0
+"""Sigmas that a mounting must be off to stay an unknown."""
 
 
 def covariances(
@@ -60,3 +62,10 @@ def between(one: Point, other: Point, wanted: Index) -> Array:
     apart = one.poses[wanted] - other.poses[wanted]
     apart[:, 2] = se2.wrap(apart[:, 2])
     return np.outer(apart, apart)
+
+
+def still_doubted(doubted: Doubted, learned: Calibration, spread: Calibration) -> Doubted:
+    """The mountings that turned out not to be as configured; of the others nothing is left."""
+    track = np.abs(learned.turn) > CERTAIN * spread.turn
+    antenna = (np.abs(learned.antenna) > CERTAIN * spread.antenna).any(axis=1)
+    return Doubted(doubted.track & track, doubted.antenna & antenna)

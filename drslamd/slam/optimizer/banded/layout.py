@@ -13,9 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drslamd.slam.optimizer.problem import Calibration, OdometryFactors, Problem
+from drslamd.slam.optimizer.problem import Calibration, OdometryFactors, Problem, RangeFactors
 from drslamd.slam.optimizer.vertex_cover import vertex_cover
 from drslamd.slam.se2 import Array, Index
+
+NOWHERE = -1
+"""The number of what is no unknown."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,7 @@ class BandLayout:
     Attributes:
         poses: (k, 3) of each pose.
         bias, scale, yaw: of each pair and robot; near_bias, team_bias: of the team.
+        turn: (robots,), antenna: (robots, 2); `NOWHERE` for what is no unknown.
         band, border: how many unknowns are in each.
         width: diagonals of the band, the main one included.
     """
@@ -35,6 +39,8 @@ class BandLayout:
     yaw: Index
     near_bias: Index
     team_bias: Index
+    turn: Index
+    antenna: Index
     band: int
     border: int
     width: int
@@ -52,9 +58,14 @@ class BandLayout:
         place[apart] = count - len(apart) + np.arange(len(apart))
         both = inside[i] & inside[j]
         reach = int(np.abs(place[i] - place[j])[both].max(initial=0))
-        sizes = [problem.pairs, robots, robots, 1, 1]
+        doubted = problem.doubted
+        turns, antennas = int(doubted.track.sum()), 2 * int(doubted.antenna.sum())
+        sizes = [problem.pairs, robots, robots, 1, 1, turns, antennas]
         numbers = 3 * count + np.arange(sum(sizes))
-        bias, scale, yaw, near_bias, team_bias = np.split(numbers, np.cumsum(sizes)[:-1])
+        *shared, turn, antenna = np.split(numbers, np.cumsum(sizes)[:-1])
+        bias, scale, yaw, near_bias, team_bias = shared
+        all_turns, all_antennas = np.full(robots, NOWHERE), np.full((robots, 2), NOWHERE)
+        all_turns[doubted.track], all_antennas[doubted.antenna] = turn, antenna.reshape(-1, 2)
         return BandLayout(
             poses=3 * place[:, None] + np.arange(3),
             bias=bias,
@@ -62,20 +73,33 @@ class BandLayout:
             yaw=yaw,
             near_bias=near_bias,
             team_bias=team_bias,
+            turn=all_turns,
+            antenna=all_antennas,
             band=3 * (count - len(apart)),
             border=3 * len(apart) + sum(sizes),
             width=3 * reach + 3,
         )
 
     def odometry_unknowns(self, odometry: OdometryFactors) -> Index:
-        """(m, 8) on which each link depends: both poses, scale and yaw rate."""
-        sensors = np.stack([self.scale[odometry.robot], self.yaw[odometry.robot]], axis=-1)
+        """(m, 9) on which each link depends: both poses, scale, yaw rate and turn."""
+        sensors = np.stack([self.scale, self.yaw, self.turn], axis=-1)[odometry.robot]
         return np.hstack([self.poses[odometry.i], self.poses[odometry.j], sensors])
+
+    def range_unknowns(self, ranges: RangeFactors) -> Index:
+        """(m, 12) likewise: both poses, bias, near-range bias and both antennas."""
+        near_bias = np.tile(self.near_bias, (len(ranges), 1))
+        antennas = self.antenna[ranges.robots].reshape(-1, 4)
+        constants = np.column_stack([self.bias[ranges.pair], near_bias, antennas])
+        return np.hstack([self.poses[ranges.i], self.poses[ranges.j], constants])
 
     def calibration(self, unknowns: Array) -> Calibration:
         """The part of a vector over all unknowns that belongs to the sensors."""
         parts = (self.bias, self.scale, self.yaw, self.near_bias, self.team_bias)
-        return Calibration(*(unknowns[numbers] for numbers in parts))
+        mountings = (
+            np.where(numbers == NOWHERE, 0.0, unknowns[numbers])
+            for numbers in (self.turn, self.antenna)
+        )
+        return Calibration(*(unknowns[numbers] for numbers in parts), *mountings)
 
 
 def border_poses(i: Index, j: Index, narrow: int) -> Index:

@@ -32,7 +32,7 @@ class Linearised(NamedTuple):
 
 
 def odometry(problem: Problem, poses: Array, calibration: Calibration) -> Linearised:
-    """By both poses, scale and yaw rate."""
+    """By both poses, scale, yaw rate and turn."""
     factors = problem.odometry
     error = pose_errors(poses, factors, corrected(factors, calibration))
     return Linearised(
@@ -41,15 +41,17 @@ def odometry(problem: Problem, poses: Array, calibration: Calibration) -> Linear
 
 
 def odometry_jacobian(problem: Problem, poses: Array) -> Array:
-    """(m, 3, 8)"""
+    """(m, 3, 9)"""
     factors = problem.odometry
-    x, y = factors.measured[:, 0], factors.measured[:, 1]
-    jacobian = np.zeros((len(factors), 3, 8))
+    x, y, theta = factors.measured.T
+    jacobian = np.zeros((len(factors), 3, 9))
     jacobian[:, :, :6] = pose_jacobian(poses, factors)
     jacobian[:, 0, 6], jacobian[:, 1, 6] = x, y
     jacobian[:, 0, 7] = -factors.path / 2 * y
     jacobian[:, 1, 7] = factors.path / 2 * x
     jacobian[:, 2, 7] = factors.path
+    jacobian[:, 0, 8], jacobian[:, 1, 8] = theta / 2 * y, -theta / 2 * x
+    jacobian[:, 2, 8] = -theta
     return jacobian
 
 
@@ -63,7 +65,7 @@ def closures(problem: Problem, poses: Array) -> Linearised:
 def ranges(
     problem: Problem, poses: Array, calibration: Calibration, threshold: Array
 ) -> Linearised:
-    """By both poses, bias and near-range bias; cost is Cauchy's, c^2 log(1 + (e / c)^2).
+    """By both poses, bias, near-range bias and both antennas; cost is c^2 log(1 + (e / c)^2).
 
     Args:
         threshold: (pairs,) c, in sigmas, as e is.
@@ -95,15 +97,18 @@ def weighed_ranges(
 def _range_jacobian(
     problem: Problem, poses: Array, calibration: Calibration
 ) -> tuple[Array, Array]:
-    """Errors (m,) and their derivatives (m, 1, 8)."""
+    """Errors (m,) and their derivatives (m, 1, 12)."""
     factors, model = problem.ranges, problem.model
     error, u, arm_i, arm_j = range_errors(poses, factors, calibration, model)
-    jacobian = np.ones((len(factors), 1, 8))
+    jacobian = np.ones((len(factors), 1, 12))
     jacobian[:, 0, 0], jacobian[:, 0, 1] = -u.real, -u.imag
     jacobian[:, 0, 2] = u.real * arm_i.imag - u.imag * arm_i.real
     jacobian[:, 0, 3], jacobian[:, 0, 4] = u.real, u.imag
     jacobian[:, 0, 5] = u.imag * arm_j.real - u.real * arm_j.imag
     jacobian[:, 0, 7] = model.near_range_shape(factors.measured)
+    heading = poses[np.stack([factors.i, factors.j], axis=-1), 2] + factors.turned
+    seen = u[:, None] * np.exp(-1j * heading) * [-1, 1]
+    jacobian[:, 0, 8::2], jacobian[:, 0, 9::2] = seen.real, seen.imag
     return error, jacobian
 
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from drslamd.slam.optimizer.banded import linearised
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.descent import Point
+from drslamd.slam.optimizer.banded.layout import NOWHERE
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.problem import Problem, corrected, pose_errors, range_errors
 from drslamd.slam.se2 import Array, Index
@@ -41,46 +42,52 @@ class Misfit:
     squares: Array
     checked: Array
 
+    @staticmethod
+    def unknown(links: int) -> Misfit:
+        """Of a system that cannot be solved."""
+        return Misfit(np.zeros(links), np.zeros(links))
+
     def ratio(self, group: Index, count: int) -> Array:
         """(count,) s / g of groups of links."""
         s, g = (np.bincount(group, each, count) for each in (self.squares, self.checked))
         return np.asarray((s + DOUBT) / (np.maximum(g, 0.0) + DOUBT))
 
 
-def misfit(equations: Equations, point: Point) -> Misfit:
-    """Computed exactly."""
-    factor, jacobian = _weighed(equations, point)
-    squares, information = _squares(equations.problem, point)
-    if factor is None:
-        return Misfit(squares, np.zeros(len(squares)))
-    unknowns = equations.layout.odometry_unknowns(equations.problem.odometry)
+def misfit(equations: Equations, point: Point, factor: BandFactor) -> Misfit:
+    """Computed exactly.
+
+    Args:
+        factor: of `Equations.weighed` at that point.
+    """
+    problem = equations.problem
+    jacobian = linearised.odometry_jacobian(problem, point.poses)
+    squares, information = _squares(problem, point)
+    unknowns = equations.layout.odometry_unknowns(problem.odometry)
     covariance = jacobian @ factor.covariance_blocks(unknowns) @ np.swapaxes(jacobian, 1, 2)
     return Misfit(squares, 3 - np.einsum("kij,kji->k", information, covariance))
 
 
-def guessed_misfit(equations: Equations, point: Point) -> Misfit:
+def guessed_misfit(equations: Equations, point: Point, factor: BandFactor) -> Misfit:
     """Several times faster, and good for sums over many links (Hutchinson's estimate).
 
     The signs are the same for everybody who has the same problem.
     """
-    factor, jacobian = _weighed(equations, point)
-    squares, information = _squares(equations.problem, point)
+    problem, layout = equations.problem, equations.layout
+    jacobian = linearised.odometry_jacobian(problem, point.poses)
+    squares, information = _squares(problem, point)
     signs = np.random.default_rng(0).choice([-1.0, 1.0], (len(jacobian), 3, PROBES))
     whitened = np.swapaxes(np.linalg.cholesky(information), 1, 2) @ jacobian
-    unknowns = equations.layout.odometry_unknowns(equations.problem.odometry)
+    unknowns = layout.odometry_unknowns(problem.odometry)
+    whitened = np.where((unknowns == NOWHERE)[:, None], 0.0, whitened)
+    unknowns = np.maximum(unknowns, 0)
     each = (np.swapaxes(whitened, 1, 2) @ signs).reshape(-1, PROBES)
-    size = equations.layout.band + equations.layout.border
+    size = layout.band + layout.border
     sums = np.stack([np.bincount(unknowns.ravel(), row, size) for row in each.T], axis=-1)
-    spread = None if factor is None else factor.solved(sums)
+    spread = factor.solved(sums)
     if spread is None:
         return Misfit(squares, np.zeros(len(squares)))
     seen: Array = signs * (whitened @ spread[unknowns])
     return Misfit(squares, 3 - seen.sum(axis=(1, 2)) / PROBES)
-
-
-def _weighed(equations: Equations, point: Point) -> tuple[BandFactor | None, Array]:
-    system = equations.weighed(point.poses, point.calibration, point.threshold)
-    return BandFactor.of(system), linearised.odometry_jacobian(equations.problem, point.poses)
 
 
 def _squares(problem: Problem, point: Point) -> tuple[Array, Array]:

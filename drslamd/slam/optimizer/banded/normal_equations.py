@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from drslamd.slam.optimizer.banded import linearised
-from drslamd.slam.optimizer.banded.layout import BandLayout
+from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout
 from drslamd.slam.optimizer.banded.linearised import Linearised
+from drslamd.slam.optimizer.mounting_prior import ANTENNA, TRACK
 from drslamd.slam.optimizer.problem import (
     Calibration,
     Problem,
@@ -66,9 +67,10 @@ class _Assembly:
         shape = (*unknowns.shape, unknowns.shape[1])
         row = np.broadcast_to(unknowns[:, :, None], shape).ravel()
         column = np.broadcast_to(unknowns[:, None, :], shape).ravel()
-        self._unknowns = unknowns.ravel()
-        self._in_band = np.flatnonzero((row >= column) & (row < n))
-        self._in_border = np.flatnonzero((row < n) & (column >= n))
+        self._known = np.flatnonzero(unknowns.ravel() != NOWHERE)
+        self._unknowns = unknowns.ravel()[self._known]
+        self._in_band = np.flatnonzero((row >= column) & (row < n) & (column != NOWHERE))
+        self._in_border = np.flatnonzero((row < n) & (row != NOWHERE) & (column >= n))
         self._in_corner = np.flatnonzero((row >= n) & (column >= n))
         self._band = ((row - column) * n + column)[self._in_band]
         self._border = (row * b + column - n)[self._in_border]
@@ -84,7 +86,7 @@ class _Assembly:
 
     def add_gradient(self, gradient: Array, factors: Linearised) -> None:
         """Add J' f."""
-        each = (factors.pull[:, None, :] @ factors.jacobian).ravel()
+        each = (factors.pull[:, None, :] @ factors.jacobian).ravel()[self._known]
         gradient += _sums(self._unknowns, each, gradient)
 
 
@@ -102,11 +104,7 @@ class Equations:
         poses = layout.poses
         self._odometry = _Assembly(layout, layout.odometry_unknowns(odometry))
         self._closures = _Assembly(layout, np.hstack([poses[closures.i], poses[closures.j]]))
-        shared = np.tile(layout.near_bias, (len(ranges), 1))
-        self._ranges = _Assembly(
-            layout,
-            np.column_stack([poses[ranges.i], poses[ranges.j], layout.bias[ranges.pair], shared]),
-        )
+        self._ranges = _Assembly(layout, layout.range_unknowns(ranges))
 
     def cost(self, poses: Array, calibration: Calibration, threshold: Array) -> float:
         """Of all factors and priors.
@@ -163,6 +161,7 @@ class Equations:
         system.add_prior(layout.bias, priors.bias.sigma**-2)
         system.add_prior(layout.team_bias, priors.bias.sigma**-2)
         system.add_prior(layout.scale, priors.scale**-2.0)
+        self._add_mounting_priors(system, calibration)
         return system
 
     def weighed(self, poses: Array, calibration: Calibration, threshold: Array) -> System:
@@ -201,6 +200,14 @@ class Equations:
         system.add_difference(layout.bias, layout.team_bias, own)
         system.add_prior(layout.team_bias, priors.bias.team_curvature(team))
         system.add_prior(layout.scale, priors.scale_curvature(calibration.scale))
+        self._add_mounting_priors(system, calibration)
+
+    def _add_mounting_priors(self, system: System, calibration: Calibration) -> None:
+        layout, doubted = self.layout, self.problem.doubted
+        turn = TRACK.curvature(calibration.turn[:, None])
+        system.add_prior(layout.turn[doubted.track], turn[doubted.track])
+        antenna = np.repeat(ANTENNA.curvature(calibration.antenna)[:, None], 2, axis=1)
+        system.add_prior(layout.antenna[doubted.antenna].ravel(), antenna[doubted.antenna].ravel())
 
     def _add_gaussian_priors(self, system: System) -> None:
         layout, priors = self.layout, self.problem.priors
@@ -216,6 +223,13 @@ class Equations:
         gradient[layout.bias] += pull
         gradient[layout.team_bias] += priors.bias.team_pull(team) - pull.sum()
         gradient[layout.scale] += priors.scale_pull(calibration.scale)
+        doubted = problem.doubted
+        turn, antenna = (
+            TRACK.pull(calibration.turn[:, None])[:, 0],
+            ANTENNA.pull(calibration.antenna),
+        )
+        gradient[layout.turn[doubted.track]] += turn[doubted.track]
+        gradient[layout.antenna[doubted.antenna]] += antenna[doubted.antenna]
         gradient[layout.yaw] += calibration.yaw / priors.yaw**2
         gradient[layout.near_bias] += calibration.near_bias / priors.near_bias**2
         moved = poses[gauge] - problem.initial[gauge]

@@ -17,21 +17,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.descent import Point, descend
 from drslamd.slam.optimizer.banded.misfit import (
     Misfit,
     Run,
-    guessed_misfit,
     misfit,
     outlier_share,
-    runs,
 )
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array, Index
 
-SUSPICIOUS = 3.0
-"""Guessed s / g above which it is computed."""
 STANDS_OUT = 4.0
 """s / g of a robot with a fault; as modelled it is 0.1 to 1.8, with a fault 5 to 90."""
 TARGET = 2.5
@@ -65,7 +62,7 @@ LONG_RUN = 30
 
 
 @dataclass(frozen=True)
-class Explained:
+class Levels:
     """
     Attributes:
         point: the solution with odometry as far as it deserves to be believed.
@@ -80,42 +77,38 @@ class Explained:
     is_odometry: bool
 
 
-def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -> Explained:
+def levelled(
+    equations: Equations,
+    nominal: Point,
+    ratio: Array,
+    found: list[Run],
+    most: int,
+    tolerance: float,
+) -> Levels:
     """Who must be believed less for the rest to make sense?
 
     Args:
-        nominal: the solution as configured.
+        nominal: the solution as configured; ratio: (robots,) its s / g; found: its runs of
+            outliers.
         most, tolerance: of the final solution, see `descend`.
     """
     problem = equations.problem
-    robot, robots = problem.odometry.robot, len(problem.priors.scale)
-    run = runs(problem, nominal)
-    ratio = guessed_misfit(equations, nominal).ratio(robot, robots)
-    if not run and not (ratio > SUSPICIOUS).any():
-        return _as_configured(nominal, robot, ratio)
-    before = misfit(equations, nominal)
-    ratio = before.ratio(robot, robots)
-    if not run and not (ratio > STANDS_OUT).any():
-        return _as_configured(nominal, robot, ratio)
+    robot = problem.odometry.robot
     level, point = _robots_raised(problem, nominal, ratio)
-    start = np.maximum(level[robot], _run_level(problem, run))
+    start = np.maximum(level[robot], _run_level(problem, found))
     seen, point = _cells_settled(problem, point, start)
     believed = Equations(raised(problem, seen, point))
     point = descend(believed, point.calibration, most, tolerance)
-    return Explained(
+    return Levels(
         point,
         seen,
         feared=TARGET * np.maximum(_lingering(problem, seen), level[robot]),
         is_odometry=bool(
             point.converged
             and outlier_share(problem, point).max(initial=0) < FEW_OUTLIERS
-            and ((ratio > STANDS_OUT).any() or _is_one_robot(run))
+            and ((ratio > STANDS_OUT).any() or _is_one_robot(found))
         ),
     )
-
-
-def _as_configured(nominal: Point, robot: Index, ratio: Array) -> Explained:
-    return Explained(nominal, np.ones(len(robot)), np.maximum(ratio, 1.0)[robot], True)
 
 
 def _robots_raised(problem: Problem, point: Point, ratio: Array) -> tuple[Array, Point]:
@@ -192,7 +185,10 @@ def _lingering(problem: Problem, variance: Array) -> Array:
 def _solved(problem: Problem, variance: Array, near: Point) -> tuple[Point, Misfit]:
     believed = Equations(raised(problem, variance, near))
     point = descend(believed, near.calibration, STEPS_OF_ROUND, ROUGH)
-    return point, misfit(believed, point)
+    factor = BandFactor.of(believed.weighed(point.poses, point.calibration, point.threshold))
+    if factor is None:
+        return point, Misfit.unknown(len(problem.odometry))
+    return point, misfit(believed, point, factor)
 
 
 def raised(problem: Problem, variance: Array, near: Point) -> Problem:
