@@ -21,7 +21,7 @@ from drslamd.slam.se2 import Array, Index
 PRIOR_RANGES = 20
 """m: as much as five independent ranges (see `RangeModel.shared`) would say, which leaves
 what was configured uncertain by a third."""
-ROUNDS = 8
+ROUNDS = 5
 """Of weighing; each brings the ratio nearer to its end by a factor of three."""
 GAUSSIAN = 1.5
 """What the weights take off the variance of a normal distribution, for a cut at 2.5 sigmas."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -269,10 +270,25 @@ def corrected(odometry: OdometryFactors, calibration: Calibration) -> Array:
     return np.stack([keep * x + bend / 2 * y, keep * y - bend / 2 * x, theta - bend], axis=-1)
 
 
+class RangeErrors(NamedTuple):
+    """Of m ranges, as complex numbers x + iy.
+
+    Attributes:
+        error: (m,) predicted minus measured, m.
+        direction: (m,) unit line of sight from i to j in w.
+        arm_i, arm_j: (m,) from the poses to the antennas in w.
+    """
+
+    error: Array
+    direction: Array
+    arm_i: Array
+    arm_j: Array
+
+
 def range_errors(
     poses: Array, ranges: RangeFactors, calibration: Calibration, model: RangeModel
-) -> tuple[Array, Array, Array, Array]:
-    """Errors (m,), unit line of sight from i to j in w (m,), and both arms in w (m,); x + iy."""
+) -> RangeErrors:
+    """Of all ranges."""
     beside = calibration.antenna @ [1, 1j]
     moved = beside[ranges.robots] * np.exp(1j * ranges.turned)
     arm_i, arm_j = (
@@ -284,4 +300,4 @@ def range_errors(
     error, direction = range_model.residuals(sight, ranges.measured)  # eq. (1)
     error += calibration.bias[ranges.pair]
     error += calibration.near_bias * model.near_range_shape(ranges.measured)
-    return error, direction, arm_i, arm_j
+    return RangeErrors(error, direction, arm_i, arm_j)

@@ -45,11 +45,12 @@ def solve(
     start = start or Calibration.zero(problem.pairs, len(problem.priors.scale))
     nominal = descend(equations, start, most, tolerance)
     explained = explain(equations, nominal, most, tolerance)
-    problem, point = explained.problem, explained.point
+    equations, point = explained.equations, explained.point
+    problem = equations.problem
     poses: Array = point.poses.copy()
     poses[:, 2] = se2.wrap(poses[:, 2])
     scatter = claims.scatter_of(problem, point)
-    feared = Equations(raised(problem, explained.feared, point))
+    feared = Equations(raised(problem, explained.feared, point), like=equations)
     wanted = np.array(marginals, dtype=int)
     joint, spread = claims.covariances(feared, point, scatter, wanted)
     if explained.other is not None:
@@ -57,7 +58,7 @@ def solve(
     return Solution(
         poses,
         point.calibration,
-        cost=Equations(problem).cost(point.poses, point.calibration, point.threshold),
+        cost=equations.cost(point, point.threshold),
         iterations=nominal.steps,
         converged=nominal.converged,
         scatter=scatter,

@@ -7,9 +7,9 @@ import numpy as np
 from drslamd.slam import se2
 from drslamd.slam.calibration.range_scatter import LEAST_SCATTER, scatter_ratios
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
-from drslamd.slam.optimizer.banded.descent import Point
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem, range_errors
+from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem
 from drslamd.slam.se2 import Array, Index
 
 UNKNOWN = 1e6
@@ -29,7 +29,7 @@ def covariances(
     """
     layout, model = equations.layout, equations.problem.model
     claims = model.correlated_ratio(1.0) * np.maximum(scatter, LEAST_SCATTER)
-    system = equations.claimed(point.poses, point.calibration, point.threshold, claims)
+    system = equations.claimed(point, claims)
     unknowns = layout.poses[wanted].ravel()
     sensors = np.arange(3 * len(point.poses), layout.band + layout.border)
     both = np.concatenate([unknowns, sensors])
@@ -46,9 +46,8 @@ def covariances(
 def scatter_of(problem: Problem, point: Point) -> Array:
     """(pairs,) how much ranges scatter about the solution, over what is configured."""
     ranges, model = problem.ranges, problem.model
-    errors = range_errors(point.poses, ranges, point.calibration, model)[0]
     return scatter_ratios(
-        errors,
+        point.sight.error,
         ranges.sigma,
         ranges.pair,
         pairs=problem.pairs,

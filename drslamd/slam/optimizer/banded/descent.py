@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from drslamd.slam.calibration.range_scatter import inlier_scatter
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.problem import Calibration, Problem, range_errors
-from drslamd.slam.se2 import Array
+from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.problem import Calibration
 
 LEAST_DAMPING = 1e-6
 """Of Levenberg and Marquardt, relative to the diagonal."""
@@ -20,27 +17,9 @@ NEAR = 0.03
 """m and rad: after a shorter step the matrix hardly changes, and serves for the next one too ..."""
 FASTER = 0.25
 """... while each step is so much shorter than the one before it."""
-TOLERANCE = 3e-7
-"""m and rad: largest step after which the solution counts as reached. Far below every noise, so
-that robots which hold the same graph have the same answer wherever they started from."""
-
-
-@dataclass(frozen=True)
-class Point:
-    """A place on the way to the solution.
-
-    Attributes:
-        poses: (k, 3)
-        threshold: (pairs,) sigmas beyond which a range loses weight.
-        steps: how many were made to get here.
-        converged: is this the solution?
-    """
-
-    poses: Array
-    calibration: Calibration
-    threshold: Array
-    steps: int = 0
-    converged: bool = False
+TOLERANCE = 1e-6
+"""m and rad: largest step after which the solution counts as reached, then a third of that away.
+So robots that hold the same graph have the same answer wherever they started from."""
 
 
 def descend(
@@ -57,17 +36,17 @@ def descend(
         tolerance: see `TOLERANCE`.
     """
     problem, layout = equations.problem, equations.layout
-    point = _point(problem, problem.initial.copy(), start, 0, False)
+    point = Point.of(problem, problem.initial.copy(), start)
     factor: BandFactor | None = None
     damping, size, steps, converged = LEAST_DAMPING, np.inf, 0, False
     while steps < most and not converged and damping < MOST_DAMPING:
         steps += 1
         is_kept = factor is not None
         if factor is None:
-            system, gradient = equations.at(point.poses, point.calibration, point.threshold)
+            system, gradient = equations.at(point)
             factor = BandFactor.of(system, damping)
         else:
-            gradient = equations.gradient(point.poses, point.calibration, point.threshold)
+            gradient = equations.gradient(point)
         step = None if factor is None else factor.solved(-gradient)
         if step is None or not np.isfinite(step).all():
             damping, factor = 10 * damping, None
@@ -75,30 +54,17 @@ def descend(
         poses = point.poses + step[layout.poses]
         calibration = point.calibration.plus(layout.calibration(step))
         before, size = size, float(np.abs(step[layout.poses]).max())
-        if not is_kept and not _is_better(equations, poses, calibration, point):
+        new = Point.of(problem, poses, calibration, steps, size < tolerance)
+        if not is_kept and not _is_better(equations, new, point):
             damping, factor = 10 * damping, None
             continue
         if size > NEAR or size > FASTER * before:
             damping, factor = damping / 10, None
-        converged = size < tolerance
-        point = _point(problem, poses, calibration, steps, converged)
+        point, converged = new, new.converged
     return point
 
 
-def _point(
-    problem: Problem, poses: Array, calibration: Calibration, steps: int, converged: bool
-) -> Point:
-    """Thresholds follow how much the ranges of a pair scatter, outliers left out."""
-    ranges, model = problem.ranges, problem.model
-    errors = range_errors(poses, ranges, calibration, model)[0]
-    scatter = inlier_scatter(
-        errors, ranges.sigma, ranges.pair, pairs=problem.pairs, sigmas_cut=model.cauchy_sigmas
-    )
-    return Point(poses, calibration, model.cauchy_sigmas * scatter, steps, converged)
-
-
-def _is_better(equations: Equations, poses: Array, calibration: Calibration, than: Point) -> bool:
+def _is_better(equations: Equations, new: Point, than: Point) -> bool:
     """Does all together cost no more than before, rounding apart?"""
-    before = equations.cost(than.poses, than.calibration, than.threshold)
-    cost = equations.cost(poses, calibration, than.threshold)
-    return cost <= before + 1e-12 * (1 + abs(before))
+    before = equations.cost(than, than.threshold)
+    return equations.cost(new, than.threshold) <= before + 1e-12 * (1 + abs(before))

@@ -14,7 +14,6 @@ import numpy as np
 
 from drslamd.slam.optimizer.banded import mountings, odometry_levels
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
-from drslamd.slam.optimizer.banded.descent import Point
 from drslamd.slam.optimizer.banded.misfit import (
     Run,
     guessed_misfit,
@@ -25,7 +24,7 @@ from drslamd.slam.optimizer.banded.misfit import (
 from drslamd.slam.optimizer.banded.mountings import Scores
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import FEW_OUTLIERS, STANDS_OUT
-from drslamd.slam.optimizer.problem import Problem
+from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.se2 import Array
 
 SUSPICIOUS = 3.0
@@ -38,14 +37,14 @@ MUCH = 100.0
 class Explanation:
     """
     Attributes:
-        problem: with the mountings that were let go.
+        equations: of the problem with the mountings that were let go.
         point: its solution.
         other: the solution of another explanation, when nobody can tell which is right.
         level: (m,) sigmas of odometry over what is configured, as far as it was seen.
         feared: (m,) variances likewise, as far as it must be feared.
     """
 
-    problem: Problem
+    equations: Equations
     point: Point
     other: Point | None
     level: Array
@@ -78,33 +77,33 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
     """
     check = _checked(equations, nominal)
     if check.is_passed() and not check.scores.ask():
-        return _as_is(equations.problem, nominal, check.ratio)
+        return _as_is(equations, nominal, check.ratio)
     base, point, ratio = equations, nominal, check.ratio
     if check.scores.ask():
         mounted, better = mountings.fitted(equations, nominal, check.scores, most, tolerance)
         again = _checked(mounted, better)
         few = outlier_share(mounted.problem, better).max(initial=0) < FEW_OUTLIERS
         if better.converged and few and again.is_passed():
-            return _as_is(mounted.problem, better, again.ratio)
+            return _as_is(mounted, better, again.ratio)
         if better.converged and _gain(equations, nominal, mounted, better) > MUCH:
             base, point, check, ratio = mounted, better, again, again.ratio
     levels = odometry_levels.levelled(base, point, ratio, check.runs, most, tolerance)
     seen = np.sqrt(levels.seen)
     if levels.is_odometry:
-        return Explanation(base.problem, levels.point, None, seen, levels.feared)
-    return Explanation(equations.problem, nominal, levels.point, seen, levels.feared)
+        return Explanation(base, levels.point, None, seen, levels.feared)
+    return Explanation(equations, nominal, levels.point, seen, levels.feared)
 
 
-def _as_is(problem: Problem, point: Point, ratio: Array) -> Explanation:
-    robot = problem.odometry.robot
+def _as_is(equations: Equations, point: Point, ratio: Array) -> Explanation:
+    robot = equations.problem.odometry.robot
     feared = np.maximum(ratio, 1.0)[robot]
-    return Explanation(problem, point, None, np.ones(len(robot)), feared)
+    return Explanation(equations, point, None, np.ones(len(robot)), feared)
 
 
 def _checked(equations: Equations, point: Point) -> _Check:
     problem = equations.problem
     robot, robots = problem.odometry.robot, len(problem.priors.scale)
-    factor = BandFactor.of(equations.weighed(point.poses, point.calibration, point.threshold))
+    factor = BandFactor.of(equations.weighed(point))
     if factor is None:
         return _Check(np.ones(robots), [], Scores(np.zeros(robots), np.zeros(robots)))
     ratio = guessed_misfit(equations, point, factor).ratio(robot, robots)
@@ -115,5 +114,4 @@ def _checked(equations: Equations, point: Point) -> _Check:
 
 def _gain(before: Equations, at: Point, after: Equations, better: Point) -> float:
     """By how much the cost fell."""
-    was = before.cost(at.poses, at.calibration, at.threshold)
-    return was - after.cost(better.poses, better.calibration, at.threshold)
+    return before.cost(at, at.threshold) - after.cost(better, at.threshold)

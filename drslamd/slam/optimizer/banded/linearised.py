@@ -6,14 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
 from drslamd.slam.optimizer.problem import (
     BetweenFactors,
-    Calibration,
     Problem,
-    corrected,
     pose_errors,
-    range_errors,
 )
 from drslamd.slam.se2 import Array
 
@@ -31,12 +29,11 @@ class Linearised(NamedTuple):
     pull: Array
 
 
-def odometry(problem: Problem, poses: Array, calibration: Calibration) -> Linearised:
+def odometry(problem: Problem, point: Point) -> Linearised:
     """By both poses, scale, yaw rate and turn."""
     factors = problem.odometry
-    error = pose_errors(poses, factors, corrected(factors, calibration))
     return Linearised(
-        odometry_jacobian(problem, poses), factors.information, _pulled(factors, error)
+        odometry_jacobian(problem, point.poses), factors.information, _pulled(factors, point.link)
     )
 
 
@@ -62,54 +59,44 @@ def closures(problem: Problem, poses: Array) -> Linearised:
     return Linearised(pose_jacobian(poses, factors), factors.information, _pulled(factors, error))
 
 
-def ranges(
-    problem: Problem, poses: Array, calibration: Calibration, threshold: Array
-) -> Linearised:
-    """By both poses, bias, near-range bias and both antennas; cost is c^2 log(1 + (e / c)^2).
-
-    Args:
-        threshold: (pairs,) c, in sigmas, as e is.
-    """
+def ranges(problem: Problem, point: Point) -> Linearised:
+    """By both poses, bias, near-range bias and both antennas; cost is c^2 log(1 + (e / c)^2)."""
     factors = problem.ranges
-    error, jacobian = _range_jacobian(problem, poses, calibration)
-    squared = (error / (threshold[factors.pair] * factors.sigma)) ** 2
+    error, jacobian = point.sight.error, _range_jacobian(problem, point)
+    squared = (error / (point.threshold[factors.pair] * factors.sigma)) ** 2
     weight = 1 / (1 + squared) / factors.sigma**2
     # the second derivative makes the steps of an iteration shrink fast
     bent = weight * np.maximum((1 - squared) / (1 + squared), LEAST_CURVATURE)
     return Linearised(jacobian, bent[:, None, None], (weight * error)[:, None])
 
 
-def weighed_ranges(
-    problem: Problem, poses: Array, calibration: Calibration, threshold: Array, claims: Array
-) -> Linearised:
+def weighed_ranges(problem: Problem, point: Point, claims: Array) -> Linearised:
     """The same without the curvature, and with so much information as ranges really have.
 
     Args:
         claims: (pairs,) how many times the sent sigma ranges are as wrong by.
     """
     factors = problem.ranges
-    error, jacobian = _range_jacobian(problem, poses, calibration)
-    squared = (error / (threshold[factors.pair] * factors.sigma)) ** 2
+    error, jacobian = point.sight.error, _range_jacobian(problem, point)
+    squared = (error / (point.threshold[factors.pair] * factors.sigma)) ** 2
     weight = 1 / (1 + squared) / (claims[factors.pair] * factors.sigma) ** 2
     return Linearised(jacobian, weight[:, None, None], (weight * error)[:, None])
 
 
-def _range_jacobian(
-    problem: Problem, poses: Array, calibration: Calibration
-) -> tuple[Array, Array]:
-    """Errors (m,) and their derivatives (m, 1, 12)."""
+def _range_jacobian(problem: Problem, point: Point) -> Array:
+    """(m, 1, 12) derivatives of errors."""
     factors, model = problem.ranges, problem.model
-    error, u, arm_i, arm_j = range_errors(poses, factors, calibration, model)
+    _, u, arm_i, arm_j = point.sight
     jacobian = np.ones((len(factors), 1, 12))
     jacobian[:, 0, 0], jacobian[:, 0, 1] = -u.real, -u.imag
     jacobian[:, 0, 2] = u.real * arm_i.imag - u.imag * arm_i.real
     jacobian[:, 0, 3], jacobian[:, 0, 4] = u.real, u.imag
     jacobian[:, 0, 5] = u.imag * arm_j.real - u.real * arm_j.imag
     jacobian[:, 0, 7] = model.near_range_shape(factors.measured)
-    heading = poses[np.stack([factors.i, factors.j], axis=-1), 2] + factors.turned
+    heading = point.poses[np.stack([factors.i, factors.j], axis=-1), 2] + factors.turned
     seen = u[:, None] * np.exp(-1j * heading) * [-1, 1]
     jacobian[:, 0, 8::2], jacobian[:, 0, 9::2] = seen.real, seen.imag
-    return error, jacobian
+    return jacobian
 
 
 def pose_jacobian(poses: Array, factors: BetweenFactors) -> Array:

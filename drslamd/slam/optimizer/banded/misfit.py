@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from drslamd.slam.optimizer.banded import linearised
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
-from drslamd.slam.optimizer.banded.descent import Point
 from drslamd.slam.optimizer.banded.layout import NOWHERE
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.problem import Problem, corrected, pose_errors, range_errors
+from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array, Index
 
 DOUBT = 1.0
@@ -92,18 +92,15 @@ def guessed_misfit(equations: Equations, point: Point, factor: BandFactor) -> Mi
 
 def _squares(problem: Problem, point: Point) -> tuple[Array, Array]:
     """e' W e (m,) and W (m, 3, 3)."""
-    odometry = problem.odometry
-    error = pose_errors(point.poses, odometry, corrected(odometry, point.calibration))
-    information = odometry.information
-    squares: Array = np.einsum("ki,kij,kj->k", error, information, error)
+    information = problem.odometry.information
+    squares: Array = np.einsum("ki,kij,kj->k", point.link, information, point.link)
     return squares, information
 
 
 def outliers(problem: Problem, point: Point) -> NDArray[np.bool_]:
     """(n,) which ranges."""
     ranges = problem.ranges
-    errors = range_errors(point.poses, ranges, point.calibration, problem.model)[0]
-    return np.asarray(np.abs(errors) > OUTLIER_SIGMAS * ranges.sigma)
+    return np.asarray(np.abs(point.sight.error) > OUTLIER_SIGMAS * ranges.sigma)
 
 
 def outlier_share(problem: Problem, point: Point) -> Array:

@@ -15,9 +15,10 @@ import numpy as np
 
 from drslamd.slam.optimizer.banded import linearised
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
-from drslamd.slam.optimizer.banded.descent import Point, descend
+from drslamd.slam.optimizer.banded.descent import descend
 from drslamd.slam.optimizer.banded.linearised import Linearised
 from drslamd.slam.optimizer.banded.normal_equations import Equations
+from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.problem import Doubted
 from drslamd.slam.se2 import Array, Index
 
@@ -51,10 +52,8 @@ def scores(equations: Equations, point: Point, factor: BandFactor) -> Scores:
     problem, layout = equations.problem, equations.layout
     robots = len(problem.priors.scale)
     ones = np.ones(problem.pairs)
-    ranges = linearised.weighed_ranges(
-        problem, point.poses, point.calibration, point.threshold, ones
-    )
-    odometry = linearised.odometry(problem, point.poses, point.calibration)
+    ranges = linearised.weighed_ranges(problem, point, ones)
+    odometry = linearised.odometry(problem, point)
     # by robot: turns are columns 0 .. R - 1, antennas the 2 R behind them
     antennas = robots + 2 * problem.ranges.robots[:, :, None] + np.arange(2)
     parts = (
@@ -124,7 +123,7 @@ def fitted(
         problem = replace(problem, doubted=wider, initial=point.poses)
         equations = Equations(problem)
         point = descend(equations, point.calibration, most, tolerance)
-        system = equations.weighed(point.poses, point.calibration, point.threshold)
+        system = equations.weighed(point)
         factor = BandFactor.of(system)
         if factor is None:
             break

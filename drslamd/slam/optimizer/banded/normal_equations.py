@@ -10,13 +10,12 @@ import numpy as np
 from drslamd.slam.optimizer.banded import linearised
 from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout
 from drslamd.slam.optimizer.banded.linearised import Linearised
+from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.mounting_prior import ANTENNA, TRACK
 from drslamd.slam.optimizer.problem import (
     Calibration,
     Problem,
-    corrected,
     pose_errors,
-    range_errors,
 )
 from drslamd.slam.se2 import Array, Index
 
@@ -64,6 +63,9 @@ class _Assembly:
             unknowns: (m, c) on which each factor depends.
         """
         n, b = layout.band, layout.border
+        # the mountings come last, and most often none of them is an unknown
+        self._columns = int(np.flatnonzero((unknowns != NOWHERE).any(axis=0)).max(initial=-1)) + 1
+        unknowns = unknowns[:, : self._columns]
         shape = (*unknowns.shape, unknowns.shape[1])
         row = np.broadcast_to(unknowns[:, :, None], shape).ravel()
         column = np.broadcast_to(unknowns[:, None, :], shape).ravel()
@@ -78,35 +80,53 @@ class _Assembly:
 
     def add_matrix(self, system: System, factors: Linearised) -> None:
         """Add J' W J."""
-        transposed = np.swapaxes(factors.jacobian, 1, 2)
-        blocks = (transposed @ (factors.information @ factors.jacobian)).ravel()
+        jacobian = factors.jacobian[:, :, : self._columns]
+        blocks = (np.swapaxes(jacobian, 1, 2) @ (factors.information @ jacobian)).ravel()
         system.band += _sums(self._band, blocks[self._in_band], system.band)
         system.border += _sums(self._border, blocks[self._in_border], system.border)
         system.corner += _sums(self._corner, blocks[self._in_corner], system.corner)
 
     def add_gradient(self, gradient: Array, factors: Linearised) -> None:
         """Add J' f."""
-        each = (factors.pull[:, None, :] @ factors.jacobian).ravel()[self._known]
-        gradient += _sums(self._unknowns, each, gradient)
+        each = (factors.pull[:, None, :] @ factors.jacobian[:, :, : self._columns]).ravel()
+        gradient += _sums(self._unknowns, each[self._known], gradient)
 
 
 def _sums(at: Index, values: Array, like: Array) -> Array:
     return np.bincount(at, values, like.size).reshape(like.shape)
 
 
+@dataclass(frozen=True)
+class _Where:
+    """The assemblies of one problem."""
+
+    odometry: _Assembly
+    closures: _Assembly
+    ranges: _Assembly
+
+    @staticmethod
+    def of(problem: Problem, layout: BandLayout) -> _Where:
+        ends = layout.poses[np.stack([problem.closures.i, problem.closures.j], axis=-1)]
+        return _Where(
+            _Assembly(layout, layout.odometry_unknowns(problem.odometry)),
+            _Assembly(layout, ends.reshape(-1, 6)),
+            _Assembly(layout, layout.range_unknowns(problem.ranges)),
+        )
+
+
 class Equations:
     """The normal equations of one problem, at any point."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, like: Equations | None = None) -> None:
+        """
+        Args:
+            like: of a problem with the same factors and unknowns, whatever it believes of them.
+        """
         self.problem = problem
-        self.layout = layout = BandLayout.of(problem)
-        odometry, closures, ranges = problem.odometry, problem.closures, problem.ranges
-        poses = layout.poses
-        self._odometry = _Assembly(layout, layout.odometry_unknowns(odometry))
-        self._closures = _Assembly(layout, np.hstack([poses[closures.i], poses[closures.j]]))
-        self._ranges = _Assembly(layout, layout.range_unknowns(ranges))
+        self.layout: BandLayout = like.layout if like else BandLayout.of(problem)
+        self._where: _Where = like._where if like else _Where.of(problem, self.layout)
 
-    def cost(self, poses: Array, calibration: Calibration, threshold: Array) -> float:
+    def cost(self, point: Point, threshold: Array) -> float:
         """Of all factors and priors.
 
         Args:
@@ -114,40 +134,38 @@ class Equations:
         """
         problem = self.problem
         odometry, closures, ranges = problem.odometry, problem.closures, problem.ranges
+        poses, calibration = point.poses, point.calibration
         moved = poses[problem.gauge] - problem.initial[problem.gauge]
         c = threshold[ranges.pair]
-        error = range_errors(poses, ranges, calibration, problem.model)[0]
         return (
-            odometry.cost(pose_errors(poses, odometry, corrected(odometry, calibration)))
+            odometry.cost(point.link)
             + closures.cost(pose_errors(poses, closures, closures.measured))
-            + float(np.sum(c**2 * np.log1p((error / (c * ranges.sigma)) ** 2)))
+            + float(np.sum(c**2 * np.log1p((point.sight.error / (c * ranges.sigma)) ** 2)))
             + problem.priors.cost(calibration)
             + float(moved @ moved) * GAUGE_SIGMA**-2
         )
 
-    def gradient(self, poses: Array, calibration: Calibration, threshold: Array) -> Array:
+    def gradient(self, point: Point) -> Array:
         """(n + b,) half the derivative of the cost."""
         gradient = np.zeros(self.layout.band + self.layout.border)
-        for where, factors in self._factors(poses, calibration, threshold):
+        for where, factors in self._factors(point):
             where.add_gradient(gradient, factors)
-        self._add_pull_of_priors(gradient, poses, calibration)
+        self._add_pull_of_priors(gradient, point)
         return gradient
 
-    def at(self, poses: Array, calibration: Calibration, threshold: Array) -> tuple[System, Array]:
+    def at(self, point: Point) -> tuple[System, Array]:
         """A matrix close to half the second derivative of the cost, and the gradient."""
         layout = self.layout
         system, gradient = System.empty(layout), np.zeros(layout.band + layout.border)
-        for where, factors in self._factors(poses, calibration, threshold):
+        for where, factors in self._factors(point):
             where.add_matrix(system, factors)
             where.add_gradient(gradient, factors)
-        self._add_heavy_priors(system, calibration)
+        self._add_heavy_priors(system, point.calibration)
         self._add_gaussian_priors(system)
-        self._add_pull_of_priors(gradient, poses, calibration)
+        self._add_pull_of_priors(gradient, point)
         return system, gradient
 
-    def claimed(
-        self, poses: Array, calibration: Calibration, threshold: Array, claims: Array
-    ) -> System:
+    def claimed(self, point: Point, claims: Array) -> System:
         """What is known at the solution: a system whose inverse is the covariance to be claimed.
 
         Weights that make a good estimate are no honest claim. Here ranges that share their errors
@@ -157,41 +175,37 @@ class Equations:
             claims: see `linearised.weighed_ranges`.
         """
         layout, priors = self.layout, self.problem.priors
-        system = self._weighed(poses, calibration, threshold, claims)
+        system = self._weighed(point, claims)
         system.add_prior(layout.bias, priors.bias.sigma**-2)
         system.add_prior(layout.team_bias, priors.bias.sigma**-2)
         system.add_prior(layout.scale, priors.scale**-2.0)
-        self._add_mounting_priors(system, calibration)
+        self._add_mounting_priors(system, point.calibration)
         return system
 
-    def weighed(self, poses: Array, calibration: Calibration, threshold: Array) -> System:
+    def weighed(self, point: Point) -> System:
         """What the factors say by their weights: what is left of an outlier's counts still."""
         claims = np.ones(self.problem.pairs)
-        system = self._weighed(poses, calibration, threshold, claims)
-        self._add_heavy_priors(system, calibration)
+        system = self._weighed(point, claims)
+        self._add_heavy_priors(system, point.calibration)
         return system
 
-    def _weighed(
-        self, poses: Array, calibration: Calibration, threshold: Array, claims: Array
-    ) -> System:
+    def _weighed(self, point: Point, claims: Array) -> System:
         problem = self.problem
         system = System.empty(self.layout)
-        self._odometry.add_matrix(system, linearised.odometry(problem, poses, calibration))
+        self._where.odometry.add_matrix(system, linearised.odometry(problem, point))
         if len(problem.closures):
-            self._closures.add_matrix(system, linearised.closures(problem, poses))
-        ranges = linearised.weighed_ranges(problem, poses, calibration, threshold, claims)
-        self._ranges.add_matrix(system, ranges)
+            self._where.closures.add_matrix(system, linearised.closures(problem, point.poses))
+        ranges = linearised.weighed_ranges(problem, point, claims)
+        self._where.ranges.add_matrix(system, ranges)
         self._add_gaussian_priors(system)
         return system
 
-    def _factors(
-        self, poses: Array, calibration: Calibration, threshold: Array
-    ) -> Iterator[tuple[_Assembly, Linearised]]:
+    def _factors(self, point: Point) -> Iterator[tuple[_Assembly, Linearised]]:
         problem = self.problem
-        yield self._odometry, linearised.odometry(problem, poses, calibration)
+        yield self._where.odometry, linearised.odometry(problem, point)
         if len(problem.closures):
-            yield self._closures, linearised.closures(problem, poses)
-        yield self._ranges, linearised.ranges(problem, poses, calibration, threshold)
+            yield self._where.closures, linearised.closures(problem, point.poses)
+        yield self._where.ranges, linearised.ranges(problem, point)
 
     def _add_heavy_priors(self, system: System, calibration: Calibration) -> None:
         layout, priors = self.layout, self.problem.priors
@@ -215,8 +229,8 @@ class Equations:
         system.add_prior(layout.near_bias, priors.near_bias**-2.0)
         system.add_prior(layout.poses[self.problem.gauge], GAUGE_SIGMA**-2)
 
-    def _add_pull_of_priors(self, gradient: Array, poses: Array, calibration: Calibration) -> None:
-        layout, problem = self.layout, self.problem
+    def _add_pull_of_priors(self, gradient: Array, point: Point) -> None:
+        layout, problem, calibration = self.layout, self.problem, point.calibration
         priors, gauge = problem.priors, problem.gauge
         team = float(calibration.team_bias[0])
         pull = priors.bias.own_pull(calibration.bias - team)
@@ -232,5 +246,5 @@ class Equations:
         gradient[layout.antenna[doubted.antenna]] += antenna[doubted.antenna]
         gradient[layout.yaw] += calibration.yaw / priors.yaw**2
         gradient[layout.near_bias] += calibration.near_bias / priors.near_bias**2
-        moved = poses[gauge] - problem.initial[gauge]
+        moved = point.poses[gauge] - problem.initial[gauge]
         gradient[layout.poses[gauge]] += moved / GAUGE_SIGMA**2

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
-from drslamd.slam.optimizer.banded.descent import Point, descend
+from drslamd.slam.optimizer.banded.descent import descend
 from drslamd.slam.optimizer.banded.misfit import (
     Misfit,
     Run,
@@ -26,6 +26,7 @@ from drslamd.slam.optimizer.banded.misfit import (
     outlier_share,
 )
 from drslamd.slam.optimizer.banded.normal_equations import Equations
+from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array, Index
 
@@ -94,10 +95,10 @@ def levelled(
     """
     problem = equations.problem
     robot = problem.odometry.robot
-    level, point = _robots_raised(problem, nominal, ratio)
+    level, point = _robots_raised(equations, nominal, ratio)
     start = np.maximum(level[robot], _run_level(problem, found))
-    seen, point = _cells_settled(problem, point, start)
-    believed = Equations(raised(problem, seen, point))
+    seen, point = _cells_settled(equations, point, start)
+    believed = Equations(raised(problem, seen, point), like=equations)
     point = descend(believed, point.calibration, most, tolerance)
     return Levels(
         point,
@@ -111,15 +112,15 @@ def levelled(
     )
 
 
-def _robots_raised(problem: Problem, point: Point, ratio: Array) -> tuple[Array, Point]:
+def _robots_raised(equations: Equations, point: Point, ratio: Array) -> tuple[Array, Point]:
     """(robots,) variance over the nominal one that brings each ratio down, all along its way."""
-    robot, level = problem.odometry.robot, np.ones(len(ratio))
+    robot, level = equations.problem.odometry.robot, np.ones(len(ratio))
     if not (ratio > STANDS_OUT).any():
         return level, point
     for _ in range(ROUNDS_OF_ROBOTS):
         raise_by = np.where(ratio > TARGET, 2 * ratio / TARGET, 1.0)
         level = np.minimum(level * raise_by, MOST_LEVEL**2)
-        point, now = _solved(problem, level[robot], point)
+        point, now = _solved(equations, level[robot], point)
         ratio = now.ratio(robot, len(ratio))
         if not (ratio > TARGET).any():
             break
@@ -143,13 +144,13 @@ def _is_one_robot(found: list[Run]) -> bool:
     return any(ends.count(end) > 1 for end in ends) or any(r.count >= LONG_RUN for r in found)
 
 
-def _cells_settled(problem: Problem, point: Point, variance: Array) -> tuple[Array, Point]:
+def _cells_settled(equations: Equations, point: Point, variance: Array) -> tuple[Array, Point]:
     """(m,) the variance over the nominal one that every cell of time asks for."""
-    odometry = problem.odometry
+    problem, odometry = equations.problem, equations.problem.odometry
     names = np.stack([odometry.robot, problem.n[odometry.j] // CELL])
     cell = np.unique(names, axis=1, return_inverse=True)[1].ravel()
     for _ in range(ROUNDS_OF_CELLS):
-        point, now = _solved(problem, variance, point)
+        point, now = _solved(equations, variance, point)
         wanted = _wanted(now, variance, cell)
         if np.abs(np.log(wanted / variance)).max() < SETTLED:
             break
@@ -182,12 +183,12 @@ def _lingering(problem: Problem, variance: Array) -> Array:
     return feared
 
 
-def _solved(problem: Problem, variance: Array, near: Point) -> tuple[Point, Misfit]:
-    believed = Equations(raised(problem, variance, near))
+def _solved(equations: Equations, variance: Array, near: Point) -> tuple[Point, Misfit]:
+    believed = Equations(raised(equations.problem, variance, near), like=equations)
     point = descend(believed, near.calibration, STEPS_OF_ROUND, ROUGH)
-    factor = BandFactor.of(believed.weighed(point.poses, point.calibration, point.threshold))
+    factor = BandFactor.of(believed.weighed(point))
     if factor is None:
-        return point, Misfit.unknown(len(problem.odometry))
+        return point, Misfit.unknown(len(variance))
     return point, misfit(believed, point, factor)
 
 
