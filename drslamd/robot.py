@@ -15,12 +15,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from drslamd import diagnosis
 from drslamd.broadcast import Broadcast
 from drslamd.config import Config
-from drslamd.conventions import GRID_US, MILLISECOND_US, SECOND_US, Chain
+from drslamd.conventions import MILLISECOND_US, SECOND_US, Chain
 from drslamd.events import (
     CanFrame,
     ChannelMessage,
@@ -49,7 +47,6 @@ from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, Job, Jobs
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.samples import Motion
 from drslamd.sensors.wheels.wheel_input import WheelInput
-from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.calibration.calibration_store import CalibrationStore
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
@@ -57,6 +54,7 @@ from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.graph.estimate import PoseNow
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.peer_in_range import PeerInRange
+from drslamd.slam.pose_now import pose_now
 from drslamd.slam.settings import closure_method
 from drslamd.slam.tuning import DEFAULTS, Tuning
 from drslamd.timers import Action, Timers
@@ -273,18 +271,12 @@ class Robot:
 
     def pose(self) -> PoseNow | None:
         """Our latest pose in the frame of the team; None while we are not localised."""
-        solved = self.back.trajectory(self.own.robot)
-        track = self.front.reckoning.track
-        if solved is None or self.back.estimate is None or not len(track):
+        estimate = self.back.estimate
+        if estimate is None:
             return None
-        last, now = int(solved.n[-1]), track.end - 1
-        if not track.covers(last, now):
-            return None
-        pose = se2.compose(solved.poses[-1], se2.between(track.at(last), track.at(now)))
-        covariance = self.back.estimate.covariance(self.own.robot)
-        if covariance is None:
-            return None
-        return PoseNow(now * GRID_US, np.append(pose[:2], se2.wrap(pose[2])), covariance)
+        return pose_now(
+            estimate, self.own.robot, self.front.reckoning.track, self.front.model.noise
+        )
 
     def _check_health(self, utime: int) -> list[Effect]:
         self.team.forget_silent(utime)

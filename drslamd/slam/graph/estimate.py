@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from drslamd.conventions import Chain, Segment
+from drslamd.slam import se2
+from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.se2 import Array
 
 
@@ -66,6 +68,8 @@ class TeamEstimate:
         turn: by which fraction turns are longer than odometry says; antenna_m: where the antenna is
             beside its place, x and y; both of robots that are not mounted as configured.
         scatter: how many times the configured sigma the ranges of a pair scatter.
+        odometry_level: how many times the sigma of a robot's odometry is what is configured, of
+            late, as far as it must be feared; 1 where none is named.
         lifted: state of the relaxation, with `rbcd`.
     """
 
@@ -80,6 +84,7 @@ class TeamEstimate:
     turn: dict[int, Learned] = field(default_factory=dict)
     antenna_m: dict[int, tuple[Learned, Learned]] = field(default_factory=dict)
     scatter: dict[tuple[int, int], float] = field(default_factory=dict)
+    odometry_level: dict[int, float] = field(default_factory=dict)
     cost: float = 0.0
     iterations: int = 0
     converged: bool = True
@@ -89,6 +94,27 @@ class TeamEstimate:
         """(3, 3) of the last pose of a robot; None where nothing is known of it."""
         at = self._rows(robot)
         return None if at is None else np.asarray(self.joint[at, at])
+
+    def relative(self, a: int, b: int) -> tuple[Array, Array] | None:
+        """a_T_b (3,) of the last poses of two robots, and its covariance (3, 3) in frame a."""
+        rows = self._rows(a), self._rows(b)
+        if rows[0] is None or rows[1] is None:
+            return None
+        w_T_a, w_T_b = (self.trajectories[robot].poses[-1] for robot in (a, b))
+        a_T_b = se2.between(w_T_a, w_T_b)
+        a_T_b[2] = se2.wrap(a_T_b[2])
+        turn = np.eye(3)
+        turn[:2, :2] = se2.rotate(-w_T_a[2], np.eye(2)).T
+        by_a = -turn
+        by_a[0, 2], by_a[1, 2] = a_T_b[1], -a_T_b[0]
+        j = np.hstack([by_a, turn])
+        at = np.r_[rows[0], rows[1]]
+        return a_T_b, j @ self.joint[np.ix_(at, at)] @ j.T
+
+    def correction(self, robot: int) -> Correction:
+        """Of a robot's odometry."""
+        parts = (self.scale, self.yaw, self.turn)
+        return Correction(*(part.get(robot, Learned()).value for part in parts))
 
     def _rows(self, robot: int) -> slice | None:
         robots = list(self.trajectories)

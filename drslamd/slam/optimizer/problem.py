@@ -236,7 +236,8 @@ class Solution:
         scatter: (pairs,) how many times the configured sigma ranges scatter.
         joint: (3 k, 3 k) covariance of x, y, theta in w of the k poses that were asked for.
         spread: sigmas of the calibration.
-        odometry_level: (m,) sigmas of the links of odometry over what was configured.
+        odometry_level: (m,) sigmas of the links of odometry over what was configured, as far as
+            it was seen; feared_level: as far as it must be feared.
         doubted: whose mountings were let go.
         is_explained: is the model, with these levels, one of what was measured?
     """
@@ -250,6 +251,7 @@ class Solution:
     joint: Array = field(default_factory=lambda: np.zeros((0, 0)))
     spread: Calibration | None = None
     odometry_level: Array = field(default_factory=lambda: np.zeros(0))
+    feared_level: Array = field(default_factory=lambda: np.zeros(0))
     is_explained: bool = True
     doubted: Doubted = field(default_factory=lambda: Doubted.none(0))
 

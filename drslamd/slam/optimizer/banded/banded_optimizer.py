@@ -24,7 +24,7 @@ from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.factors import Numbering
-from drslamd.slam.optimizer.problem import Calibration, Doubted, Priors, Problem
+from drslamd.slam.optimizer.problem import Calibration, Doubted, Priors, Problem, Solution
 from drslamd.slam.range_model import LINKTRACK, RangeModel
 from drslamd.slam.se2 import Array
 
@@ -187,10 +187,19 @@ def _solve(team: TeamProblem, group: Group) -> TeamEstimate:
             if let_go
         },
         scatter=dict(zip(team.pairs, solution.scatter.tolist(), strict=True)),
+        odometry_level=_latest(team, solution),
         cost=solution.cost,
         iterations=solution.iterations,
         converged=solution.converged,
     )
+
+
+def _latest(team: TeamProblem, solution: Solution) -> dict[int, float]:
+    """Of the last link of each robot, where it is not as configured."""
+    robot = team.problem.odometry.robot
+    last = {team.chains[index].robot: k for k, index in enumerate(robot.tolist())}
+    levels = {name: float(solution.feared_level[k]) for name, k in last.items()}
+    return {name: level for name, level in levels.items() if level > 1.0}
 
 
 def _named(names: list[Name], values: Array, sigmas: Array) -> dict[Name, Learned]:

@@ -65,6 +65,7 @@ def solve(
         joint=joint,
         spread=spread,
         odometry_level=explained.level,
+        feared_level=np.sqrt(explained.feared),
         is_explained=explained.other is None,
         doubted=claims.still_doubted(problem.doubted, point.calibration, spread),
     )
