@@ -68,6 +68,8 @@ class RangeModel:
             off the others may be.
         team_share: what all pairs have in common is of Cauchy's distribution, so much narrower:
             most makers calibrate to centimetres, some not at all.
+        antenna_sigma_m: biases move with the bearing by 4 to 10 cm, which is as if ranges were not
+            measured from the antenna but from a point beside it.
         huber_sigmas: of module 1; beyond it a range loses weight (bursts are 0.3 m and more).
         cauchy_sigmas: of module 3; a burst of 0.5 m weighs 1/50 of a good range.
         shared: ranges of one second and the next have a correlation of 0.3 to 0.7, so a sigma
@@ -86,6 +88,7 @@ class RangeModel:
     spread_share: float = 0.27
     spread_dof: float = 3.0
     team_share: float = 0.07
+    antenna_sigma_m: float = 0.03
     huber_sigmas: float = 2.5
     cauchy_sigmas: float = 2.5
     shared: float = 2.0

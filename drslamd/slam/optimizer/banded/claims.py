@@ -23,24 +23,24 @@ def covariances(
 ) -> tuple[Array, Calibration]:
     """Joint covariance (3 k, 3 k) of poses (k,), and sigmas of the calibration.
 
+    A bias of the configured size is feared for poses; what was learned of it is told with the sigma
+    that the team's likeness leaves, because others go on from there.
+
     Args:
         equations: of a problem whose odometry is believed as far as it should be.
         scatter: (pairs,) see `scatter_of`.
     """
     layout, model = equations.layout, equations.problem.model
     claims = model.correlated_ratio(1.0) * np.maximum(scatter, LEAST_SCATTER)
-    system = equations.claimed(point, claims)
-    unknowns = layout.poses[wanted].ravel()
-    sensors = np.arange(3 * len(point.poses), layout.band + layout.border)
-    both = np.concatenate([unknowns, sensors])
-    factor = BandFactor.of(system)
-    joint = None if factor is None else factor.joint_covariance(both)
-    if joint is None:
-        joint = UNKNOWN * np.eye(len(both))
-    k = len(unknowns)
-    sigmas = np.zeros(layout.band + layout.border)
-    sigmas[sensors] = np.sqrt(np.diag(joint)[k:])
-    return joint[:k, :k], layout.calibration(sigmas)
+    factor = BandFactor.of(equations.claimed(point, claims))
+    poses = layout.poses[wanted].ravel()
+    joint = None if factor is None else factor.joint_covariance(poses)
+    sigmas = np.full(layout.band + layout.border, np.sqrt(UNKNOWN))
+    if factor is None or joint is None:
+        return UNKNOWN * np.eye(len(poses)), layout.calibration(sigmas)
+    learned = np.linalg.inv(factor.schur + equations.bias_belief(point))
+    sigmas[layout.band :] = np.sqrt(np.diag(learned))
+    return joint, layout.calibration(sigmas)
 
 
 def scatter_of(problem: Problem, point: Point) -> Array:

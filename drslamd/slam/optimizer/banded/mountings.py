@@ -22,7 +22,7 @@ from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.problem import Doubted
 from drslamd.slam.se2 import Array, Index
 
-ASKED_FOR = 50.0
+ASKED_FOR = 30.0
 """Score; with mountings as configured it stays below 10, and below 25 where biases move with
 bearing; a track or an antenna that is far off scores 65 to 400."""
 WITHOUT_DATA = 0.1

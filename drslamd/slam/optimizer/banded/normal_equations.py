@@ -182,6 +182,15 @@ class Equations:
         self._add_mounting_priors(system, point.calibration)
         return system
 
+    def bias_belief(self, point: Point) -> Array:
+        """(b, b) what the border gains where biases are believed as in the estimate, not claimed."""
+        layout, prior = self.layout, self.problem.priors.bias
+        gain = System.empty(layout)
+        self._add_bias_prior(gain, point.calibration)
+        gain.add_prior(layout.bias, -(prior.sigma**-2))
+        gain.add_prior(layout.team_bias, -(prior.sigma**-2))
+        return gain.corner
+
     def weighed(self, point: Point) -> System:
         """What the factors say by their weights: what is left of an outlier's counts still."""
         claims = np.ones(self.problem.pairs)
@@ -209,12 +218,16 @@ class Equations:
 
     def _add_heavy_priors(self, system: System, calibration: Calibration) -> None:
         layout, priors = self.layout, self.problem.priors
-        team = float(calibration.team_bias[0])
-        own = priors.bias.own_curvature(calibration.bias - team)
-        system.add_difference(layout.bias, layout.team_bias, own)
-        system.add_prior(layout.team_bias, priors.bias.team_curvature(team))
+        self._add_bias_prior(system, calibration)
         system.add_prior(layout.scale, priors.scale_curvature(calibration.scale))
         self._add_mounting_priors(system, calibration)
+
+    def _add_bias_prior(self, system: System, calibration: Calibration) -> None:
+        layout, prior = self.layout, self.problem.priors.bias
+        team = float(calibration.team_bias[0])
+        own = prior.own_curvature(calibration.bias - team)
+        system.add_difference(layout.bias, layout.team_bias, own)
+        system.add_prior(layout.team_bias, prior.team_curvature(team))
 
     def _add_mounting_priors(self, system: System, calibration: Calibration) -> None:
         layout, doubted = self.layout, self.problem.doubted
