@@ -242,7 +242,7 @@ class Robot:
         """Module 2: which of a pair's closures belong together."""
         return [
             self.jobs.begin(Job(CONSISTENCY, pair), run)
-            for pair, run in self.front.module2(self.back.graph)
+            for pair, run in self.front.module2(self.back.graph, self.back.estimate)
         ]
 
     def _optimize(self, utime: int) -> list[Effect]:

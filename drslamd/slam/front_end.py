@@ -225,21 +225,32 @@ class FrontEnd:
             b.data.model.noise,
             self._range_model,
         )
-        team = estimate if self._method.uses_calibration else None
-        known = PairCalibration.of(team, self._own.robot, peer)
+        known = PairCalibration.of(self._used(estimate), self._own.robot, peer)
         return partial(self._method.solve, found.window, noise, known)
+
+    def _used(self, estimate: TeamEstimate | None) -> TeamEstimate | None:
+        """What was learned, where it serves modules 1 and 2."""
+        return estimate if self._method.uses_calibration else None
 
     # ---- module 2 ----
 
-    def module2(self, graph: PoseGraph) -> list[tuple[PairTracker, Callable[[], Checked]]]:
-        """Begin the consistency checks to be computed now: pair, computation."""
+    def module2(
+        self, graph: PoseGraph, estimate: TeamEstimate | None
+    ) -> list[tuple[PairTracker, Callable[[], Checked]]]:
+        """Begin the consistency checks to be computed now: pair, computation.
+
+        Args:
+            estimate: see `module1`.
+        """
         out = []
         own = graph.chains.get(self._own.robot)
         for robot, pair in self.pairs.items():
             data = graph.chains.get(robot)
             if own is None or data is None or data.chain != pair.peer:
                 continue
-            job = pair.begin_check(own, data, self.model.noise)
+            known = PairCalibration.of(self._used(estimate), self._own.robot, robot)
+            corrections = known.a.correction, known.b.correction
+            job = pair.begin_check(own, data, self.model.noise, corrections)
             if job is not None:
                 out.append((pair, job))
         return out

@@ -294,7 +294,7 @@ def believed(scene: FrontScene, windows: int) -> None:
     pair = scene.front.pairs[1]
     for n in range(10, 10 + 10 * windows, 10):
         pair.on_estimate(asked_at(n), estimate_of(scene.seen(n)))
-        ((same, run),) = scene.front.module2(scene.graph)
+        ((same, run),) = scene.front.module2(scene.graph, None)
         assert same is pair
         pair.on_check(run())
 
@@ -319,11 +319,11 @@ def test_module_2_checks_what_waits_and_only_of_the_start_that_the_graph_knows()
     scene = FrontScene()
     scene.drive(5)
     scene.module1()
-    assert scene.front.module2(scene.graph) == []
+    assert scene.front.module2(scene.graph, None) == []
     scene.front.pairs[1].on_estimate(asked_at(10), estimate_of(BESIDE))
     later = GraphEntry(0, keyframes=(Keyframe(10, 0, 0, 0, 0),))
     scene.graph.insert(Chain(1, 2), later)
-    assert scene.front.module2(scene.graph) == []
+    assert scene.front.module2(scene.graph, None) == []
 
 
 def test_a_range_is_sampled_each_second_between_keyframes_of_both() -> None:

@@ -5,7 +5,7 @@ driving do. Module 3 carries the bias of each pair, the near-range bias of the t
 each robot's odometry as unknowns. Here a window is rid of what is known of them, and its noise says
 what is still unknown:
 
-    r' = r - bias - near_bias exp(-r / L)     p' = (1 - scale) p
+    r' = r - bias - near_bias exp(-r / L)     p' = (1 - scale) p     theta' = (1 + turn) theta
     sigma'^2 = sigma_measured^2 + least^2
 
 Module 3's sigmas are those of all that it knows, its priors included. Nothing falls below what no
@@ -19,7 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from drslamd.slam import se2
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
+from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.range_model import RangeNoise
 from drslamd.slam.relative_pose.estimate import PairNoise
@@ -30,19 +32,56 @@ LEAST_SCALE = 0.01
 """Floors and loads change wheels by so much."""
 
 
+class EndCalibration(NamedTuple):
+    """What is known of the sensors of one robot of a pair.
+
+    Attributes:
+        scale: of its odometry, a fraction; turn: by which fraction turns are longer.
+        antenna: (2,) of its antenna beside its place, m.
+    """
+
+    scale: Learned = Learned()
+    turn: float = 0.0
+    antenna: tuple[float, float] = (0.0, 0.0)
+
+    @staticmethod
+    def of(estimate: TeamEstimate, robot: int) -> EndCalibration:
+        x, y = estimate.antenna_m.get(robot, (Learned(), Learned()))
+        return EndCalibration(
+            estimate.scale.get(robot, Learned()),
+            estimate.turn.get(robot, Learned()).value,
+            (x.value, y.value),
+        )
+
+    @property
+    def correction(self) -> Correction:
+        """Of a long way, where wheels are not as configured; a usual scale is noise."""
+        return Correction(scale=self.scale.value, turn=self.turn) if self.turn else Correction()
+
+    def path(self, poses: Array, before: int) -> Array:
+        """(n, 3) poses of a window, seen from its reference time, as they should have been.
+
+        Args:
+            before: how many of them lie before the reference time.
+        """
+        whole = np.insert(poses, before, np.zeros(3), axis=0)
+        better = Correction(scale=self.scale.value, turn=self.turn).path(whole)
+        return np.delete(se2.between(better[before], better), before, axis=0)
+
+
 class PairCalibration(NamedTuple):
     """What is known of one pair's sensors.
 
     Attributes:
         bias: of the pair, m.
-        scale_a, scale_b: of both odometries, fractions.
+        a, b: of both robots.
         scatter: of the pair's ranges over the configured sigma, see `range_scatter`.
         near_bias: of the team, m at range 0, see `RangeModel.near_range_shape`.
     """
 
     bias: Learned = Learned()
-    scale_a: Learned = Learned()
-    scale_b: Learned = Learned()
+    a: EndCalibration = EndCalibration()
+    b: EndCalibration = EndCalibration()
     scatter: float = 1.0
     near_bias: Learned = Learned()
 
@@ -54,8 +93,8 @@ class PairCalibration(NamedTuple):
         pair = (min(a, b), max(a, b))
         return PairCalibration(
             estimate.bias_m.get(pair, Learned()),
-            estimate.scale.get(a, Learned()),
-            estimate.scale.get(b, Learned()),
+            EndCalibration.of(estimate, a),
+            EndCalibration.of(estimate, b),
             estimate.scatter.get(pair, 1.0),
             estimate.near_bias_m,
         )
@@ -80,20 +119,18 @@ def calibrated_window(
     better = replace(
         window,
         ranges=window.ranges - known.bias.value - near,
-        a_poses=_scaled(window.a_poses, known.scale_a),
-        b_poses=_scaled(window.b_poses, known.scale_b),
+        a_poses=known.a.path(window.a_poses, window.before),
+        b_poses=known.b.path(window.b_poses, window.before),
+        a_antenna=window.a_antenna + known.a.antenna,
+        b_antenna=window.b_antenna + known.b.antenna,
     )
     bias = remaining(known.bias, noise.ranges.bias_sigma, model.least_bias_m)
     return better, PairNoise(
         RangeNoise(noise.ranges.sigma, bias, known.scatter),
-        _narrowed(noise.a, known.scale_a),
-        _narrowed(noise.b, known.scale_b),
+        _narrowed(noise.a, known.a.scale),
+        _narrowed(noise.b, known.b.scale),
         model,
     )
-
-
-def _scaled(poses: Array, scale: Learned) -> Array:
-    return np.asarray(poses * [1 - scale.value, 1 - scale.value, 1.0])
 
 
 def _narrowed(noise: OdometryNoise, scale: Learned) -> OdometryNoise:

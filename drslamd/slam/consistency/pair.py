@@ -18,6 +18,7 @@ from drslamd.slam import se2
 from drslamd.slam.consistency.pcm import Candidate, PairConsistency
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import ClosureMeasurement
+from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.relative_pose.estimate import RelativePoseEstimate
 from drslamd.slam.relative_pose.pair_end import at_keyframes
@@ -32,6 +33,9 @@ HISTORY = 2_000
 """Answers of module 1 that can be asked for: half an hour at one a second, 1 MB."""
 TELL_EVERY = 100
 """Grid samples between closures that are sent when the graph's edges are the ranges."""
+UNCORRECTED = (Correction(), Correction())
+ANOTHER_WAY = 0.03
+"""Of scale or turn: corrections that differ by more lead to ways that do not agree."""
 SHRINK = 1e-4
 """Of correlations, before rounding: far above a rounding of 6e-8, far below what anyone knows."""
 
@@ -113,6 +117,7 @@ class PairTracker:
         self.connected = False
         self._checked: Checked | None = None
         self._is_busy = False
+        self._corrections = UNCORRECTED
         self._segments: tuple[Segment, Segment] | None = None
         self._pending: deque[tuple[int, WindowRequest, RelativePoseEstimate]]
         self._pending = deque(maxlen=PENDING)
@@ -139,11 +144,22 @@ class PairTracker:
     # ---- module 2 ----
 
     def begin_check(
-        self, own: ChainData, peer: ChainData, noise: OdometryNoise
+        self,
+        own: ChainData,
+        peer: ChainData,
+        noise: OdometryNoise,
+        known: tuple[Correction, Correction] = UNCORRECTED,
     ) -> Callable[[], Checked] | None:
-        """Module 2 on what came in since; the pair's set belongs to the job until `on_check`."""
+        """Module 2 on what came in since; the pair's set belongs to the job until `on_check`.
+
+        Args:
+            known: of our odometry and the peer's.
+        """
         if self._is_busy:
             return None
+        if _differ(known, self._corrections):
+            self._corrections = known
+            self._begin_anew()
         work: list[tuple[Candidate, ClosureMeasurement]] = []
         while self._pending:
             number, request, estimate = self._pending.popleft()
@@ -153,9 +169,8 @@ class PairTracker:
             )
             if segments != self._segments:
                 # odometry broke: what was kept stays in the graph, a new set begins
-                self._kept_before = self.accepted() if self.connected else self._kept_before
-                self._segments, self._checked, work = segments, None, []
-                self.connected, self.kept = False, ()
+                self._segments, work = segments, []
+                self._begin_anew()
             work += self._candidates(number, request, estimate, own, peer)
         if not work or self._segments is None:
             return None
@@ -167,6 +182,11 @@ class PairTracker:
             checked.renew_sums(own, peer)
         self._is_busy, self._checked = True, None
         return partial(extended, checked, work)
+
+    def _begin_anew(self) -> None:
+        """What is kept now stays in the graph, a new set begins."""
+        self._kept_before = self.accepted() if self.connected else self._kept_before
+        self._checked, self.connected, self.kept = None, False, ()
 
     def _candidates(
         self,
@@ -181,6 +201,10 @@ class PairTracker:
         b, b_there = peer.keyframes.find(np.array([float(request.b.n)]))
         if not (a_there[0] and b_there[0]):
             return []
+        a_pose, b_pose = (
+            correction.path(data.keyframes.poses[: row[0] + 1])[-1]
+            for correction, data, row in zip(self._corrections, (own, peer), (a, b), strict=True)
+        )
         out = []
         for hypothesis in estimate.hypotheses:
             pose, covariance = at_keyframes(
@@ -200,8 +224,8 @@ class PairTracker:
                 closure=number,
                 a_T_b=pose,
                 covariance=covariance,
-                a_pose=own.keyframes.poses[a[0]],
-                b_pose=peer.keyframes.poses[b[0]],
+                a_pose=a_pose,
+                b_pose=b_pose,
                 a_sums=own.sums[a[0]],
                 b_sums=peer.sums[b[0]],
             )
@@ -258,6 +282,11 @@ class PairTracker:
                 self._told[number] = m
                 recent = max(recent, m.a_n)
         return gone + new
+
+
+def _differ(one: tuple[Correction, Correction], other: tuple[Correction, Correction]) -> bool:
+    apart = np.array(one) - np.array(other)
+    return bool(np.abs(apart).max() > ANOTHER_WAY)
 
 
 def sendable(covariance: Array) -> Array:

@@ -183,7 +183,7 @@ class Equations:
         return system
 
     def bias_belief(self, point: Point) -> Array:
-        """(b, b) what the border gains where biases are believed as in the estimate, not claimed."""
+        """(b, b) what the border gains where biases are as believed instead of as claimed."""
         layout, prior = self.layout, self.problem.priors.bias
         gain = System.empty(layout)
         self._add_bias_prior(gain, point.calibration)
