@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Protocol
 
+from drslamd import mounting_advice
 from drslamd.config import Config
 from drslamd.conventions import SECOND_US
 from drslamd.events import NetworkState, PortCondition, PortState
@@ -57,6 +58,7 @@ def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
     yield "network", None if network is None or network.up else network.detail
     yield from robot.team.conditions(utime)
     yield "pose", why_not_localised(robot, utime)
+    yield "mounting", _mountings(robot)
     yield "load", _load(robot, utime)
     yield "budget", robot.outbox.condition(utime)
 
@@ -86,6 +88,23 @@ def _load(robot: Stages, utime: int) -> str | None:
     if not late:
         return None
     return f"{', '.join(late)}, to leave time for the sensors; the team is large for this computer"
+
+
+def _mountings(robot: Stages) -> str | None:
+    """What was found wrong with the wheels of whom, and whose windows nothing explains."""
+    own, pairs = robot.front.own.robot, robot.front.pairs
+    said = [
+        sentence
+        for peer, pair in pairs.items()
+        if (sentence := mounting_advice.advice(own, peer, pair.search, _is_odd(pairs, peer)))
+    ]
+    return "; ".join(said) or None
+
+
+def _is_odd(pairs: dict[int, PairTracker], peer: int) -> bool:
+    """Is it the peer that is wrong: do we agree with somebody else?"""
+    others = (pair for robot, pair in pairs.items() if robot != peer)
+    return any(pair.connected and pair.search.found is None for pair in others)
 
 
 def why_not_localised(robot: Stages, utime: int) -> str | None:

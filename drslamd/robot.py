@@ -43,7 +43,7 @@ from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
 from drslamd.health import Health
-from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, Job, Jobs
+from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, WHAT_IF, Job, Jobs
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.samples import Motion
 from drslamd.sensors.wheels.wheel_input import WheelInput
@@ -130,6 +130,7 @@ class Robot:
             self._send_odometry: SECOND_US,
             self._extend_log: SECOND_US,
             self._relative_poses: round(SECOND_US / config.relative_pose.rate_hz),
+            self._what_if: SECOND_US,
             self._consistency: round(SECOND_US / config.consistency.rate_hz),
             self._optimize: round(SECOND_US / config.optimizer.rate_hz),
             self._check_health: SECOND_US,
@@ -238,6 +239,13 @@ class Robot:
             if not self.jobs.is_busy(RELATIVE_POSE, window.pair)
         ]
 
+    def _what_if(self, utime: int) -> list[Effect]:
+        """Where windows disagree again and again: which mistake in the mountings explains them?"""
+        if self.jobs.is_busy(WHAT_IF) or self.jobs.is_resting(WHAT_IF, utime):
+            return []
+        asked = self.front.what_if(self.neighbours(utime), self.back.graph, utime)
+        return [self.jobs.begin(Job(WHAT_IF, w.pair, w.request), w.run) for w in asked]
+
     def _consistency(self, utime: int) -> list[Effect]:
         """Module 2: which of a pair's closures belong together."""
         return [
@@ -255,6 +263,10 @@ class Robot:
 
     def _on_job(self, event: JobDone) -> list[Effect]:
         job = self.jobs.finish(event)
+        if job.module == WHAT_IF and job.pair is not None and job.request is not None:
+            measured = len(job.request.window)
+            job.pair.search.on_costs(job.request.utime, event.result, measured)
+            return []
         if job.pair is not None and job.request is not None:
             job.pair.on_estimate(job.request, event.result)
             return []

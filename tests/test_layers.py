@@ -26,6 +26,7 @@ RINGS = {
         "jobs",
         "broadcast",
         "health",
+        "mounting_advice",
         "diagnosis",
         "robot",
         "report",

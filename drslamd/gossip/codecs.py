@@ -38,7 +38,7 @@ from drslamd.slam.robot_model import RobotModel
 MILLIMETRE_M = 1e-3
 LONGEST_STEP = 2**15 - 1
 """Between two samples: 3.2 m or 3.2 rad in a tenth of a second."""
-TRAITS = 7
+TRAITS = 8
 MAX_TRAIT = 10.0
 MAX_UWB_ID = 2**32 - 1
 

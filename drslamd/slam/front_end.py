@@ -22,11 +22,13 @@ from drslamd.slam.odometry.dead_reckoning import DeadReckoning
 from drslamd.slam.odometry.track import RESOLUTION
 from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.range_model import RangeNoise
+from drslamd.slam.relative_pose import what_if
 from drslamd.slam.relative_pose.estimate import PairNoise, RelativePoseEstimate
 from drslamd.slam.relative_pose.pair_end import PairEnd
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 from drslamd.slam.relative_pose.range_sampler import RangeSampler
 from drslamd.slam.relative_pose.window_request import WindowRequest, request
+from drslamd.slam.se2 import Array
 from drslamd.slam.tuning import DEFAULTS, Tuning
 
 KEYFRAME_M = 0.05
@@ -56,6 +58,14 @@ class WindowJob(NamedTuple):
     run: Callable[[], RelativePoseEstimate]
 
 
+class WhatIfJob(NamedTuple):
+    """A search for mistakes in the mountings of a pair, by one window: chi-squared of each case."""
+
+    pair: PairTracker
+    request: WindowRequest
+    run: Callable[[], Array]
+
+
 class FrontEnd:
     """What this robot measures, prepared for the graph."""
 
@@ -71,10 +81,11 @@ class FrontEnd:
             known: of our sensors, from before this start; it is taken out of what they say.
         """
         section = config.relative_pose
-        self._own = own
+        self.own = own
         self._known, self._range_model = known, tuning.ranges
         self._method = settings.closure_method(section, tuning)
         self._range_sigma, self._bias_sigma = section.range_sigma_m, section.range_bias_sigma_m
+        self._delta = section.delta
         self._nlos_db, self._epsilon = section.nlos_db, config.consistency.epsilon
         self._tells_all = config.optimizer.algorithm != "banded"
         noise = known.narrowed(settings.odometry_noise(config.odometry))
@@ -136,7 +147,7 @@ class FrontEnd:
 
     def _owns(self, peer: PeerInRange) -> bool:
         """Are we the one of the two that makes closures?"""
-        return self._own.robot < peer.chain.robot or not peer.ranges_to_us
+        return self.own.robot < peer.chain.robot or not peer.ranges_to_us
 
     def needed(self, neighbours: list[PeerInRange], utime: int) -> set[int]:
         """Robots whose odometry our windows need."""
@@ -160,7 +171,7 @@ class FrontEnd:
         self, neighbours: list[PeerInRange], graph: PoseGraph, utime: int
     ) -> Iterator[PeerInRange]:
         """Peers of owned pairs to which ranges come in and whose log has begun."""
-        if self._own.robot not in graph.chains:
+        if self.own.robot not in graph.chains:
             return
         for peer in neighbours:
             ranges, data = self.ranges.get(peer.uwb_id), graph.chains.get(peer.chain.robot)
@@ -176,7 +187,7 @@ class FrontEnd:
         for peer in self._measured(neighbours, graph, utime):
             pair = self.pairs.get(peer.chain.robot)
             if pair is not None and pair.peer == peer.chain and peer.ahead_us is not None:
-                a = PairEnd(self.reckoning.track, graph.chains[self._own.robot])
+                a = PairEnd(self.reckoning.track, graph.chains[self.own.robot])
                 b = PairEnd(peer.track, graph.chains[peer.chain.robot], peer.ahead_us)
                 out.append(Measurable(pair, a, b))
         return out
@@ -217,20 +228,38 @@ class FrontEnd:
     def _computation(
         self, pair: PairTracker, found: WindowRequest, b: PairEnd, estimate: TeamEstimate | None
     ) -> Callable[[], RelativePoseEstimate]:
-        peer = pair.peer.robot
-        bias_sigma = self._known.bias_sigma(peer, self._bias_sigma)
-        noise = PairNoise(
-            RangeNoise(self._range_sigma, bias_sigma),
-            self.model.noise,
-            b.data.model.noise,
-            self._range_model,
-        )
-        known = PairCalibration.of(self._used(estimate), self._own.robot, peer)
-        return partial(self._method.solve, found.window, noise, known)
+        known = self._calibration(pair, estimate)
+        return partial(self._method.solve, found.window, self._noise(pair, b), known)
+
+    def _noise(self, pair: PairTracker, b: PairEnd) -> PairNoise:
+        bias_sigma = self._known.bias_sigma(pair.peer.robot, self._bias_sigma)
+        ranges = RangeNoise(self._range_sigma, bias_sigma)
+        return PairNoise(ranges, self.model.noise, b.data.model.noise, self._range_model)
+
+    def _calibration(self, pair: PairTracker, estimate: TeamEstimate | None) -> PairCalibration:
+        found = pair.search.found
+        return PairCalibration.of(self._used(estimate), self.own.robot, pair.peer.robot, found)
 
     def _used(self, estimate: TeamEstimate | None) -> TeamEstimate | None:
         """What was learned, where it serves modules 1 and 2."""
         return estimate if self._method.uses_calibration else None
+
+    def what_if(
+        self, neighbours: list[PeerInRange], graph: PoseGraph, utime: int
+    ) -> list[WhatIfJob]:
+        """Begin the searches for mistakes in mountings that are due, where windows disagree."""
+        out = []
+        for pair, a, b in self._measurable(neighbours, graph, utime):
+            if not (self._method.uses_calibration and pair.search.is_due(utime)):
+                continue
+            found = request(pair.ranges, a, b, self._method.rule, self._range_model)
+            if isinstance(found, str):
+                continue
+            pair.search.begin(utime)
+            question = what_if.ask(found, a, b)
+            run = partial(question.costs, self._noise(pair, b), self._delta)
+            out.append(WhatIfJob(pair, found, run))
+        return out
 
     # ---- module 2 ----
 
@@ -243,12 +272,12 @@ class FrontEnd:
             estimate: see `module1`.
         """
         out = []
-        own = graph.chains.get(self._own.robot)
+        own = graph.chains.get(self.own.robot)
         for robot, pair in self.pairs.items():
             data = graph.chains.get(robot)
             if own is None or data is None or data.chain != pair.peer:
                 continue
-            known = PairCalibration.of(self._used(estimate), self._own.robot, robot)
+            known = self._calibration(pair, estimate)
             corrections = known.a.correction, known.b.correction
             job = pair.begin_check(own, data, self.model.noise, corrections)
             if job is not None:

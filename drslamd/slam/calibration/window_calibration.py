@@ -22,9 +22,11 @@ import numpy as np
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
 from drslamd.slam.odometry.correction import Correction
+from drslamd.slam.odometry.mounting import LEARNED, Repair
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.range_model import RangeNoise
 from drslamd.slam.relative_pose.estimate import PairNoise
+from drslamd.slam.relative_pose.what_if import Case
 from drslamd.slam.relative_pose.window import Window
 from drslamd.slam.se2 import Array
 
@@ -52,6 +54,13 @@ class EndCalibration(NamedTuple):
             estimate.turn.get(robot, Learned()).value,
             (x.value, y.value),
         )
+
+    @staticmethod
+    def repaired(repair: Repair) -> EndCalibration:
+        """Where a search for mistakes has found one that is learned."""
+        if repair.fault not in LEARNED:
+            return EndCalibration()
+        return EndCalibration(Learned(1 - repair.way), repair.turn - 1)
 
     @property
     def correction(self) -> Correction:
@@ -86,8 +95,17 @@ class PairCalibration(NamedTuple):
     near_bias: Learned = Learned()
 
     @staticmethod
-    def of(estimate: TeamEstimate | None, a: int, b: int) -> PairCalibration:
-        """Of robots a and b, as the team's last solution has them, if it is one."""
+    def of(
+        estimate: TeamEstimate | None, a: int, b: int, found: Case | None = None
+    ) -> PairCalibration:
+        """Of robots a and b, as the team's last solution has them, if it is one.
+
+        Args:
+            found: what a search for mistakes found; it serves until module 3 has learned more.
+        """
+        if found is not None and not _has_learned(estimate, (a, b), found):
+            a_end, b_end = (EndCalibration.repaired(repair) for repair in found)
+            return PairCalibration(a=a_end, b=b_end)
         if estimate is None or not estimate.converged:
             return PairCalibration()
         pair = (min(a, b), max(a, b))
@@ -98,6 +116,19 @@ class PairCalibration(NamedTuple):
             estimate.scatter.get(pair, 1.0),
             estimate.near_bias_m,
         )
+
+
+def _has_learned(estimate: TeamEstimate | None, robots: tuple[int, int], found: Case) -> bool:
+    """Has module 3 gone most of the way to what was found?"""
+    if estimate is None or not estimate.converged:
+        return False
+    for robot, repair in zip(robots, found, strict=True):
+        start = EndCalibration.repaired(repair)
+        scale = estimate.scale.get(robot, Learned()).value
+        turn = estimate.turn.get(robot, Learned()).value
+        if abs(start.scale.value - scale) > abs(scale) or abs(start.turn - turn) > abs(turn):
+            return False
+    return True
 
 
 def remaining(learned: Learned, before: float, least: float) -> float:

@@ -19,8 +19,10 @@ from drslamd.slam.consistency.pcm import Candidate, PairConsistency
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import ClosureMeasurement
 from drslamd.slam.odometry.correction import Correction
+from drslamd.slam.odometry.mounting import LEARNED, Fault
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.relative_pose.estimate import RelativePoseEstimate
+from drslamd.slam.relative_pose.mounting_search import MountingSearch
 from drslamd.slam.relative_pose.pair_end import at_keyframes
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 from drslamd.slam.relative_pose.range_sampler import RangeSampler
@@ -91,6 +93,7 @@ class PairTracker:
         kept: closures of the consistent set, as module 2 last left it.
         agreement: when they are believed.
         connected: are they?
+        search: for mistakes in the mountings, where windows disagree.
     """
 
     def __init__(
@@ -115,6 +118,7 @@ class PairTracker:
         self.closures_seen = 0
         self.kept: tuple[ClosureMeasurement, ...] = ()
         self.connected = False
+        self.search = MountingSearch()
         self._checked: Checked | None = None
         self._is_busy = False
         self._corrections = UNCORRECTED
@@ -135,11 +139,20 @@ class PairTracker:
     def on_estimate(self, request: WindowRequest, estimate: RelativePoseEstimate) -> None:
         """Module 1 has answered."""
         self.count(estimate.verdict.value)
+        self.search.on_verdict(estimate.verdict)
         self.history.append(WindowAnswer(self._number, request.utime, estimate))
         if estimate.hypotheses:
             self.closures_seen += 1
             self._pending.append((self._number, request, estimate))
             self._number += 1
+
+    @property
+    def is_refused(self) -> bool:
+        """Is a robot of the pair wired so that nothing of the pair can be believed?"""
+        found = self.search.found
+        return found is not None and any(
+            repair.fault not in (Fault.NONE, *LEARNED) for repair in found
+        )
 
     # ---- module 2 ----
 
@@ -241,7 +254,8 @@ class PairTracker:
             return
         # the rivals are searched last: that takes a while
         rivals = self.agreement.outnumber and checked.consistency.rivals()
-        self.connected = enough and len(self.kept) >= self.agreement.outnumber * rivals
+        outnumbers = len(self.kept) >= self.agreement.outnumber * rivals
+        self.connected = enough and outnumbers and not self.search.disagrees
 
     def accepted(self) -> set[int]:
         """Numbers of all closures that are kept, of earlier segments too, back to `history`."""
@@ -260,7 +274,8 @@ class PairTracker:
         """
         if self._checked is None:
             return []
-        kept = {m.number: m for m in self.kept} if self.connected else {}
+        believed = self.connected and not self.is_refused
+        kept = {m.number: m for m in self.kept} if believed else {}
         remembered = min((m.number for m in self._checked.measurements), default=0)
         gone = [
             replace(m, kept=False)

@@ -1,0 +1,51 @@
+"""What is said of wheels that are not mounted as configured: whose, and which key to set."""
+
+from __future__ import annotations
+
+from drslamd.slam.odometry.mounting import Fault, Repair
+from drslamd.slam.relative_pose.mounting_search import MountingSearch
+
+CHECK = {
+    Fault.MIRRORED: (
+        "run backwards on both sides (set wheels.reverse_left and wheels.reverse_right) or are "
+        "swapped (wheels.swap_channels, or left and right in [wheels])"
+    ),
+    Fault.LEFT_REVERSED: "run backwards on the left (set wheels.reverse_left)",
+    Fault.RIGHT_REVERSED: "run backwards on the right (set wheels.reverse_right)",
+}
+"""Of the wheels of a robot."""
+
+
+def advice(own: int, peer: int, search: MountingSearch, peer_is_odd: bool) -> str | None:
+    """One sentence on a pair; None while nothing is wrong with it.
+
+    Args:
+        peer_is_odd: do we agree with other robots?
+    """
+    case = search.found
+    if case is None:
+        if not search.is_puzzled:
+            return None
+        return (
+            f"ranges and odometry of robots {own} and {peer} contradict each other, and no usual "
+            "mistake explains it; look at the wheels and the antennas of both"
+        )
+    if case.b.fault is Fault.MIRRORED:
+        whose = f"robot {peer}" if peer_is_odd else f"robot {own} or {peer}"
+        return f"the wheels of {whose} {CHECK[Fault.MIRRORED]}"
+    found = ((own, case.a), (peer, case.b))
+    return ", ".join(_of_one(robot, repair) for robot, repair in found if repair.fault.value)
+
+
+def _of_one(robot: int, repair: Repair) -> str:
+    if repair.fault is Fault.TRACK:
+        return (
+            f"wheels.track_m of robot {robot} should be about {1 / repair.turn:.1f} times what it "
+            "is; it is learned meanwhile"
+        )
+    if repair.fault is Fault.SCALE:
+        return (
+            f"the odometry of robot {robot} should be about {repair.way:.1f} times as long; set "
+            "wheels.counts_per_metre (or the radius of its wheels); it is learned meanwhile"
+        )
+    return f"the wheels of robot {robot} {CHECK[repair.fault]}"
