@@ -60,6 +60,7 @@ SLAM_ORDER = [
 """The rooms of `slam` and what stands beside them, in the order of the paper."""
 
 OPTIMIZER_ORDER = [
+    "bias_prior",
     "problem",
     "complex_factors",
     "vertex_cover",
@@ -99,7 +100,7 @@ NOUNS = {
 }
 """Modules that hold only nouns, types or protocols: what uses them is tested."""
 
-SAID_OF_MANY = {"solve"}
+SAID_OF_MANY = {"solve", "descend"}
 """Verbs that their module qualifies."""
 
 

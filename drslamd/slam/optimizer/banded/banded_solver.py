@@ -14,7 +14,7 @@ import numpy as np
 
 from drslamd.slam import se2
 from drslamd.slam.optimizer.banded import claims
-from drslamd.slam.optimizer.banded.descent import TOLERANCE, descend
+from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import explain, raised
 from drslamd.slam.optimizer.problem import Calibration, Problem, Solution
@@ -38,7 +38,7 @@ def solve(
         start: calibration to start from (zero when left out).
         marginals: poses whose joint covariance is wanted.
         most: bound on steps.
-        tolerance: see `descent.TOLERANCE`.
+        tolerance: see `newton_descent.TOLERANCE`.
     """
     equations = Equations(problem)
     start = start or Calibration.zero(problem.pairs, len(problem.priors.scale))
@@ -52,7 +52,7 @@ def solve(
     wanted = np.array(marginals, dtype=int)
     joint, spread = claims.covariances(feared, point, scatter, wanted)
     if not explained.is_odometry:
-        joint += claims.between(nominal, explained.point, wanted)
+        joint += claims.disagreement(nominal, explained.point, wanted)
     return Solution(
         poses,
         point.calibration,

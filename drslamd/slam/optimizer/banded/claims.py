@@ -7,7 +7,7 @@ import numpy as np
 from drslamd.slam import se2
 from drslamd.slam.calibration.range_scatter import LEAST_SCATTER, scatter_ratios
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
-from drslamd.slam.optimizer.banded.descent import Point
+from drslamd.slam.optimizer.banded.newton_descent import Point
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.problem import Calibration, Problem, range_errors
 from drslamd.slam.se2 import Array, Index
@@ -55,7 +55,7 @@ def scatter_of(problem: Problem, point: Point) -> Array:
     )
 
 
-def between(one: Point, other: Point, wanted: Index) -> Array:
+def disagreement(one: Point, other: Point, wanted: Index) -> Array:
     """(3 k, 3 k) what two explanations differ by, when nobody can tell which is right."""
     apart = one.poses[wanted] - other.poses[wanted]
     apart[:, 2] = se2.wrap(apart[:, 2])

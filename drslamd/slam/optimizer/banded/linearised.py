@@ -31,7 +31,7 @@ class Linearised(NamedTuple):
     pull: Array
 
 
-def odometry(problem: Problem, poses: Array, calibration: Calibration) -> Linearised:
+def odometry_at(problem: Problem, poses: Array, calibration: Calibration) -> Linearised:
     """By both poses, scale and yaw rate."""
     factors = problem.odometry
     error = pose_errors(poses, factors, corrected(factors, calibration))
@@ -53,14 +53,14 @@ def odometry_jacobian(problem: Problem, poses: Array) -> Array:
     return jacobian
 
 
-def closures(problem: Problem, poses: Array) -> Linearised:
+def closures_at(problem: Problem, poses: Array) -> Linearised:
     """By both poses."""
     factors = problem.closures
     error = pose_errors(poses, factors, factors.measured)
     return Linearised(pose_jacobian(poses, factors), factors.information, _pulled(factors, error))
 
 
-def ranges(
+def ranges_at(
     problem: Problem, poses: Array, calibration: Calibration, threshold: Array
 ) -> Linearised:
     """By both poses, bias and near-range bias; cost is Cauchy's, c^2 log(1 + (e / c)^2).

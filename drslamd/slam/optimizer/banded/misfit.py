@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from drslamd.slam.optimizer.banded import linearised
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
-from drslamd.slam.optimizer.banded.descent import Point
+from drslamd.slam.optimizer.banded.newton_descent import Point
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.problem import Problem, corrected, pose_errors, range_errors
 from drslamd.slam.se2 import Array, Index

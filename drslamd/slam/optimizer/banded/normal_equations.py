@@ -177,9 +177,9 @@ class Equations:
     ) -> System:
         problem = self.problem
         system = System.empty(self.layout)
-        self._odometry.add_matrix(system, linearised.odometry(problem, poses, calibration))
+        self._odometry.add_matrix(system, linearised.odometry_at(problem, poses, calibration))
         if len(problem.closures):
-            self._closures.add_matrix(system, linearised.closures(problem, poses))
+            self._closures.add_matrix(system, linearised.closures_at(problem, poses))
         ranges = linearised.weighed_ranges(problem, poses, calibration, threshold, claims)
         self._ranges.add_matrix(system, ranges)
         self._add_gaussian_priors(system)
@@ -189,10 +189,10 @@ class Equations:
         self, poses: Array, calibration: Calibration, threshold: Array
     ) -> Iterator[tuple[_Assembly, Linearised]]:
         problem = self.problem
-        yield self._odometry, linearised.odometry(problem, poses, calibration)
+        yield self._odometry, linearised.odometry_at(problem, poses, calibration)
         if len(problem.closures):
-            yield self._closures, linearised.closures(problem, poses)
-        yield self._ranges, linearised.ranges(problem, poses, calibration, threshold)
+            yield self._closures, linearised.closures_at(problem, poses)
+        yield self._ranges, linearised.ranges_at(problem, poses, calibration, threshold)
 
     def _add_heavy_priors(self, system: System, calibration: Calibration) -> None:
         layout, priors = self.layout, self.problem.priors

@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drslamd.slam.optimizer.banded.descent import Point, descend
 from drslamd.slam.optimizer.banded.misfit import (
     Misfit,
     Run,
@@ -26,6 +25,7 @@ from drslamd.slam.optimizer.banded.misfit import (
     outlier_share,
     runs,
 )
+from drslamd.slam.optimizer.banded.newton_descent import Point, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array, Index
