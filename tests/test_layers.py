@@ -91,7 +91,6 @@ NOUNS = {
     "gossip.message_types",
     "io.transport",
     "sensors.samples",
-    "slam.graph.estimate",
     "slam.graph.measurements",
     "slam.optimizer.contract",
     "slam.peer_in_range",
