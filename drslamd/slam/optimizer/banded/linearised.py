@@ -41,7 +41,7 @@ def odometry_at(problem: Problem, poses: Array, calibration: Calibration) -> Lin
 
 
 def odometry_jacobian(problem: Problem, poses: Array) -> Array:
-    """(m, 3, 8)"""
+    """(m, 3, 8): derivative of the errors by both poses, scale and yaw rate."""
     factors = problem.odometry
     x, y = factors.measured[:, 0], factors.measured[:, 1]
     jacobian = np.zeros((len(factors), 3, 8))
@@ -61,26 +61,31 @@ def closures_at(problem: Problem, poses: Array) -> Linearised:
 
 
 def ranges_at(
-    problem: Problem, poses: Array, calibration: Calibration, threshold: Array
+    problem: Problem,
+    poses: Array,
+    calibration: Calibration,
+    threshold: Array,
+    least: float = LEAST_CURVATURE,
 ) -> Linearised:
     """By both poses, bias and near-range bias; cost is Cauchy's, c^2 log(1 + (e / c)^2).
 
     Args:
         threshold: (pairs,) c, in sigmas, as e is.
+        least: see `LEAST_CURVATURE`.
     """
     factors = problem.ranges
     error, jacobian = _range_jacobian(problem, poses, calibration)
     squared = (error / (threshold[factors.pair] * factors.sigma)) ** 2
     weight = 1 / (1 + squared) / factors.sigma**2
     # the second derivative makes the steps of an iteration shrink fast
-    bent = weight * np.maximum((1 - squared) / (1 + squared), LEAST_CURVATURE)
+    bent = weight * np.maximum((1 - squared) / (1 + squared), least)
     return Linearised(jacobian, bent[:, None, None], (weight * error)[:, None])
 
 
 def weighed_ranges(
     problem: Problem, poses: Array, calibration: Calibration, threshold: Array, claims: Array
 ) -> Linearised:
-    """The same without the curvature, and with so much information as ranges really have.
+    """The same without the curvature, and with as much information as ranges really have.
 
     Args:
         claims: (pairs,) how many times the sent sigma ranges are as wrong by.
@@ -123,4 +128,5 @@ def pose_jacobian(poses: Array, factors: BetweenFactors) -> Array:
 
 
 def _pulled(factors: BetweenFactors, errors: Array) -> Array:
+    """(m, 3) W e."""
     return np.asarray((factors.information @ errors[..., None])[..., 0])

@@ -10,6 +10,7 @@ import numpy as np
 from drslamd.slam.optimizer.banded import linearised
 from drslamd.slam.optimizer.banded.layout import BandLayout
 from drslamd.slam.optimizer.banded.linearised import Linearised
+from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
 from drslamd.slam.optimizer.problem import (
     Calibration,
     Problem,
@@ -130,19 +131,29 @@ class Equations:
     def gradient(self, poses: Array, calibration: Calibration, threshold: Array) -> Array:
         """(n + b,) half the derivative of the cost."""
         gradient = np.zeros(self.layout.band + self.layout.border)
-        for where, factors in self._factors(poses, calibration, threshold):
+        for where, factors in self._factors(poses, calibration, threshold, LEAST_CURVATURE):
             where.add_gradient(gradient, factors)
         self._add_pull_of_priors(gradient, poses, calibration)
         return gradient
 
-    def at(self, poses: Array, calibration: Calibration, threshold: Array) -> tuple[System, Array]:
-        """A matrix close to half the second derivative of the cost, and the gradient."""
+    def at(
+        self,
+        poses: Array,
+        calibration: Calibration,
+        threshold: Array,
+        least: float = LEAST_CURVATURE,
+    ) -> tuple[System, Array]:
+        """A matrix close to half the second derivative of the cost, and the gradient.
+
+        Args:
+            least: see `bias_prior.LEAST_CURVATURE`.
+        """
         layout = self.layout
         system, gradient = System.empty(layout), np.zeros(layout.band + layout.border)
-        for where, factors in self._factors(poses, calibration, threshold):
+        for where, factors in self._factors(poses, calibration, threshold, least):
             where.add_matrix(system, factors)
             where.add_gradient(gradient, factors)
-        self._add_heavy_priors(system, calibration)
+        self._add_heavy_priors(system, calibration, least)
         self._add_gaussian_priors(system)
         self._add_pull_of_priors(gradient, poses, calibration)
         return system, gradient
@@ -169,7 +180,7 @@ class Equations:
         """What the factors say by their weights: what is left of an outlier's counts still."""
         claims = np.ones(self.problem.pairs)
         system = self._weighed(poses, calibration, threshold, claims)
-        self._add_heavy_priors(system, calibration)
+        self._add_heavy_priors(system, calibration, LEAST_CURVATURE)
         return system
 
     def _weighed(
@@ -186,21 +197,21 @@ class Equations:
         return system
 
     def _factors(
-        self, poses: Array, calibration: Calibration, threshold: Array
+        self, poses: Array, calibration: Calibration, threshold: Array, least: float
     ) -> Iterator[tuple[_Assembly, Linearised]]:
         problem = self.problem
         yield self._odometry, linearised.odometry_at(problem, poses, calibration)
         if len(problem.closures):
             yield self._closures, linearised.closures_at(problem, poses)
-        yield self._ranges, linearised.ranges_at(problem, poses, calibration, threshold)
+        yield self._ranges, linearised.ranges_at(problem, poses, calibration, threshold, least)
 
-    def _add_heavy_priors(self, system: System, calibration: Calibration) -> None:
+    def _add_heavy_priors(self, system: System, calibration: Calibration, least: float) -> None:
         layout, priors = self.layout, self.problem.priors
         team = float(calibration.team_bias[0])
-        own = priors.bias.own_curvature(calibration.bias - team)
+        own = priors.bias.own_curvature(calibration.bias - team, least)
         system.add_difference(layout.bias, layout.team_bias, own)
-        system.add_prior(layout.team_bias, priors.bias.team_curvature(team))
-        system.add_prior(layout.scale, priors.scale_curvature(calibration.scale))
+        system.add_prior(layout.team_bias, priors.bias.team_curvature(team, least))
+        system.add_prior(layout.scale, priors.scale_curvature(calibration.scale, least))
 
     def _add_gaussian_priors(self, system: System) -> None:
         layout, priors = self.layout, self.problem.priors
