@@ -138,9 +138,9 @@ def _run_level(problem: Problem, found: list[Run]) -> Array:
     odometry = problem.odometry
     level = np.ones(len(odometry))
     for run in found:
-        since = problem.n[run.first] - BEFORE
-        either = (odometry.robot == run.i) | (odometry.robot == run.j)
-        level[either & (problem.n[odometry.j] >= since)] = FIRST_LEVEL**2
+        for robot, n in ((run.i, run.n_i), (run.j, run.n_j)):
+            since = problem.n[odometry.j] >= n - BEFORE
+            level[since & (odometry.robot == robot)] = FIRST_LEVEL**2
     return level
 
 
@@ -158,7 +158,7 @@ def _cells_settled(problem: Problem, point: Point, variance: Array) -> tuple[Arr
     for _ in range(ROUNDS_OF_CELLS):
         point, now = _solved(problem, variance, point)
         wanted = _wanted(now, variance, cell)
-        if np.abs(np.log(wanted / variance)).max() < SETTLED:
+        if np.abs(np.log(wanted / variance)).max(initial=0.0) < SETTLED:
             break
         variance = wanted
     return variance, point
