@@ -118,8 +118,8 @@ def team_problem(
     joined = [(robots * k, robots * k + 1) for k in np.linspace(1, count - 2, closures).astype(int)]
     priors = Priors(
         bias=BIAS,
-        scale=np.full(robots, 0.03),
-        scale_tails=1.0,
+        scale=np.full(robots, 0.06),
+        scale_tails=2.0,
         yaw=np.full(robots, 0.01),
         near_bias=0.1,
     )

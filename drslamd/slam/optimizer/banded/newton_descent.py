@@ -83,11 +83,12 @@ def descend(
         poses = point.poses + step[layout.poses]
         calibration = point.calibration.plus(layout.calibration(step))
         before, size = size, float(np.abs(step[layout.poses]).max())
+        metres = max(size, float(np.abs(step[layout.bias]).max(initial=0.0)))
         if not is_kept and not _is_better(equations, poses, calibration, point):
-            (damping, level), factor = _stiffer(damping, level, size), None
+            (damping, level), factor = _stiffer(damping, level, metres), None
             continue
-        level = 0 if size < NEAR else 1 if size < FAR else 2
-        if size > NEAR or size > FASTER * before:
+        level = 0 if metres < NEAR else 1 if metres < FAR else 2
+        if metres > NEAR or size > FASTER * before:
             damping, factor = damping / 10, None
         converged = size < tolerance
         point = _point(problem, poses, calibration)

@@ -12,7 +12,6 @@ from slam_scenes import Array
 
 from drslamd.slam.optimizer.banded.misfit import (
     OF_RUN,
-    OUTLIER_SIGMAS,
     RUN,
     Misfit,
     Run,
@@ -102,7 +101,7 @@ def errs(sigmas: Array, pair: Array | None = None) -> tuple[Problem, Point]:
 
 @pytest.mark.parametrize("times", [0.99, 1.01, -0.99, -1.01])
 def test_a_range_is_an_outlier_beyond_two_and_a_half_sigmas(times: float) -> None:
-    problem, point = errs(np.array([0.0, times * OUTLIER_SIGMAS, 0.0]))
+    problem, point = errs(np.array([0.0, times * 2.5, 0.0]))
     assert outliers(problem, point).tolist() == [False, abs(times) > 1, False]
 
 
