@@ -72,8 +72,6 @@ class RangeModel:
             measured from the antenna but from a point beside it.
         huber_sigmas: of module 1; beyond it a range loses weight (bursts are 0.3 m and more).
         cauchy_sigmas: of module 3; a burst of 0.5 m weighs 1/50 of a good range.
-        shared: ranges of one second and the next have a correlation of 0.3 to 0.7, so a sigma
-            counted as if they had none is wrong by about this factor.
     """
 
     slow_share: float = 0.8
@@ -91,10 +89,10 @@ class RangeModel:
     antenna_sigma_m: float = 0.03
     huber_sigmas: float = 2.5
     cauchy_sigmas: float = 2.5
-    shared: float = 2.0
 
     def correlated_ratio(self, period_s: float) -> float:
-        """How many times less than independent ones many ranges tell, one every `period_s`.
+        """How many times more wrong many ranges are together, one every `period_s`, than if each
+        had its own error.
 
         The variance of a mean of values with a slow part is larger by the sum of its correlations.
         """

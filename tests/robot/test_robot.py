@@ -213,13 +213,16 @@ def test_without_odometry_or_an_estimate_of_us_there_is_no_pose() -> None:
     scene = RobotScene()
     other = Trajectory(Chain(4, 1), np.array([7]), np.zeros((1, 3)))
     own = Trajectory(scene.robot.own, np.array([1001]), np.zeros((1, 3)))
-    covariances = {0: np.eye(3)}
+    joint = np.eye(3)
     assert scene.robot.pose() is None
-    scene.robot.back.on_solution(TeamEstimate(Segment(0, 1, 0), {0: own}, covariances))
+    scene.robot.back.on_solution(TeamEstimate(Segment(0, 1, 0), {0: own}, joint))
     assert scene.robot.pose() is None
     scene.drive(1)
     assert scene.robot.pose() is not None
-    scene.robot.back.on_solution(TeamEstimate(Segment(4, 1, 0), {4: other}, covariances))
+    # an estimate that claims nothing of us
+    scene.robot.back.on_solution(TeamEstimate(Segment(0, 1, 0), {4: other, 0: own}, joint))
+    assert scene.robot.pose() is None
+    scene.robot.back.on_solution(TeamEstimate(Segment(4, 1, 0), {4: other}, joint))
     assert scene.robot.pose() is None
 
 

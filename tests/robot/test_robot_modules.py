@@ -49,7 +49,7 @@ def test_an_answer_of_module_3_is_our_estimate_and_our_pose_goes_out() -> None:
     n = scene.robot.front.reckoning.track.end - 1
     own = Trajectory(scene.robot.own, np.array([n]), np.zeros((1, 3)))
     estimate = TeamEstimate(
-        Segment(0, 1, 0), {0: own}, {0: np.eye(3)}, scale={0: Learned(0.03, 0.01)}
+        Segment(0, 1, 0), {0: own}, joint=np.eye(3), scale={0: Learned(0.03, 0.01)}
     )
     effects = answered(scene, Job(OPTIMIZER), estimate)
     assert scene.robot.back.estimate is estimate

@@ -82,8 +82,6 @@ def test_the_default_optimiser_gets_the_noise_of_ranges() -> None:
     [
         ({"ranges": OTHER_RANGES}, {"model": OTHER_RANGES}),
         ({"scale_tails": 1.0}, {"scale_tails": 1.0}),
-        ({"has_cauchy_priors": False}, {"has_cauchy_priors": False}),
-        ({"learns_scatter": False}, {"learns_scatter": False}),
     ],
 )
 def test_what_the_laboratory_tunes_reaches_the_optimiser(

@@ -19,7 +19,7 @@ import numpy as np
 from drslamd.slam.se2 import Array, Index
 
 PRIOR_RANGES = 20
-"""m: as much as five independent ranges (see `RangeModel.shared`) would say, which leaves
+"""m: as much as five independent ranges would say (see `RangeModel.correlated_ratio`), which leaves
 what was configured uncertain by a third."""
 ROUNDS = 5
 """Of weighing; each brings the ratio nearer to its end by a factor of three."""

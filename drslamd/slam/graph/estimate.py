@@ -39,7 +39,7 @@ class Lifted:
 
 
 class Learned(NamedTuple):
-    """A constant of a sensor, and the sigma of what was measured of it (infinite of nothing)."""
+    """A constant of a sensor, and its sigma, all that is known counted (infinite: nothing is)."""
 
     value: float = 0.0
     sigma: float = float("inf")

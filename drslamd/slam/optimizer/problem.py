@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.slam import range_model, se2
-from drslamd.slam.optimizer.bias_prior import BiasPrior, cauchy_curvature
+from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE, BiasPrior, cauchy_curvature
 from drslamd.slam.optimizer.mounting_prior import ANTENNA, TRACK
 from drslamd.slam.range_model import LINKTRACK, RangeModel
 from drslamd.slam.se2 import Array, Index
@@ -106,7 +106,8 @@ class Priors:
     Attributes:
         bias: of the pairs' range biases.
         scale: (robots,) sigmas as configured, a fraction.
-        scale_tails: the distribution of a scale is Cauchy's, so many times narrower than that.
+        scale_tails: the cost of a scale is Cauchy's, log(1 + (s / width)^2), with a width so many
+            times narrower than that.
         yaw: (robots,) sigmas, rad/m.
         near_bias: m, for the whole team: its modules are of one kind, and the near-range bias
             follows the power that is received.
@@ -120,16 +121,16 @@ class Priors:
 
     @property
     def scale_width(self) -> Array:
-        """(robots,) half widths of the distributions of scales."""
+        """(robots,) half widths of Cauchy's cost, a fraction."""
         return self.scale / self.scale_tails
 
     def scale_pull(self, scale: Array) -> Array:
         """(robots,) half the derivative of the cost by scales."""
         return np.asarray(scale / (self.scale_width**2 + scale**2))
 
-    def scale_curvature(self, scale: Array) -> Array:
-        """(robots,) half the second derivative."""
-        return cauchy_curvature(self.scale_width, scale)
+    def scale_curvature(self, scale: Array, least: float = LEAST_CURVATURE) -> Array:
+        """(robots,) half the second derivative, kept positive."""
+        return cauchy_curvature(self.scale_width, scale, least)
 
     def cost(self, calibration: Calibration) -> float:
         """Of all that is learned of the sensors."""

@@ -65,8 +65,8 @@ def test_nothing_is_taken_out_where_it_is_not_wanted_but_it_is_still_learned(
 
 
 def test_a_start_that_learns_less_keeps_what_there_was() -> None:
-    widened = math.hypot(2 * 0.03, CHANGED_BIAS_M)
-    less, more = (Learned(0.1, factor * widened / 2) for factor in (1.01, 0.99))
+    kept = math.hypot(0.03, CHANGED_BIAS_M)
+    less, more = (Learned(0.1, factor * kept) for factor in (1.01, 0.99))
     assert after(CalibrationStore(KEPT, True), bias=less) == KEPT
     assert after(CalibrationStore(KEPT, True), bias=more).bias[2].value == pytest.approx(-0.3)
     memory = CalibrationStore(KEPT, True)

@@ -57,33 +57,40 @@ def test_what_was_never_measured_changes_nothing() -> None:
 
 def test_what_is_left_is_never_below_what_no_constant_describes() -> None:
     _, noise = calibrated_window(uncalibrated(4)[0], SENSORS, KNOWN)
-    assert noise.ranges.bias_sigma == pytest.approx(1 / math.hypot(1 / 0.3, 1 / 0.0539), rel=1e-3)
-    assert noise.ranges.bias_sigma > 0.98 * LINKTRACK.least_bias_m
-    assert 0.9 * LEAST_SCALE < noise.b.scale < NOISE.scale
+    assert noise.ranges.bias_sigma == pytest.approx(math.hypot(0.01, LINKTRACK.least_bias_m))
+    assert noise.b.scale == pytest.approx(math.hypot(0.001, LEAST_SCALE))
+    assert noise.b.scale < NOISE.scale
     assert noise.a.yaw_rad_per_m == NOISE.yaw_rad_per_m
 
 
 @pytest.mark.parametrize("scatter", [0.5, 1.0, 1.3])
-def test_ranges_that_scatter_less_have_taught_more(scatter: float) -> None:
+def test_what_module_3_says_of_its_sigmas_is_taken_as_it_is(scatter: float) -> None:
+    """How much the ranges of the pair scatter is part of those sigmas, and does not count twice."""
     window, _ = uncalibrated(5)
     learned = PairCalibration(Learned(0.1, 0.08), Learned(0.05, 0.02), Learned(0.0, 0.01), scatter)
-    same, noise = calibrated_window(window, SENSORS, learned)
+    wide = replace(NOISE, scale=0.1)
+    same, noise = calibrated_window(window, replace(SENSORS, a=wide, b=wide), learned)
     assert np.allclose(same.ranges, window.ranges - 0.1)
     # weights are those that the configuration asks for, claims those of what was learned
     assert noise.ranges.sigma == SENSORS.ranges.sigma
     assert noise.ranges.scatter == scatter
-    spread = math.hypot(2 * scatter * 0.08, 0.05)
-    assert noise.ranges.bias_sigma**-2 == pytest.approx(0.3**-2 + spread**-2)
-    spread = math.hypot(2 * scatter * 0.02, 0.01)
-    assert noise.a.scale**-2 == pytest.approx(NOISE.scale**-2 + spread**-2)
-    spread = math.hypot(2 * scatter * 0.01, 0.01)
-    assert noise.b.scale**-2 == pytest.approx(NOISE.scale**-2 + spread**-2)
+    assert noise.ranges.bias_sigma == pytest.approx(math.hypot(0.08, LINKTRACK.least_bias_m))
+    assert noise.a.scale == pytest.approx(math.hypot(0.02, LEAST_SCALE))
+    assert noise.b.scale == pytest.approx(math.hypot(0.01, LEAST_SCALE))
 
 
-@pytest.mark.parametrize("sigma", [0.01, 0.1, 10.0])
-def test_knowledge_adds_up_as_information(sigma: float) -> None:
-    left = remaining(Learned(0.2, sigma), before=0.3, least=0.0, widened=2.0)
-    assert left**-2 == pytest.approx(0.3**-2 + (2.0 * sigma) ** -2)
+@pytest.mark.parametrize(
+    ("sigma", "least", "left"),
+    [(0.01, 0.0, 0.01), (0.03, 0.04, 0.05), (0.299, 0.0, 0.299), (0.301, 0.0, 0.3)],
+)
+def test_what_is_left_is_what_was_learned_and_what_changes_but_no_more_than_before(
+    sigma: float, least: float, left: float
+) -> None:
+    assert remaining(Learned(0.2, sigma), before=0.3, least=least) == pytest.approx(left)
+
+
+def test_of_what_was_never_measured_all_is_left() -> None:
+    assert remaining(Learned(), before=0.3, least=0.05) == 0.3
 
 
 def test_what_strong_signals_do_is_taken_out_of_near_ranges_alone() -> None:

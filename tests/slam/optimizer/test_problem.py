@@ -10,6 +10,7 @@ import pytest
 from slam_problems import no_ranges, pose_edges, team_problem
 from slam_scenes import inverted, matrix, product, wander
 
+from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.problem import (
     BetweenFactors,
     Calibration,
@@ -74,7 +75,7 @@ def test_scale_shortens_a_link_and_yaw_rate_bends_it_over_half_of_the_way() -> N
         robot=np.array([0, 1]),
         path=np.array([way, way]),
     )
-    known = Calibration(np.zeros(0), np.array([0.0, scale]), np.array([0.0, yaw]), np.zeros(1))
+    known = replace(Calibration.zero(0, 2), scale=np.array([0.0, scale]), yaw=np.array([0.0, yaw]))
     right = corrected(odometry, known)
     assert right[0] == pytest.approx([*chord[:2], turn])
     # turned back by half of what the yaw rate added, to first order in it and in scale
@@ -90,7 +91,8 @@ def test_an_error_of_a_range_is_predicted_minus_measured_with_its_biases(
     problem, _ = team_problem(2, robots=3, count=4)
     poses, r = problem.initial, problem.ranges
     bias = np.array([0.2, -0.1, 0.3])
-    known = Calibration(bias, np.zeros(3), np.zeros(3), np.array([-0.25]))
+    # what biases have in common is part of them, and does not count twice
+    known = Calibration(bias, np.zeros(3), np.zeros(3), np.array([-0.25]), np.array([0.7]))
     error, sight, arm_i, arm_j = range_errors(poses, r, known, model)
     for m in range(len(r)):
         i, j = (product(poses[k], (*q, 0.0)) for k, q in ((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m])))
@@ -116,21 +118,68 @@ def test_some_of_the_factors_are_chosen_with_all_their_columns() -> None:
     assert isinstance(few, RangeFactors)
 
 
-PRIORS = Priors(np.array([0.3]), np.array([0.03]), np.array([0.01]), np.array([0.05]))
+def test_what_errors_cost_is_their_information() -> None:
+    edges = pose_edges(
+        np.random.default_rng(5), np.zeros((3, 3)), [(0, 1), (1, 2)], (0.1, 0.2, 0.3)
+    )
+    errors = np.array([[0.1, -0.2, 0.3], [0.0, 0.4, -0.1]])
+    expected = sum(
+        float(e @ np.linalg.solve(c, e)) for e, c in zip(errors, edges.covariance, strict=True)
+    )
+    assert edges.cost(errors) == pytest.approx(expected, rel=1e-6)
+    assert edges.chosen(np.zeros(2, dtype=bool)).cost(np.zeros((0, 3))) == 0
 
 
-@pytest.mark.parametrize(("value", "share"), [(0.0, 1.0), (0.3, 0.5), (0.9, 0.1)])
-def test_the_hold_of_a_prior_with_heavy_tails_gives_way(value: float, share: float) -> None:
-    """Half of it at one width, a tenth at three."""
-    values = np.array([value])
-    assert PRIORS.stiffness(values, PRIORS.bias) == pytest.approx([share / 0.09])
-    gauss = replace(PRIORS, has_cauchy_tails=False)
-    assert gauss.stiffness(values, PRIORS.bias) == pytest.approx([1 / 0.09])
+PRIORS = Priors(
+    bias=BiasPrior(sigma=0.3, spread=0.08, dof=3.0, team=0.02),
+    scale=np.array([0.03, 0.3]),
+    scale_tails=3.0,
+    yaw=np.array([0.01, 0.02]),
+    near_bias=0.05,
+)
+
+
+def test_priors_cost_the_sum_of_what_each_constant_is_off() -> None:
+    """Scales by Cauchy with a third of what is configured, yaw rates and near range by Gauss."""
+    known = Calibration(
+        bias=np.array([0.13, 0.05]),
+        scale=np.array([0.01, 0.3]),
+        yaw=np.array([0.02, -0.02]),
+        near_bias=np.array([0.1]),
+        team_bias=np.array([0.05]),
+    )
+    own = np.array([0.08, 0.0])
+    of_scales = math.log(2) + math.log(10)
+    of_others = 4 + 1 + 4
+    assert PRIORS.cost(known) == pytest.approx(PRIORS.bias.cost(own, 0.05) + of_scales + of_others)
+    assert PRIORS.cost(Calibration.zero(2, 2)) == 0
+
+
+@pytest.mark.parametrize("times", [-0.5, 0.0, 0.3, 5.0])
+def test_the_pull_on_a_scale_is_half_the_derivative_of_its_cost(times: float) -> None:
+    scale, h = times * PRIORS.scale / 3, 1e-7
+    for robot, unit in enumerate(np.eye(2)):
+        ends = [
+            PRIORS.cost(replace(Calibration.zero(2, 2), scale=scale + step * unit))
+            for step in (h, -h)
+        ]
+        assert PRIORS.scale_pull(scale)[robot] == pytest.approx(
+            (ends[0] - ends[1]) / (4 * h), rel=1e-5, abs=1e-4
+        )
+
+
+def test_the_curvature_of_a_scale_is_the_derivative_of_its_pull_and_stays_positive() -> None:
+    scale, h = 0.2 * PRIORS.scale, 1e-7
+    true = (PRIORS.scale_pull(scale + h) - PRIORS.scale_pull(scale - h)) / (2 * h)
+    assert PRIORS.scale_curvature(scale) == pytest.approx(true, rel=1e-5)
+    assert (PRIORS.scale_curvature(10 * PRIORS.scale) > 0).all()
 
 
 def test_what_was_learned_adds_up() -> None:
-    zero = Calibration.zero(PRIORS)
-    assert [len(part) for part in (zero.bias, zero.scale, zero.yaw, zero.near_bias)] == [1] * 4
-    step = Calibration(np.array([1.0]), np.array([2.0]), np.array([3.0]), np.array([4.0]))
-    twice = zero.plus(step).plus(step)
-    assert (twice.bias[0], twice.scale[0], twice.yaw[0], twice.near_bias[0]) == (2, 4, 6, 8)
+    names = ("bias", "scale", "yaw", "near_bias", "team_bias")
+    zero = Calibration.zero(3, 2)
+    assert [len(getattr(zero, name)) for name in names] == [3, 2, 2, 1, 1]
+    assert not any(getattr(zero, name).any() for name in names)
+    step = Calibration(*(np.array([value]) for value in (1.0, 2.0, 3.0, 4.0, 5.0)))
+    twice = Calibration.zero(1, 1).plus(step).plus(step)
+    assert [getattr(twice, name)[0] for name in names] == [2, 4, 6, 8, 10]

@@ -13,7 +13,7 @@ from drslamd.slam.optimizer.banded.normal_equations import System
 from drslamd.slam.se2 import Array, Index
 
 ROOM = 64
-"""Poses that are done before a window is moved, because moving it costs as much as some of them."""
+"""Poses that `selected_inverse` does before it moves its window: moving costs as much as some."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,11 @@ class BandFactor:
 
     @staticmethod
     def of(system: System, damping: float = 0.0) -> BandFactor | None:
-        """None where the system is not positive definite."""
+        """None where the system is not positive definite, as far as that shows.
+
+        Args:
+            damping: what is added to the diagonal, relative to it.
+        """
         band, corner = system.band.copy(), system.corner.copy()
         band[0] *= 1 + damping
         corner[np.diag_indices(len(corner))] *= 1 + damping
@@ -40,7 +44,7 @@ class BandFactor:
             lower = cholesky_banded(band, lower=True, check_finite=False)
         except np.linalg.LinAlgError:
             return None
-        halfway, _ = dtbtrs(lower, system.border, uplo="L")
+        halfway = _triangular(lower, system.border)
         schur = corner - halfway.T @ halfway
         # a tiny pivot of A can leave nothing of the border but rounding
         definite = np.isfinite(schur).all() and bool((np.diag(schur) > 0).all())
@@ -50,12 +54,12 @@ class BandFactor:
         """The solution for a right-hand side (n + b,), or for c of them (n + b, c)."""
         n = len(self.halfway)
         columns = right.reshape(len(right), -1)
-        middle = self._forward(columns[:n])
+        middle = _triangular(self.lower, columns[:n])
         try:
             outer = np.linalg.solve(self.schur, columns[n:] - self.halfway.T @ middle)
         except np.linalg.LinAlgError:
             return None
-        inner, _ = dtbtrs(self.lower, middle - self.halfway @ outer, uplo="L", trans="T")
+        inner = _triangular(self.lower, middle - self.halfway @ outer, transposed=True)
         return np.concatenate([inner, outer]).reshape(right.shape)
 
     def joint_covariance(self, unknowns: Index) -> Array | None:
@@ -65,7 +69,7 @@ class BandFactor:
         inside = unknowns < n
         unit = np.zeros((n, len(unknowns)))
         unit[unknowns[inside], columns[inside]] = 1
-        own = self._forward(unit)
+        own = _triangular(self.lower, unit)
         bound = -self.halfway.T @ own
         bound[unknowns[~inside] - n, columns[~inside]] += 1
         try:
@@ -74,30 +78,36 @@ class BandFactor:
             return None
         return joint if np.isfinite(joint).all() else None
 
-    def covariance_blocks(self, unknowns: Index) -> Array:
+    def covariance_blocks(self, unknowns: Index) -> Array | None:
         """(m, c, c) blocks of the inverse, for m factors that depend on unknowns (m, c) each.
 
-        Those that are in the band are no farther apart than its width; `NOWHERE` is known.
+        Those that are in the band are no farther apart than its width; `NOWHERE` is known. None
+        where there is no inverse.
         """
         n = len(self.halfway)
-        across, _ = dtbtrs(self.lower, self.halfway, uplo="L", trans="T")
-        outer = np.linalg.inv(self.schur)
+        across = _triangular(self.lower, self.halfway, transposed=True)
+        try:
+            outer = np.linalg.inv(self.schur)
+        except np.linalg.LinAlgError:
+            return None
         rows = np.zeros((*unknowns.shape, len(outer)))
         inside, outside = (unknowns < n) & (unknowns != NOWHERE), unknowns >= n
         rows[inside] = -across[unknowns[inside]]
         rows[outside] = np.eye(len(outer))[unknowns[outside] - n]
         blocks = rows @ outer @ np.swapaxes(rows, 1, 2)
-        shape = (*unknowns.shape, unknowns.shape[1])
-        row = np.maximum(*np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :]))
-        column = np.minimum(*np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :]))
-        both = ((row < n) & (column != NOWHERE)).reshape(shape)
+        row = np.maximum(unknowns[:, :, None], unknowns[:, None, :])
+        column = np.minimum(unknowns[:, :, None], unknowns[:, None, :])
+        both = (row < n) & (column != NOWHERE)
         blocks[both] += selected_inverse(self.lower)[(row - column)[both], column[both]]
         return np.asarray(blocks)
 
-    def _forward(self, columns: Array) -> Array:
-        """L^-1 times columns (n, c)."""
-        solved, _ = dtbtrs(self.lower, columns, uplo="L")
-        return np.asarray(solved)
+
+def _triangular(lower: Array, columns: Array, transposed: bool = False) -> Array:
+    """L^-1, or L'^-1, times columns (n, c)."""
+    if not columns.size:  # of which scipy would write beyond its memory
+        return columns
+    solved, _ = dtbtrs(lower, columns, uplo="L", trans="T" if transposed else "N")
+    return np.asarray(solved)
 
 
 def selected_inverse(lower: Array) -> Array:

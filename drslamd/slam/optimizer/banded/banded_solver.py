@@ -14,8 +14,8 @@ import numpy as np
 
 from drslamd.slam import se2
 from drslamd.slam.optimizer.banded import claims
-from drslamd.slam.optimizer.banded.descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.explanation import explain
+from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import raised
 from drslamd.slam.optimizer.problem import Calibration, Problem, Solution
@@ -39,7 +39,7 @@ def solve(
         start: calibration to start from (zero when left out).
         marginals: poses whose joint covariance is wanted.
         most: bound on steps.
-        tolerance: see `descent.TOLERANCE`.
+        tolerance: see `newton_descent.TOLERANCE`.
     """
     equations = Equations(problem)
     start = start or Calibration.zero(problem.pairs, len(problem.priors.scale))
@@ -54,7 +54,7 @@ def solve(
     wanted = np.array(marginals, dtype=int)
     joint, spread = claims.covariances(feared, point, scatter, wanted)
     if explained.other is not None:
-        joint += claims.between(point, explained.other, wanted)
+        joint += claims.disagreement(point, explained.other, wanted)
     return Solution(
         poses,
         point.calibration,

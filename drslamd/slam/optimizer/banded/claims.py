@@ -56,7 +56,7 @@ def scatter_of(problem: Problem, point: Point) -> Array:
     )
 
 
-def between(one: Point, other: Point, wanted: Index) -> Array:
+def disagreement(one: Point, other: Point, wanted: Index) -> Array:
     """(3 k, 3 k) what two explanations differ by, when nobody can tell which is right."""
     apart = one.poses[wanted] - other.poses[wanted]
     apart[:, 2] = se2.wrap(apart[:, 2])

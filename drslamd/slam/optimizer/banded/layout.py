@@ -2,9 +2,9 @@
 
 Closures and ranges join poses of the same time and odometry joins neighbouring times, so with all
 poses of all robots in the order of time J' W J is banded. The border takes the unknowns that touch
-everything: the bias of each pair, the near-range bias, scale and yaw rate of each robot, and the
-few poses that reach far (a robot that stands still while others drive about has one pose for all
-that time).
+everything: the bias of each pair and what they have in common, the near-range bias, scale and yaw
+rate of each robot, and the few poses that reach far (a robot that stands still while others drive
+about has one pose for all that time).
 """
 
 from __future__ import annotations

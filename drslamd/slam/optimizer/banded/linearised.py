@@ -29,7 +29,7 @@ class Linearised(NamedTuple):
     pull: Array
 
 
-def odometry(problem: Problem, point: Point) -> Linearised:
+def odometry_at(problem: Problem, point: Point) -> Linearised:
     """By both poses, scale, yaw rate and turn."""
     factors = problem.odometry
     return Linearised(
@@ -38,7 +38,7 @@ def odometry(problem: Problem, point: Point) -> Linearised:
 
 
 def odometry_jacobian(problem: Problem, poses: Array) -> Array:
-    """(m, 3, 9)"""
+    """(m, 3, 9): derivative of the errors by both poses, scale, yaw rate and turn."""
     factors = problem.odometry
     x, y, theta = factors.measured.T
     jacobian = np.zeros((len(factors), 3, 9))
@@ -52,26 +52,30 @@ def odometry_jacobian(problem: Problem, poses: Array) -> Array:
     return jacobian
 
 
-def closures(problem: Problem, poses: Array) -> Linearised:
+def closures_at(problem: Problem, poses: Array) -> Linearised:
     """By both poses."""
     factors = problem.closures
     error = pose_errors(poses, factors, factors.measured)
     return Linearised(pose_jacobian(poses, factors), factors.information, _pulled(factors, error))
 
 
-def ranges(problem: Problem, point: Point) -> Linearised:
-    """By both poses, bias, near-range bias and both antennas; cost is c^2 log(1 + (e / c)^2)."""
+def ranges_at(problem: Problem, point: Point, least: float = LEAST_CURVATURE) -> Linearised:
+    """By both poses, bias, near-range bias and both antennas; cost is c^2 log(1 + (e / c)^2).
+
+    Args:
+        least: see `LEAST_CURVATURE`.
+    """
     factors = problem.ranges
     error, jacobian = point.sight.error, _range_jacobian(problem, point)
     squared = (error / (point.threshold[factors.pair] * factors.sigma)) ** 2
     weight = 1 / (1 + squared) / factors.sigma**2
     # the second derivative makes the steps of an iteration shrink fast
-    bent = weight * np.maximum((1 - squared) / (1 + squared), LEAST_CURVATURE)
+    bent = weight * np.maximum((1 - squared) / (1 + squared), least)
     return Linearised(jacobian, bent[:, None, None], (weight * error)[:, None])
 
 
 def weighed_ranges(problem: Problem, point: Point, claims: Array) -> Linearised:
-    """The same without the curvature, and with so much information as ranges really have.
+    """The same without the curvature, and with as much information as ranges really have.
 
     Args:
         claims: (pairs,) how many times the sent sigma ranges are as wrong by.
@@ -115,4 +119,5 @@ def pose_jacobian(poses: Array, factors: BetweenFactors) -> Array:
 
 
 def _pulled(factors: BetweenFactors, errors: Array) -> Array:
+    """(m, 3) W e."""
     return np.asarray((factors.information @ errors[..., None])[..., 0])

@@ -29,6 +29,7 @@ DOUBT = 1.0
 PROBES = 6
 """Rows of random signs that estimate g of a whole robot to some percent."""
 OUTLIER_SIGMAS = 2.5
+"""Of what a range was sent with: beyond it, it is an outlier."""
 RUN = 4
 """Outliers of one pair that follow each other, at one a second; bursts are shorter."""
 OF_RUN = 0.8
@@ -37,7 +38,11 @@ OF_RUN = 0.8
 
 @dataclass(frozen=True)
 class Misfit:
-    """s and g of each link."""
+    """
+    Attributes:
+        squares: (m,) s of each link of odometry.
+        checked: (m,) g of each.
+    """
 
     squares: Array
     checked: Array
@@ -48,7 +53,11 @@ class Misfit:
         return Misfit(np.zeros(links), np.zeros(links))
 
     def ratio(self, group: Index, count: int) -> Array:
-        """(count,) s / g of groups of links."""
+        """(count,) s / g of groups of links.
+
+        Args:
+            group: (m,) to which each link belongs.
+        """
         s, g = (np.bincount(group, each, count) for each in (self.squares, self.checked))
         return np.asarray((s + DOUBT) / (np.maximum(g, 0.0) + DOUBT))
 
@@ -62,8 +71,10 @@ def misfit(equations: Equations, point: Point, factor: BandFactor) -> Misfit:
     problem = equations.problem
     jacobian = linearised.odometry_jacobian(problem, point.poses)
     squares, information = _squares(problem, point)
-    unknowns = equations.layout.odometry_unknowns(problem.odometry)
-    covariance = jacobian @ factor.covariance_blocks(unknowns) @ np.swapaxes(jacobian, 1, 2)
+    blocks = factor.covariance_blocks(equations.layout.odometry_unknowns(problem.odometry))
+    if blocks is None:
+        return Misfit(squares, np.zeros(len(squares)))
+    covariance = jacobian @ blocks @ np.swapaxes(jacobian, 1, 2)
     return Misfit(squares, 3 - np.einsum("kij,kji->k", information, covariance))
 
 
@@ -98,13 +109,13 @@ def _squares(problem: Problem, point: Point) -> tuple[Array, Array]:
 
 
 def outliers(problem: Problem, point: Point) -> NDArray[np.bool_]:
-    """(n,) which ranges."""
+    """(n,) which of the ranges are far off the solution."""
     ranges = problem.ranges
     return np.asarray(np.abs(point.sight.error) > OUTLIER_SIGMAS * ranges.sigma)
 
 
 def outlier_share(problem: Problem, point: Point) -> Array:
-    """(pairs,) of ranges."""
+    """(pairs,) of the ranges of each pair; none of no ranges."""
     pair = problem.ranges.pair
     count = np.bincount(pair, minlength=problem.pairs)
     return np.bincount(pair, outliers(problem, point), problem.pairs) / np.maximum(count, 1)
@@ -116,13 +127,14 @@ class Run:
 
     Attributes:
         i, j: robots, as the problem numbers them; i < j.
-        first: pose of the first of them.
+        n_i, n_j: their keyframes at the first of them, each on the clock of its robot.
         count: of ranges.
     """
 
     i: int
     j: int
-    first: int
+    n_i: int
+    n_j: int
     count: int
 
 
@@ -141,8 +153,9 @@ def runs(problem: Problem, point: Point) -> list[Run]:
         count = int(good[-1]) + 1 if len(good) else 0
         if count < RUN or not wrong[mine[:RUN]].all():
             continue
-        begin = mine[count - 1]
-        ends = np.searchsorted(robots, problem.robot[[ranges.i[begin], ranges.j[begin]]])
-        first = int(min(ranges.i[begin], ranges.j[begin]))
-        found.append(Run(int(ends.min()), int(ends.max()), first, count))
+        first = mine[count - 1]
+        ends = np.array([ranges.i[first], ranges.j[first]])
+        ends = ends[np.argsort(problem.robot[ends])]
+        (i, j), (n_i, n_j) = np.searchsorted(robots, problem.robot[ends]), problem.n[ends]
+        found.append(Run(int(i), int(j), int(n_i), int(n_j), count))
     return found

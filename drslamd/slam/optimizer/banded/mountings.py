@@ -15,8 +15,8 @@ import numpy as np
 
 from drslamd.slam.optimizer.banded import linearised
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
-from drslamd.slam.optimizer.banded.descent import descend
 from drslamd.slam.optimizer.banded.linearised import Linearised
+from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.problem import Doubted
@@ -53,7 +53,7 @@ def scores(equations: Equations, point: Point, factor: BandFactor) -> Scores:
     robots = len(problem.priors.scale)
     ones = np.ones(problem.pairs)
     ranges = linearised.weighed_ranges(problem, point, ones)
-    odometry = linearised.odometry(problem, point)
+    odometry = linearised.odometry_at(problem, point)
     # by robot: turns are columns 0 .. R - 1, antennas the 2 R behind them
     antennas = robots + 2 * problem.ranges.robots[:, :, None] + np.arange(2)
     parts = (

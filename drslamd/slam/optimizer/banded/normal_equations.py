@@ -11,6 +11,7 @@ from drslamd.slam.optimizer.banded import linearised
 from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout
 from drslamd.slam.optimizer.banded.linearised import Linearised
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
 from drslamd.slam.optimizer.mounting_prior import ANTENNA, TRACK
 from drslamd.slam.optimizer.problem import (
     Calibration,
@@ -148,19 +149,23 @@ class Equations:
     def gradient(self, point: Point) -> Array:
         """(n + b,) half the derivative of the cost."""
         gradient = np.zeros(self.layout.band + self.layout.border)
-        for where, factors in self._factors(point):
+        for where, factors in self._factors(point, LEAST_CURVATURE):
             where.add_gradient(gradient, factors)
         self._add_pull_of_priors(gradient, point)
         return gradient
 
-    def at(self, point: Point) -> tuple[System, Array]:
-        """A matrix close to half the second derivative of the cost, and the gradient."""
+    def at(self, point: Point, least: float = LEAST_CURVATURE) -> tuple[System, Array]:
+        """A matrix close to half the second derivative of the cost, and the gradient.
+
+        Args:
+            least: see `bias_prior.LEAST_CURVATURE`.
+        """
         layout = self.layout
         system, gradient = System.empty(layout), np.zeros(layout.band + layout.border)
-        for where, factors in self._factors(point):
+        for where, factors in self._factors(point, least):
             where.add_matrix(system, factors)
             where.add_gradient(gradient, factors)
-        self._add_heavy_priors(system, point.calibration)
+        self._add_heavy_priors(system, point.calibration, least)
         self._add_gaussian_priors(system)
         self._add_pull_of_priors(gradient, point)
         return system, gradient
@@ -186,7 +191,7 @@ class Equations:
         """(b, b) what the border gains where biases are as believed instead of as claimed."""
         layout, prior = self.layout, self.problem.priors.bias
         gain = System.empty(layout)
-        self._add_bias_prior(gain, point.calibration)
+        self._add_bias_prior(gain, point.calibration, LEAST_CURVATURE)
         gain.add_prior(layout.bias, -(prior.sigma**-2))
         gain.add_prior(layout.team_bias, -(prior.sigma**-2))
         return gain.corner
@@ -195,39 +200,39 @@ class Equations:
         """What the factors say by their weights: what is left of an outlier's counts still."""
         claims = np.ones(self.problem.pairs)
         system = self._weighed(point, claims)
-        self._add_heavy_priors(system, point.calibration)
+        self._add_heavy_priors(system, point.calibration, LEAST_CURVATURE)
         return system
 
     def _weighed(self, point: Point, claims: Array) -> System:
         problem = self.problem
         system = System.empty(self.layout)
-        self._where.odometry.add_matrix(system, linearised.odometry(problem, point))
+        self._where.odometry.add_matrix(system, linearised.odometry_at(problem, point))
         if len(problem.closures):
-            self._where.closures.add_matrix(system, linearised.closures(problem, point.poses))
+            self._where.closures.add_matrix(system, linearised.closures_at(problem, point.poses))
         ranges = linearised.weighed_ranges(problem, point, claims)
         self._where.ranges.add_matrix(system, ranges)
         self._add_gaussian_priors(system)
         return system
 
-    def _factors(self, point: Point) -> Iterator[tuple[_Assembly, Linearised]]:
+    def _factors(self, point: Point, least: float) -> Iterator[tuple[_Assembly, Linearised]]:
         problem = self.problem
-        yield self._where.odometry, linearised.odometry(problem, point)
+        yield self._where.odometry, linearised.odometry_at(problem, point)
         if len(problem.closures):
-            yield self._where.closures, linearised.closures(problem, point.poses)
-        yield self._where.ranges, linearised.ranges(problem, point)
+            yield self._where.closures, linearised.closures_at(problem, point.poses)
+        yield self._where.ranges, linearised.ranges_at(problem, point, least)
 
-    def _add_heavy_priors(self, system: System, calibration: Calibration) -> None:
+    def _add_heavy_priors(self, system: System, calibration: Calibration, least: float) -> None:
         layout, priors = self.layout, self.problem.priors
-        self._add_bias_prior(system, calibration)
-        system.add_prior(layout.scale, priors.scale_curvature(calibration.scale))
+        self._add_bias_prior(system, calibration, least)
+        system.add_prior(layout.scale, priors.scale_curvature(calibration.scale, least))
         self._add_mounting_priors(system, calibration)
 
-    def _add_bias_prior(self, system: System, calibration: Calibration) -> None:
+    def _add_bias_prior(self, system: System, calibration: Calibration, least: float) -> None:
         layout, prior = self.layout, self.problem.priors.bias
         team = float(calibration.team_bias[0])
-        own = prior.own_curvature(calibration.bias - team)
+        own = prior.own_curvature(calibration.bias - team, least)
         system.add_difference(layout.bias, layout.team_bias, own)
-        system.add_prior(layout.team_bias, prior.team_curvature(team))
+        system.add_prior(layout.team_bias, prior.team_curvature(team, least))
 
     def _add_mounting_priors(self, system: System, calibration: Calibration) -> None:
         layout, doubted = self.layout, self.problem.doubted

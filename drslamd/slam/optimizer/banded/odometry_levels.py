@@ -18,13 +18,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
-from drslamd.slam.optimizer.banded.descent import descend
 from drslamd.slam.optimizer.banded.misfit import (
     Misfit,
     Run,
     misfit,
     outlier_share,
 )
+from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.problem import Problem
@@ -132,9 +132,9 @@ def _run_level(problem: Problem, found: list[Run]) -> Array:
     odometry = problem.odometry
     level = np.ones(len(odometry))
     for run in found:
-        since = problem.n[run.first] - BEFORE
-        either = (odometry.robot == run.i) | (odometry.robot == run.j)
-        level[either & (problem.n[odometry.j] >= since)] = FIRST_LEVEL**2
+        for robot, n in ((run.i, run.n_i), (run.j, run.n_j)):
+            since = problem.n[odometry.j] >= n - BEFORE
+            level[since & (odometry.robot == robot)] = FIRST_LEVEL**2
     return level
 
 
@@ -152,7 +152,7 @@ def _cells_settled(equations: Equations, point: Point, variance: Array) -> tuple
     for _ in range(ROUNDS_OF_CELLS):
         point, now = _solved(equations, variance, point)
         wanted = _wanted(now, variance, cell)
-        if np.abs(np.log(wanted / variance)).max() < SETTLED:
+        if np.abs(np.log(wanted / variance)).max(initial=0.0) < SETTLED:
             break
         variance = wanted
     return variance, point

@@ -68,7 +68,7 @@ class PoseGraphSolver:
     def __init__(self, edges: ComplexFactors, count: int, gauge: int = 0) -> None:
         """
         Args:
-            gauge: the pose that is held, which only `marginals` shows.
+            gauge: the pose that is held, which only `joint_covariance` shows.
         """
         self._order = elimination_order(edges.i, edges.j, count)
         self._place = np.argsort(self._order)

@@ -27,10 +27,13 @@ from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
+from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.banded.banded_optimizer import (
+    SCALE_TAILS,
     YAW_PRIOR_FLOOR,
     build_problem,
 )
+from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.range_model import LINKTRACK
 from drslamd.slam.robot_model import RobotModel
 
@@ -60,8 +63,10 @@ def test_a_team_is_solved_in_the_frame_of_its_lowest_robot() -> None:
         r: n.tolist() for r, n in team.n.items()
     }
     assert errors(estimate, team.truth) < 0.7
-    assert set(estimate.covariances) == {0, 1, 2}
-    for robot, covariance in estimate.covariances.items():
+    assert estimate.joint.shape == (9, 9)
+    for robot in range(3):
+        covariance = estimate.covariance(robot)
+        assert covariance is not None
         error = estimate.trajectories[robot].poses[-1] - product(
             inverted(team.truth[0][0]), team.truth[robot][-1]
         )
@@ -69,19 +74,45 @@ def test_a_team_is_solved_in_the_frame_of_its_lowest_robot() -> None:
         assert error @ np.linalg.solve(covariance, error) < 14.2
 
 
+def test_what_is_claimed_is_named_by_its_robot_and_its_pair() -> None:
+    """As the solver claims it of each last pose and of each constant by itself."""
+    team = small_team(1, count=40)
+    group = group_of(team.graph, CLOCKS)
+    estimate = solved(team.graph, group)
+    built = build_problem(team.graph, group, None, BANDED)
+    for robot in range(3):
+        last = int(built.places.of_robot(robot)[-1])
+        alone = banded_solver.solve(built.problem, built.start, (last,))
+        covariance = estimate.covariance(robot)
+        assert covariance is not None
+        assert np.allclose(covariance, alone.joint, rtol=1e-6, atol=1e-12)
+        assert alone.spread is not None
+        assert estimate.scale[robot].sigma == pytest.approx(alone.spread.scale[robot])
+        assert estimate.yaw[robot].sigma == pytest.approx(alone.spread.yaw[robot])
+    assert alone.spread is not None
+    for number, pair in enumerate([(0, 1), (0, 2), (1, 2)]):
+        assert estimate.bias_m[pair] == pytest.approx(
+            (alone.calibration.bias[number], alone.spread.bias[number])
+        )
+        assert estimate.scatter[pair] == pytest.approx(alone.scatter[number])
+    assert estimate.team_bias_m.sigma == pytest.approx(BANDED.bias_sigma)
+
+
 def test_biases_are_named_by_their_pairs_and_scales_by_their_robots() -> None:
     true = {(0, 1): 0.4, (0, 2): 0.0, (1, 2): -0.3}
-    team = small_team(2, count=150, range_sigma=0.01, biases=true)
+    team = small_team(3, count=150, range_sigma=0.01, biases=true)
     estimate = solved(team.graph, group_of(team.graph, CLOCKS))
     for pair, bias in true.items():
         found = estimate.bias_m[pair]
         assert found.value == pytest.approx(bias, abs=0.15)
         assert abs(found.value - bias) < 2 * found.sigma < 0.6
     assert set(estimate.scale) == set(estimate.yaw) == {0, 1, 2}
+    # what pairs have in common lies between them
+    assert -0.3 < estimate.team_bias_m.value < 0.4
 
 
 def test_what_strong_signals_do_is_one_constant_of_the_team() -> None:
-    """Found where it may be large; its sigma is that of what was measured, without the prior."""
+    """Found where it may be large; its sigma is that of all that is known, the prior included."""
     team = small_team(2, count=150, range_sigma=0.01)
     for pair in team.graph.pairs.values():
         table = pair.ranges.copy()
@@ -93,7 +124,8 @@ def test_what_strong_signals_do_is_one_constant_of_the_team() -> None:
     free = loose.job(team.graph, group, None, {})().near_bias_m
     assert abs(free.value + 0.6) < 3 * free.sigma
     assert free.value < held.value < 0
-    assert held.sigma == pytest.approx(free.sigma, rel=0.3)
+    # what was measured adds to a prior of 0.05 m as it did to one of a metre
+    assert held.sigma**-2 == pytest.approx(free.sigma**-2 - 1 + 0.05**-2, rel=0.05)
     assert abs(held.value) < 2 * LINKTRACK.near_bias_sigma_m
 
 
@@ -104,12 +136,15 @@ def test_priors_are_those_of_the_robots_and_of_the_configuration() -> None:
     problem = build_problem(
         team.graph, group_of(team.graph), None, replace(BANDED, bias_sigma=0.25)
     ).problem
-    assert problem.priors.bias == pytest.approx(0.25 / 3)
-    assert problem.priors.scale == pytest.approx([0.01, 0.07 / 3, 0.01])
+    # 0.27 and 0.07 of what is configured, and three degrees of freedom
+    assert problem.priors.bias == BiasPrior(sigma=0.25, spread=0.0675, dof=3.0, team=0.0175)
+    assert problem.priors.scale == pytest.approx([NOISE.scale, 0.07, NOISE.scale])
+    assert problem.priors.scale_tails == SCALE_TAILS
     assert problem.priors.yaw == pytest.approx(
         [NOISE.yaw_rad_per_m, YAW_PRIOR_FLOOR, NOISE.yaw_rad_per_m]
     )
-    assert problem.priors.near_bias == pytest.approx([LINKTRACK.near_bias_sigma_m])
+    assert problem.priors.near_bias == LINKTRACK.near_bias_sigma_m
+    assert (problem.pairs, problem.range_sigma) == (3, 0.10)
 
 
 def test_the_next_solution_goes_on_from_the_last_one() -> None:
@@ -119,6 +154,7 @@ def test_the_next_solution_goes_on_from_the_last_one() -> None:
     problem_and_start = build_problem(team.graph, group, first, BANDED)
     assert problem_and_start.start.scale.tolist() == [first.scale[r].value for r in range(3)]
     assert problem_and_start.start.near_bias.tolist() == [first.near_bias_m.value] != [0.0]
+    assert problem_and_start.start.team_bias.tolist() == [first.team_bias_m.value] != [0.0]
     again = solved(team.graph, group, first)
     assert again.iterations <= 2
     for robot, trajectory in again.trajectories.items():
@@ -156,7 +192,9 @@ def test_closures_hold_together_what_has_no_ranges() -> None:
     estimate = solved(graph, group_of(graph, CLOCKS))
     assert estimate.converged
     assert errors(estimate, team.truth) < 0.5
-    sigma = math.sqrt(estimate.covariances[2][0, 0])
+    covariance = estimate.covariance(2)
+    assert covariance is not None
+    sigma = math.sqrt(covariance[0, 0])
     assert 1.0 < sigma < 100.0
 
 
