@@ -47,10 +47,21 @@ def carried(
         step: (k, 3) the way, from its start.
         level: how many times the sigma of odometry is what is configured.
     """
-    end = step[-1, :2]
-    lever, forward = np.eye(3), np.eye(3)
-    lever[:2, 2] = -end[1], end[0]
-    forward[:2, 2] = se2.rotate(heading, lever[:2, 2])
-    added = lever @ covariance_between(noise, step, growth(step), 0, -1) @ lever.T
+    forward = np.eye(3)
+    forward[:2, 2] = se2.rotate(heading, _lever(step)[:2, 2])
     moved = forward @ covariance @ forward.T
-    return np.asarray(moved + level**2 * se2.turned(added, heading))
+    return np.asarray(moved + noise_of_way(heading, step, noise, level))
+
+
+def noise_of_way(heading: float, step: Array, noise: OdometryNoise, level: float) -> Array:
+    """(3, 3) what a way adds to the covariance of x, y, theta in w, see `carried`."""
+    lever = _lever(step)
+    added = lever @ covariance_between(noise, step, growth(step), 0, -1) @ lever.T
+    return np.asarray(level**2 * se2.turned(added, heading))
+
+
+def _lever(step: Array) -> Array:
+    """(3, 3) from a twist about the start of a way to one about its end."""
+    lever = np.eye(3)
+    lever[:2, 2] = -step[-1, 1], step[-1, 0]
+    return lever

@@ -70,6 +70,8 @@ class TeamEstimate:
         scatter: how many times the configured sigma the ranges of a pair scatter.
         odometry_level: how many times the sigma of a robot's odometry is what is configured, of
             late, as far as it must be feared; 1 where none is named.
+        contradicted: pairs whose ranges of late do not fit the rest.
+        is_explained: is the model, with what was learned, one of what was measured?
         lifted: state of the relaxation, with `rbcd`.
     """
 
@@ -85,6 +87,8 @@ class TeamEstimate:
     antenna_m: dict[int, tuple[Learned, Learned]] = field(default_factory=dict)
     scatter: dict[tuple[int, int], float] = field(default_factory=dict)
     odometry_level: dict[int, float] = field(default_factory=dict)
+    contradicted: frozenset[tuple[int, int]] = frozenset()
+    is_explained: bool = True
     cost: float = 0.0
     iterations: int = 0
     converged: bool = True
@@ -95,10 +99,18 @@ class TeamEstimate:
         at = self._rows(robot)
         return None if at is None else np.asarray(self.joint[at, at])
 
-    def relative(self, a: int, b: int) -> tuple[Array, Array] | None:
-        """a_T_b (3,) of the last poses of two robots, and its covariance (3, 3) in frame a."""
+    def joint_of(self, a: int, b: int) -> Array | None:
+        """(6, 6) of the last poses of two robots."""
         rows = self._rows(a), self._rows(b)
         if rows[0] is None or rows[1] is None:
+            return None
+        at = np.r_[rows[0], rows[1]]
+        return np.asarray(self.joint[np.ix_(at, at)])
+
+    def relative(self, a: int, b: int) -> tuple[Array, Array] | None:
+        """a_T_b (3,) of the last poses of two robots, and its covariance (3, 3) in frame a."""
+        joint = self.joint_of(a, b)
+        if joint is None:
             return None
         w_T_a, w_T_b = (self.trajectories[robot].poses[-1] for robot in (a, b))
         a_T_b = se2.between(w_T_a, w_T_b)
@@ -108,8 +120,7 @@ class TeamEstimate:
         by_a = -turn
         by_a[0, 2], by_a[1, 2] = a_T_b[1], -a_T_b[0]
         j = np.hstack([by_a, turn])
-        at = np.r_[rows[0], rows[1]]
-        return a_T_b, j @ self.joint[np.ix_(at, at)] @ j.T
+        return a_T_b, j @ joint @ j.T
 
     def correction(self, robot: int) -> Correction:
         """Of a robot's odometry."""

@@ -241,6 +241,7 @@ class Solution:
             it was seen; feared_level: as far as it must be feared.
         doubted: whose mountings were let go.
         is_explained: is the model, with these levels, one of what was measured?
+        contradicted: (pairs,) whose ranges of late do not fit.
     """
 
     poses: Array
@@ -254,6 +255,7 @@ class Solution:
     odometry_level: Array = field(default_factory=lambda: np.zeros(0))
     feared_level: Array = field(default_factory=lambda: np.zeros(0))
     is_explained: bool = True
+    contradicted: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     doubted: Doubted = field(default_factory=lambda: Doubted.none(0))
 
 

@@ -188,6 +188,10 @@ def _solve(team: TeamProblem, group: Group) -> TeamEstimate:
         },
         scatter=dict(zip(team.pairs, solution.scatter.tolist(), strict=True)),
         odometry_level=_latest(team, solution),
+        contradicted=frozenset(
+            pair for pair, bad in zip(team.pairs, solution.contradicted, strict=True) if bad
+        ),
+        is_explained=solution.is_explained,
         cost=solution.cost,
         iterations=solution.iterations,
         converged=solution.converged,

@@ -15,6 +15,7 @@ import numpy as np
 from drslamd.slam import se2
 from drslamd.slam.optimizer.banded import claims
 from drslamd.slam.optimizer.banded.explanation import explain
+from drslamd.slam.optimizer.banded.misfit import contradicted
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import raised
@@ -67,5 +68,6 @@ def solve(
         odometry_level=explained.level,
         feared_level=np.sqrt(explained.feared),
         is_explained=explained.other is None,
+        contradicted=contradicted(problem, point),
         doubted=claims.still_doubted(problem.doubted, point.calibration, spread),
     )

@@ -36,6 +36,14 @@ OF_RUN = 0.8
 """Share of the ranges since its beginning that are outliers."""
 
 
+LATELY = 200
+"""Steps of the keyframes' grid."""
+MANY_WRONG = 0.4
+"""Share of the ranges of late that are outliers; bursts take a tenth or two."""
+FEWEST_LATELY = 8
+"""Ranges, fewer are no share."""
+
+
 @dataclass(frozen=True)
 class Misfit:
     """
@@ -136,6 +144,25 @@ class Run:
     n_i: int
     n_j: int
     count: int
+
+
+def contradicted(problem: Problem, point: Point) -> NDArray[np.bool_]:
+    """(pairs,) whose ranges of late do not fit the solution: an unbroken run of them, or many."""
+    found = np.zeros(problem.pairs, dtype=bool)
+    wrong = outliers(problem, point)
+    pair = problem.ranges.pair
+    n = problem.n[problem.ranges.i]
+    for k in range(problem.pairs):
+        mine = pair == k
+        lately = mine & (n > n[mine].max(initial=0) - LATELY)
+        count = np.count_nonzero(lately)
+        found[k] = count >= FEWEST_LATELY and wrong[lately].sum() >= MANY_WRONG * count
+    robots = np.unique(problem.robot)
+    ends = problem.robot[np.stack([problem.ranges.i, problem.ranges.j])]
+    for run in runs(problem, point):
+        between = np.isin(ends, robots[[run.i, run.j]]).all(axis=0)
+        found[pair[between]] = True
+    return found
 
 
 def runs(problem: Problem, point: Point) -> list[Run]:
