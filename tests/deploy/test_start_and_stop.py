@@ -149,11 +149,11 @@ def test_epochs_grow_over_restarts_and_survive_kill_9(tmp_path: Path) -> None:
 def test_an_epoch_from_a_clock_that_ran_ahead_is_not_reused(tmp_path: Path) -> None:
     config = example_in(tmp_path)
     (tmp_path / "state").mkdir()
-    ahead = 10**15
+    ahead = 5 * 10**15
     (tmp_path / "state" / "robot-1.json").write_text(f'{{"schema": 1, "epoch": {ahead}}}')
     with Daemon(config) as daemon:
         daemon.manager.wait_for("READY=1")
-        assert daemon.state()["epoch"] == ahead + 1
+        assert ahead < daemon.state()["epoch"] <= ahead + 2 * 10**6
 
 
 @pytest.mark.parametrize(

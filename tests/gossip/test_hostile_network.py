@@ -6,6 +6,7 @@ import copy
 import random
 import struct
 from collections.abc import Iterator
+from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,8 @@ def plain(value: Any) -> Any:
     """An object and all in it as plain values that can be compared."""
     if isinstance(value, np.ndarray):
         return value.tobytes()
+    if isinstance(value, Enum):
+        return value.name
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)) or type(value).__name__ == "deque":
@@ -161,6 +164,10 @@ def test_everything_that_comes_in_is_counted_exactly_once() -> None:
         ChannelMessage(T0, "MBOT_ODOMETRY", b"x"),
         ChannelMessage(T0, *forged(a_status(), robot=1, epoch=99)),
         ChannelMessage(T0, *sealed(a_seal(3, epoch=12), a_status())),
+        ChannelMessage(T0 + 3 * SECOND, *sealed(a_seal(3, epoch=13), a_status())),
+        ChannelMessage(T0, *forged(a_status(), robot=4, epoch=2**62)),
+        ChannelMessage(T0, *forged(an_entry(5_000), robot=4)),
+        ChannelMessage(T0, *forged(a_status(), robot=4, utime=-1)),
     ]
     for event in more:
         before = team.accepted + team.refused.total() + team.own_echoes + team.repeats_heard
@@ -201,6 +208,12 @@ def test_everything_that_comes_in_is_counted_exactly_once() -> None:
             "of another start of this robot, repeated by a peer",
         ),
         (ChannelMessage(T0, *forged(an_entry(-1))), "content out of range"),
+        (ChannelMessage(T0, *forged(an_entry(1_024))), "entry far ahead of its log"),
+        (
+            ChannelMessage(T0, *forged(a_status(), epoch=2**53 + 2**32 + 1)),
+            "of a start later than any clock can say",
+        ),
+        (ChannelMessage(T0, *forged(a_status(), utime=-1)), "made at a time that no clock shows"),
     ],
 )
 def test_every_reason_has_a_counter_of_its_own(

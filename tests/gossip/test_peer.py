@@ -7,7 +7,7 @@ import pytest
 from message_builders import MS, SECOND, a_status
 
 from drslamd.conventions import Chain
-from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose, Status
+from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose, PoseState, Status
 from drslamd.gossip.peer import Peer
 from drslamd.slam.se2 import Array
 
@@ -168,7 +168,7 @@ def test_a_status_that_was_overtaken_says_nothing_new() -> None:
 
 def test_a_pose_that_was_overtaken_says_nothing_new() -> None:
     peer = a_peer()
-    late, latest = Pose(1, 3, 11, 1), Pose(1, 3, 11, 2)
+    late, latest = (Pose(PoseState.LOCALISED, 3, 11, utime) for utime in (1, 2))
     peer.take_pose(latest, 5)
     peer.take_pose(late, 4)
     assert peer.pose is latest

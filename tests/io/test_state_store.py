@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from drslamd.config import ConfigError
-from drslamd.io.state_store import StateStore, next_epoch, read_key, write_key
+from drslamd.io.state_store import StateStore, read_key, write_key
 
 
 def test_state_comes_back_as_it_was_saved(tmp_path: Path) -> None:
@@ -53,13 +53,6 @@ def test_an_interrupted_save_leaves_the_old_file(
     store.save({"epoch": 2})
     assert "No space left" in store.fault
     assert StateStore(tmp_path, 3).load()["epoch"] == 1
-
-
-def test_an_epoch_is_above_the_last_even_when_the_wall_clock_went_back() -> None:
-    assert next_epoch({}, 1_000) == 1_000
-    assert next_epoch({"epoch": 1_000}, 500) == 1_001
-    assert next_epoch({"epoch": 1_000}, 1_000) == 1_001
-    assert next_epoch({"epoch": 1_000}, 2_000) == 2_000
 
 
 def test_a_key_is_made_private_and_never_twice(tmp_path: Path) -> None:
@@ -135,3 +128,156 @@ def test_two_keys_are_different(tmp_path: Path) -> None:
     for name in ("a", "b"):
         write_key(tmp_path / name)
     assert read_key(str(tmp_path / "a")) != read_key(str(tmp_path / "b"))
+
+
+# ---- a file that a stranger wrote --------------------------------------------------------------
+
+
+def loaded(tmp_path: Path, content: str | bytes) -> tuple[dict[str, Any], str]:
+    """What is read of a file, and the fault."""
+    store = StateStore(tmp_path, 3)
+    store.path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return store.load(), store.fault
+
+
+def a_state(**fields: Any) -> str:
+    return json.dumps({"schema": 1, "epoch": 7, "epochs": {"1": 5}, "calibration": {}} | fields)
+
+
+LAST_KEPT = 2**53 + 2**44
+
+
+@pytest.mark.parametrize("epoch", [0, LAST_KEPT])
+def test_epochs_at_their_bounds_are_read(tmp_path: Path, epoch: int) -> None:
+    state, fault = loaded(tmp_path, a_state(epoch=epoch, epochs={"0": epoch, "254": epoch}))
+    assert (state["epoch"], state["epochs"], fault) == (epoch, {"0": epoch, "254": epoch}, "")
+
+
+DAMAGED = [
+    {"epoch": -1},
+    {"epoch": LAST_KEPT + 1},
+    {"epoch": 2**63 - 1},
+    {"epoch": 10**400},
+    {"epoch": True},
+    {"epoch": None},
+    {"epochs": {"1": LAST_KEPT + 1}},
+    {"epochs": {"1": -1}},
+    {"epochs": {"1": False}},
+    {"epochs": {"255": 5}},
+    {"epochs": {"-1": 5}},
+    {"epochs": {"01": 5}},
+    {"epochs": {"\u0661": 5}},
+    {"epochs": {"1" * 5_000: 5}},
+    {"calibration": []},
+    {"calibration": {"bias_m": {"1" * 5_000: [0.1, 0.1]}}},
+    {"calibration": {"bias_m": {"\u0661": [0.1, 0.1]}}},
+    {"calibration": {"scale": [10**400, 0.1]}},
+    {"calibration": {"scale": [0.1, 0.0]}},
+]
+
+
+@pytest.mark.parametrize("fields", DAMAGED, ids=lambda fields: str(fields)[:40])
+def test_a_state_file_with_a_value_beyond_its_bound_is_not_used(
+    tmp_path: Path, fields: dict[str, Any]
+) -> None:
+    state, fault = loaded(tmp_path, a_state(**fields))
+    assert state == {}
+    assert "is damaged; starting afresh" in fault
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [
+        ("[" * 100_000, "nested too deep"),
+        ('{"a":' * 40_000, "nested too deep"),
+        ("7" * 5_000, "cannot read"),
+        (b"\xff\xfe{}", "cannot read"),
+        ("", "cannot read"),
+        ("NaN", "another version"),
+        ("null", "another version"),
+    ],
+    ids=["brackets", "braces", "digits", "no text", "empty", "NaN", "null"],
+)
+def test_a_state_file_that_is_none_is_named_with_its_fault(
+    tmp_path: Path, content: str | bytes, word: str
+) -> None:
+    state, fault = loaded(tmp_path, content)
+    assert state == {}
+    assert word in fault
+    assert "starting afresh" in fault
+
+
+@pytest.mark.parametrize(("size", "read"), [(262_144, True), (262_145, False)])
+def test_a_state_file_of_more_than_256_kib_is_not_read(
+    tmp_path: Path, size: int, read: bool
+) -> None:
+    state, fault = loaded(tmp_path, a_state().ljust(size))
+    assert bool(state) == read
+    assert read or "more than 262144 bytes" in fault
+
+
+@pytest.mark.parametrize("kind", ["pipe", "folder", "device"])
+def test_what_is_no_plain_file_is_not_read_and_nobody_waits_for_it(
+    tmp_path: Path, kind: str
+) -> None:
+    store = StateStore(tmp_path, 3)
+    if kind == "pipe":
+        os.mkfifo(store.path)
+    elif kind == "folder":
+        store.path.mkdir()
+    else:
+        store.path.symlink_to("/dev/zero")
+    assert store.load() == {}
+    assert "cannot read" in store.fault
+
+
+def test_the_state_of_a_robot_that_knows_everybody_is_read_again(tmp_path: Path) -> None:
+    pair = [-0.12345678901234567, 0.12345678901234567]
+    bias = {str(robot): pair for robot in range(1, 255)}
+    calibration = {"scale": pair, "yaw_rad_per_m": pair, "bias_m": bias}
+    epochs = {robot: LAST_KEPT - robot for robot in range(1, 255)}
+    store = StateStore(tmp_path, 3)
+    store.save({"epoch": LAST_KEPT, "epochs": epochs, "calibration": calibration})
+    assert store.path.stat().st_size < 262_144 / 5
+    assert StateStore(tmp_path, 3).load()["calibration"] == calibration
+
+
+@pytest.mark.parametrize(
+    "state", [{"epoch": LAST_KEPT + 1}, {"epochs": {1: -1}}, {"calibration": 3}]
+)
+def test_what_would_not_be_read_is_a_bug_and_is_not_written(
+    tmp_path: Path, state: dict[str, Any]
+) -> None:
+    store = StateStore(tmp_path, 3)
+    with pytest.raises(AssertionError, match="would not read"):
+        store.save(state)
+    assert not store.path.exists()
+
+
+def test_a_save_that_failed_leaves_nothing_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    StateStore(tmp_path, 3).save({"epoch": 2})
+    assert list(tmp_path.iterdir()) == []
+
+
+# ---- a new epoch -------------------------------------------------------------------------------
+
+
+def test_a_new_epoch_is_kept_with_what_is_known(tmp_path: Path) -> None:
+    store = StateStore(tmp_path, 3)
+    epoch = store.begin({"epochs": {1: 5}}, 7)
+    assert epoch > 10**15
+    state = StateStore(tmp_path, 3).load()
+    assert (state["epoch"], state["epochs"]) == (epoch, {"1": 5})
+
+
+def test_a_hundred_new_epochs_grow_strictly(tmp_path: Path) -> None:
+    store, epochs = StateStore(tmp_path, 3), [0]
+    for _ in range(100):
+        epochs.append(store.begin({}, epochs[-1]))
+    assert epochs == sorted(set(epochs))
