@@ -85,7 +85,9 @@ def likely_speeds(track: Track, most_mps: float) -> tuple[float, float]:
     count = min(len(track), LOOK_BACK)
     poses = track.steps(track.end - count, count) * RESOLUTION
     change = poses[GRID_HZ:] - poses[:-GRID_HZ]
-    change = change[np.isfinite(change[:, 0])]
+    holes = np.cumsum(np.isnan(poses[:, 0]))
+    is_whole = (holes[GRID_HZ:] == holes[:-GRID_HZ]) & np.isfinite(change[:, 0])
+    change = change[is_whole]
     speed = float(np.hypot(change[:, 0], change[:, 1]).max(initial=0.0))
     turning = float(np.abs(change[:, 2]).max(initial=0.0))
     if max(speed, turning) < STANDING_MPS:

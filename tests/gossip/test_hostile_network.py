@@ -6,10 +6,8 @@ import copy
 import random
 import struct
 from collections.abc import Iterator
-from enum import Enum
 from typing import Any
 
-import numpy as np
 import pytest
 from message_builders import (
     OTHER_SECRET,
@@ -22,6 +20,7 @@ from message_builders import (
     resealed,
     sealed,
 )
+from snapshots import plain
 
 from drslamd.conventions import Chain
 from drslamd.events import ChannelMessage, Datagram
@@ -33,21 +32,6 @@ OWN = Chain(1, 10)
 T0 = 100 * SECOND
 COUNTERS = {"refused", "own_echoes", "last_echo", "repeats_heard", "_last_refused"}
 """What an unproven message may change: counts, and what the user is told of them."""
-
-
-def plain(value: Any) -> Any:
-    """An object and all in it as plain values that can be compared."""
-    if isinstance(value, np.ndarray):
-        return value.tobytes()
-    if isinstance(value, Enum):
-        return value.name
-    if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)) or type(value).__name__ == "deque":
-        return [plain(item) for item in value]
-    if hasattr(value, "__dict__"):
-        return {key: plain(item) for key, item in vars(value).items()}
-    return value
 
 
 def snapshot(team: Team) -> Any:

@@ -91,6 +91,17 @@ def test_a_log_entry_says_nothing_of_whether_its_origin_lives() -> None:
     assert team.logs.next_states() == (LogState(3, 1, 0, 1, 1),)
 
 
+@pytest.mark.parametrize(("newest", "taken"), [(3_977, True), (3_976, False)])
+def test_an_entry_far_from_what_we_hold_is_taken_when_any_status_speaks_of_its_log(
+    newest: int, taken: bool
+) -> None:
+    """A newcomer may hear an old robot through others only."""
+    team = a_team()
+    tell(team, a_seal(4), hearing(logs=(LogState(3, 1, 0, newest, newest),)))
+    assert tell(team, a_seal(3), an_entry(5_000, 1)) == taken
+    assert dict(team.refused) == ({} if taken else {"entry far ahead of its log": 1})
+
+
 def test_a_log_entry_is_handed_out_once_whoever_sends_it() -> None:
     team, event = a_team(), ChannelMessage(T0, *sealed(a_seal(3), an_entry(0, 1)))
     assert team.receive(event) is not None
