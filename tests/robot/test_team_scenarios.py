@@ -247,6 +247,20 @@ def test_a_robot_whose_memory_was_lost_begins_above_what_its_peers_know() -> Non
     assert team.member(0).robot.team.peers[1].chain.epoch == forgetful.robot.own.epoch
 
 
+def test_a_robot_that_starts_under_an_epoch_that_it_used_before_begins_again_above_it() -> None:
+    """A copied disk, or a computer without clock and disk: its peers hold what it never said."""
+    team = VirtualTeam()
+    team.run(12.0)
+    team.simulator.kill(team.member(1))
+    team.run(20.0)
+    team.start(1, epoch=1, epochs={0: 1, 2: 1})
+    team.run(36.5)
+    assert team.member(1).robot.own.epoch > 1
+    chains = [m.robot.back.graph.chains[1] for m in team.simulator.members.values()]
+    assert {data.chain for data in chains} == {team.member(1).robot.own}
+    assert len({data.keyframes.rows.tobytes() for data in chains}) == 1
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "extra",
