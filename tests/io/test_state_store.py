@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import os
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ import pytest
 
 from drslamd.config import ConfigError
 from drslamd.io.state_store import StateStore, read_key, write_key
+from drslamd.slam.calibration.sensor_calibration import SensorCalibration
 
 
 def test_state_comes_back_as_it_was_saved(tmp_path: Path) -> None:
@@ -276,8 +279,70 @@ def test_a_new_epoch_is_kept_with_what_is_known(tmp_path: Path) -> None:
     assert (state["epoch"], state["epochs"]) == (epoch, {"1": 5})
 
 
-def test_a_hundred_new_epochs_grow_strictly(tmp_path: Path) -> None:
+def test_thirty_new_epochs_grow_strictly(tmp_path: Path) -> None:
     store, epochs = StateStore(tmp_path, 3), [0]
-    for _ in range(100):
+    for _ in range(30):
         epochs.append(store.begin({}, epochs[-1]))
     assert epochs == sorted(set(epochs))
+
+
+# ---- every value of the file, at every border --------------------------------------------------
+
+WHOLE: dict[str, Any] = {
+    "schema": 1,
+    "epoch": 7,
+    "epochs": {"1": 5, "254": 6},
+    "calibration": {
+        "scale": [0.01, 0.02],
+        "yaw_rad_per_m": [0.001, 0.002],
+        "bias_m": {"1": [0.1, 0.05]},
+    },
+}
+INTS = [0, 1, -1, 2**31, 2**53, LAST_KEPT, LAST_KEPT + 1, 2**63 - 1, 2**63, -(2**63), 2**64]
+FLOATS = [float("nan"), float("inf"), -float("inf"), 5e-324, -5e-324, 1.8e308, -0.0, 0.5]
+OTHERS: list[Any] = [None, True, "", "7", [], {}, [0.1, 0.1, 0.1], 10**400]
+BORDERS = [*INTS, *FLOATS, *OTHERS]
+
+
+def ways(value: Any) -> Iterator[tuple[Any, ...]]:
+    """To every value inside, and to the whole."""
+    yield ()
+    if isinstance(value, dict):
+        yield from ((key, *way) for key, inner in value.items() for way in ways(inner))
+    if isinstance(value, list):
+        yield from ((at, *way) for at, inner in enumerate(value) for way in ways(inner))
+
+
+def altered(way: tuple[Any, ...], value: Any) -> Any:
+    """The whole state with one value in the place of another."""
+    if not way:
+        return value
+    state = copy.deepcopy(WHOLE)
+    place: Any = state
+    for step in way[:-1]:
+        place = place[step]
+    place[way[-1]] = value
+    return state
+
+
+def test_whatever_one_value_of_the_file_is_the_next_start_begins_and_keeps_what_can_be_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "fsync", lambda _: None)
+    tried = 0
+    for way in ways(WHOLE):
+        for border in BORDERS:
+            StateStore(tmp_path, 3).path.write_text(json.dumps(altered(way, border)))
+            store = StateStore(tmp_path, 3)
+            state = store.load()
+            assert state or store.fault, (way, border)
+            kept = SensorCalibration.of_state(state.get("calibration", {}))
+            last = state.get("epoch", 0)
+            epochs = {int(robot): epoch for robot, epoch in state.get("epochs", {}).items()}
+            epoch = store.begin({"epochs": epochs, "calibration": kept.state()}, last)
+            assert epoch > last or last > LAST_KEPT - 2 * 10**6
+            again = StateStore(tmp_path, 3)
+            assert again.load()["epoch"] == epoch
+            assert again.fault == ""
+            tried += 1
+    assert tried > 400
