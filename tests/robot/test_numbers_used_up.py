@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +23,7 @@ from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.robot_model import UNTOLD
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def pair() -> VirtualTeam:
     """Two robots that have been talking for five seconds."""
     team = VirtualTeam(on=(0, 1))
@@ -30,9 +31,20 @@ def pair() -> VirtualTeam:
     return team
 
 
-def later(team: VirtualTeam, seconds: int = 1) -> list[Effect]:
-    """What robot 1 does at its next ticks."""
-    robot, utime = team.member(1).robot, team.member(1).clock.local(team.simulator.now)
+@pytest.fixture
+def utime(pair: VirtualTeam) -> int:
+    """Of robot 1, after these seconds."""
+    return pair.member(1).clock.local(pair.simulator.now)
+
+
+@pytest.fixture
+def robot(pair: VirtualTeam) -> Robot:
+    """Robot 1 then, for one test alone."""
+    return copy.deepcopy(pair.member(1).robot)
+
+
+def later(robot: Robot, utime: int, seconds: int = 1) -> list[Effect]:
+    """What it does at its next ticks."""
     return [e for k in range(1, seconds + 1) for e in robot.handle(Tick(utime + k * SECOND_US))]
 
 
@@ -51,24 +63,21 @@ def drive(robot: Robot, x: float, y: float, theta: float) -> None:
 
 @pytest.mark.parametrize(("counter", "again"), [(2**31 - 1 - 100_001, False), (2**31 - 2, True)])
 def test_a_robot_that_runs_out_of_counters_begins_again(
-    pair: VirtualTeam, counter: int, again: bool
+    robot: Robot, utime: int, counter: int, again: bool
 ) -> None:
-    robot = pair.member(1).robot
     robot.team.seal._counter = counter - 3
     drive(robot, 9_000.0, 0.0, 0.0)
-    assert restarts(later(pair)) == ([1] if again else [])
+    assert restarts(later(robot, utime)) == ([1] if again else [])
 
 
 @pytest.mark.parametrize(("segment", "again"), [(2**15 - 2, False), (2**15 - 1, True)])
 def test_a_robot_whose_odometry_broke_too_often_for_16_bits_begins_again(
-    pair: VirtualTeam, segment: int, again: bool
+    robot: Robot, utime: int, segment: int, again: bool
 ) -> None:
-    robot = pair.member(1).robot
     robot.front._segment = segment
     track = robot.front.reckoning.track
     track.append(track.end + 1, np.array([9_000.0, 0.0, 0.0]))
-    effects = later(pair)
-    assert restarts(effects) == ([1] if again else [])
+    assert restarts(later(robot, utime)) == ([1] if again else [])
 
 
 FAR = 2**31 - 1 - 2**20
@@ -77,20 +86,21 @@ FAR = 2**31 - 1 - 2**20
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize(("step", "again"), [(FAR, False), (FAR + 1, True), (-FAR - 1, True)])
 def test_a_robot_that_drove_or_turned_too_far_for_32_bits_begins_again(
-    pair: VirtualTeam, axis: int, step: int, again: bool
+    robot: Robot, utime: int, axis: int, step: int, again: bool
 ) -> None:
-    robot = pair.member(1).robot
     steps = [0.0, 0.0, 0.0]
     steps[axis] = float(step)
     drive(robot, *steps)
-    effects = later(pair, seconds=3)
+    effects = later(robot, utime, seconds=3)
     assert bool(restarts(effects)) == again
     for effect in effects:
         if isinstance(effect, Send) and messages.kind_of_channel(effect.channel) == "ODOMETRY":
             assert not isinstance(messages.decode("ODOMETRY", effect.payload), str)
 
 
-def test_a_team_goes_on_when_one_of_them_has_begun_again(pair: VirtualTeam) -> None:
+def test_a_team_goes_on_when_one_of_them_has_begun_again() -> None:
+    pair = VirtualTeam(on=(0, 1))
+    pair.run(5.0)
     old = pair.member(1).robot
     old.front.reckoning._pose = np.array([1e-4 * (FAR + 1), 0.0, 0.0])
     pair.run(16.0)
@@ -115,10 +125,8 @@ def the_spoken() -> tuple[RangeMeasurement, ClosureMeasurement, Pose, PublicPose
     return entry.ranges[0], entry.closures[0], pose, public, batch
 
 
-def test_what_was_measured_and_no_message_can_say_is_left_out_and_counted(
-    pair: VirtualTeam,
-) -> None:
-    team = pair.member(1).robot.team
+def test_what_was_measured_and_no_message_can_say_is_left_out_and_counted(robot: Robot) -> None:
+    team = robot.team
     place, closure, *_ = the_spoken()
     ranges = [place, replace(place, range_m=1e4), replace(place, sigma_m=33.0)]
     ranges += [replace(place, q_a=(0.0, -33.0)), replace(place, range_m=float("nan"))]
@@ -133,8 +141,8 @@ def test_what_was_measured_and_no_message_can_say_is_left_out_and_counted(
     assert len(decoded.ranges) == len(decoded.closures) == 1
 
 
-def test_a_value_just_within_its_bound_is_still_there_when_it_is_rounded(pair: VirtualTeam) -> None:
-    team = pair.member(1).robot.team
+def test_a_value_just_within_its_bound_is_still_there_when_it_is_rounded(robot: Robot) -> None:
+    team = robot.team
     place, closure, *_ = the_spoken()
     edge = 1e4 - 2e-3
     ranges = [replace(place, range_m=sign * edge) for sign in (1, -1)]
@@ -165,14 +173,14 @@ def test_lifted_poses_beyond_all_places_are_not_said(value: float, sayable: bool
 # ---- what a peer cannot mean -------------------------------------------------------------------
 
 
-def test_a_peer_that_wants_odometry_from_the_future_gets_what_there_is(pair: VirtualTeam) -> None:
+def test_a_peer_that_wants_odometry_from_the_future_gets_what_there_is(
+    robot: Robot, utime: int
+) -> None:
     """It believed a false batch, and would wait for ever."""
-    robot = pair.member(1).robot
     peer: Peer = robot.team.peers[0]
     assert peer.status is not None
     wanted = Heard(1, robot.own.epoch, 0, 2**31 - 1)
     named = replace(peer.status, heard=(wanted,))
-    utime = pair.member(1).clock.local(pair.simulator.now)
     peer.take_status(named, peer._status_counter + 1, robot.own, utime)
     (send,) = robot.broadcast.odometry(robot.neighbours(utime), utime)
     assert isinstance(send, Send)
@@ -183,8 +191,8 @@ def test_a_peer_that_wants_odometry_from_the_future_gets_what_there_is(pair: Vir
     assert len(batch.steps) == len(track) > 30
 
 
-def test_an_entry_with_nothing_to_say_is_none(pair: VirtualTeam) -> None:
-    team = pair.member(1).robot.team
+def test_an_entry_with_nothing_to_say_is_none(robot: Robot) -> None:
+    team = robot.team
     place, *_ = the_spoken()
     assert list(team.entries(UNTOLD, (), [replace(place, range_m=1e5)], ())) == []
     assert list(team.entries(UNTOLD, an_entry(0, 1).keyframes, (), ())) != []

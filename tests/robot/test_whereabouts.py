@@ -208,6 +208,7 @@ def test_when_the_cable_is_back_a_new_piece_begins_that_is_nowhere_yet(team: Vir
     assert [pose for sent, _, pose in said(team, 1) if sent > BACK_S + 1] == []
 
 
+@pytest.mark.slow
 def test_a_robot_alone_says_that_its_pose_grew_old_though_nothing_is_solved() -> None:
     team = VirtualTeam(EASY, on=())
     team.cut = lambda robot, port, t: robot == 1 and t > OUT_S
