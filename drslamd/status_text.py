@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+UNSURE = ("stale", "doubtful")
+"""States of the pose of a peer that are worth a word."""
+
 
 def lines(s: dict[str, Any]) -> list[str]:
     """Text lines of one status answer."""
@@ -66,6 +69,7 @@ def _peer(robot: str, peer: dict[str, Any]) -> str:
     words = [
         "alive" if peer["alive"] else "SILENT",
         "" if peer["hears_us"] else "does not hear us",
+        f"its pose is {peer['pose']}" if peer["pose"] in UNSURE else "",
         f"heard {peer['age_s']:.1f} s ago",
         f"loss {100 * peer['loss']:.0f} %",
         clock,

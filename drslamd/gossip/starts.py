@@ -86,13 +86,14 @@ class Starts:
         named = set() if own.epoch in heard else {e for e in later if e > own.epoch}
         if any(log.epoch == own.epoch and log.first < log.complete > said for log in logs):
             named.add(own.epoch)  # it holds what we never said: this epoch was used before
+        # whoever was lied high and lost its memory comes back there step by step
         most = min(highest_believed(own.epoch), LAST_KEPT_EPOCH - 2 * SECOND_US)
-        believed = [epoch for epoch in named if epoch <= most]
-        if not believed:
+        claim = min(max(named, default=-1), most)
+        if claim < own.epoch:
             self._claims.pop(sender, None)
             return
         known = self._claims.get(sender)
-        self._claims[sender] = _Claim(max(believed), known.since if known else utime, utime)
+        self._claims[sender] = _Claim(claim, known.since if known else utime, utime)
 
     def superseded_by(self) -> int | None:
         """The epoch above which we have to begin again to be heard by all; None as it should be."""

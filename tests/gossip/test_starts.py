@@ -15,6 +15,7 @@ OWN = Chain(1, 10)
 T0 = 100 * SECOND
 YEAR_2255 = 2**53
 STEP = 2**32
+LAST_KEPT = 2**53 + 2**44
 HIGHEST = YEAR_2255 + STEP
 """What one message can make believe of a robot."""
 
@@ -162,15 +163,37 @@ def test_a_peer_that_hears_us_has_taken_no_later_start_for_ours() -> None:
     assert claims(heard=(10,), logs=log(12)) is None
 
 
+@pytest.mark.parametrize("epoch", [HIGHEST, HIGHEST + 1, 2**62])
+def test_a_claim_beyond_all_clocks_is_followed_by_a_step_only(epoch: int) -> None:
+    assert claims(heard=(epoch,)) == HIGHEST
+
+
+def test_of_several_claims_the_highest_counts() -> None:
+    assert claims(heard=(11, 13), logs=log(12)) == 13
+
+
+def test_a_robot_that_was_lied_high_and_lost_its_memory_comes_back_there_in_steps() -> None:
+    high, own = YEAR_2255 + 3 * STEP, 10
+    for _ in range(3):
+        team, seal = Team(a_seal(1, own)), a_seal(3)
+        for utime in (T0, T0 + 2 * SECOND):
+            status = a_status((Heard(1, high, 0),))
+            team.receive(ChannelMessage(utime, *sealed(seal, status, utime)))
+        assert team.superseded_by is not None
+        assert team.superseded_by > own
+        own = team.superseded_by + 1
+    assert own > high
+
+
 @pytest.mark.parametrize(
-    ("epoch", "believed"), [(HIGHEST, True), (HIGHEST + 1, False), (2**62, False)]
+    ("own", "followed"), [(LAST_KEPT - 3 * 10**6, True), (LAST_KEPT - 10**6, False)]
 )
-def test_a_claim_beyond_all_clocks_is_followed_by_a_step_only(epoch: int, believed: bool) -> None:
-    assert claims(heard=(epoch,)) == (epoch if believed else None)
-
-
-def test_of_several_claims_the_highest_that_can_be_believed_counts() -> None:
-    assert claims(heard=(11, 13, 2**62)) == 13
+def test_no_claim_leads_beyond_what_can_be_kept(own: int, followed: bool) -> None:
+    team, seal = Team(a_seal(1, own)), a_seal(3)
+    for utime in (T0, T0 + 2 * SECOND):
+        status = a_status((Heard(1, 2**62, 0),))
+        team.receive(ChannelMessage(utime, *sealed(seal, status, utime)))
+    assert team.superseded_by == (LAST_KEPT - 2 * 10**6 if followed else None)
 
 
 def test_entries_of_our_log_that_we_never_made_show_that_this_epoch_was_used_before() -> None:
