@@ -56,6 +56,7 @@ MAX_ANGLE = math.pi + ROTATION_STEP_RAD
 """Angles of poses are wrapped; one step for the rounding."""
 ROOM_M = 1e-3
 """What is said stays so far within its bound, and is still there when it is rounded."""
+ROOM_RAD = ROTATION_STEP_RAD / 2
 VARIANCES = (0, 3, 5)
 """Their places among xx xy xt yy yt tt."""
 
@@ -103,17 +104,19 @@ def is_range(metres: float, room: float = 0.0) -> bool:
     return abs(metres) < FARTHEST_M - room
 
 
-def is_closure(a_T_b: Sequence[float], covariance: Sequence[float], room: float = 0.0) -> bool:
+def is_closure(
+    a_T_b: Sequence[float], covariance: Sequence[float], room_m: float = 0.0, room_rad: float = 0.0
+) -> bool:
     """Is it a relative pose, with a covariance that is one in 32 bits too?"""
     x, y, theta = a_T_b
-    if not (is_range(x, room) and is_range(y, room) and abs(theta) < MAX_ANGLE):
-        return False
-    if not all(BEST_SIGMA**2 < covariance[k] < WORST_SIGMA**2 for k in VARIANCES):
+    if not (is_range(x, room_m) and is_range(y, room_m) and abs(theta) < MAX_ANGLE - room_rad):
         return False
     if not all(abs(v) < WORST_SIGMA**2 for v in covariance):
         return False
-    full = se2.unpacked(tuple(np.float32(v) for v in covariance))
-    return bool(np.linalg.eigvalsh(full)[0] > 0)
+    said = tuple(float(np.float32(v)) for v in covariance)
+    if not all(BEST_SIGMA**2 < said[k] < WORST_SIGMA**2 for k in VARIANCES):
+        return False
+    return bool(np.linalg.eigvalsh(se2.unpacked(said))[0] > 0)
 
 
 def is_pose(pose: Sequence[float], covariance: Sequence[float]) -> bool:
@@ -143,7 +146,7 @@ def is_sayable(item: Measurement | OdometryBatch | Pose | PublicPoses) -> bool:
         fits = levers < LONGEST_LEVER_M and 0 < item.sigma_m < LONGEST_LEVER_M
         return fits and is_range(item.range_m, ROOM_M)
     if isinstance(item, ClosureMeasurement):
-        return is_closure(item.a_T_b, item.covariance, ROOM_M)
+        return is_closure(item.a_T_b, item.covariance, ROOM_M, ROOM_RAD)
     if isinstance(item, OdometryBatch):
         last = item.n0 + len(item.steps) - 1
         return bool((np.abs(item.steps) <= SPENT_STEP).all()) and last <= LAST_N

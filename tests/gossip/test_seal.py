@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import random
-
 import pytest
 from message_builders import OTHER_SECRET, SECRET, a_seal, a_status, forged, kinds, resealed, sealed
 
 from drslamd.gossip import messages
-from drslamd.gossip.replay_window import ReplayWindow
 from drslamd.gossip.seal import Header, Seal, SealFault, team_key
 
 STATUS = frozenset([messages.FINGERPRINTS["STATUS"]])
@@ -226,70 +223,6 @@ def test_the_largest_counter_is_the_last_one() -> None:
     last = [LAST_COUNTER - k for k in (2, 1, 0)]
     assert counters(*last, *last, LAST_COUNTER - 1023) == [True] * 3 + [False] * 3 + [True]
     assert counters(*last, LAST_COUNTER - 1024) == [True] * 3 + [False]
-
-
-@pytest.mark.parametrize("leap", [1025, 5_000, LAST_COUNTER - 3])
-def test_one_message_that_leaps_ahead_silences_none_of_those_that_follow(leap: int) -> None:
-    follow = [counter for counter in range(4, 3_000) if counter != 3 + leap]
-    assert counters(1, 2, 3, 3 + leap, *follow, 3 + leap) == [True] * (4 + len(follow)) + [False]
-
-
-def test_one_message_a_whole_window_ahead_silences_none_of_those_that_follow() -> None:
-    follow = range(4, 1_027)
-    assert counters(1, 2, 3, 3 + 1024, *follow) == [True] * (4 + len(follow))
-
-
-@pytest.mark.parametrize(("ahead", "back"), [(2, True), (3, False)])
-def test_three_messages_from_far_ahead_take_the_window_there(ahead: int, back: bool) -> None:
-    """A robot that was out of range for hours is heard at once, and then as ever."""
-    leapt = range(50_000, 50_000 + ahead)
-    assert counters(1, 2, *leapt, *leapt, 3) == [True] * (2 + ahead) + [False] * ahead + [back]
-
-
-def test_messages_far_ahead_that_are_not_together_take_the_window_nowhere() -> None:
-    leaps = [5_000 * k for k in range(1, 9)]
-    assert counters(1, *leaps, 2, *leaps, 3) == [True] * 10 + [False] * 8 + [True]
-
-
-def test_one_leap_more_than_are_remembered_moves_the_window_to_the_first_of_them() -> None:
-    leaps = [5_000 * k for k in range(1, 10)]
-    taken = counters(1, *leaps, 2, *leaps, 5_001)
-    assert taken == [True] * 10 + [False] + [False] * 9 + [True]
-
-
-def test_the_window_takes_nothing_twice_wherever_counters_leap() -> None:
-    draw, window = random.Random(6), ReplayWindow()
-    seen: set[int] = set()
-    at = 1
-    for _ in range(20_000):
-        at = max(1, at + draw.choice([1, 1, 2, -1, -3, -500, 501, -1023, 1025, 3000, -2900]))
-        if window.is_new(at):
-            assert at not in seen
-            window.commit(at)
-            seen.add(at)
-        assert not window.is_new(at)
-        assert len(window._ahead) <= 9
-    assert len(seen) > 500
-
-
-def test_the_window_takes_all_that_is_new_while_no_counter_leaps() -> None:
-    draw, window = random.Random(7), ReplayWindow()
-    seen: set[int] = set()
-    at = 1
-    for _ in range(20_000):
-        at = max(1, at + draw.choice([1, 1, 2, -1, -3, -500, 501, -1023, 1023, -900]))
-        newest = max(seen, default=0)
-        at = min(at, newest + 1024)
-        expected = at not in seen and at > newest - 1024
-        assert window.is_new(at) == expected
-        if expected:
-            window.commit(at)
-            seen.add(at)
-
-
-def test_asking_the_window_changes_nothing() -> None:
-    window = ReplayWindow()
-    assert [window.is_new(5) for _ in range(3)] == [True] * 3
 
 
 # ---- nothing is remembered of what is not proven -----------------------------------------------

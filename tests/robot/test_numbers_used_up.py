@@ -14,7 +14,6 @@ from teams import VirtualTeam
 from drslamd.conventions import SECOND_US
 from drslamd.events import Effect, Restart, Send, Tick
 from drslamd.gossip import messages
-from drslamd.gossip.bounds import is_sayable
 from drslamd.gossip.message_types import Heard, OdometryBatch, Pose
 from drslamd.gossip.peer import Peer
 from drslamd.robot import Robot
@@ -151,23 +150,6 @@ def test_a_value_just_within_its_bound_is_still_there_when_it_is_rounded(robot: 
     decoded, _ = team.append(entry, 10 * SECOND_US)
     assert len(decoded.ranges) == len(decoded.closures) == 2
     assert team.unsayable == 0
-
-
-@pytest.mark.parametrize(
-    ("variance", "sayable"), [(1e12, True), (1.1e12, False), (1e39, False), (float("nan"), False)]
-)
-def test_a_pose_that_is_uncertain_beyond_all_places_is_not_said(
-    variance: float, sayable: bool
-) -> None:
-    _, _, pose, _, _ = the_spoken()
-    assert is_sayable(replace(pose, covariance=(variance, 0.0, 0.0, 1.0, 0.0, 1.0))) == sayable
-
-
-@pytest.mark.parametrize(("value", "sayable"), [(1e6, True), (1.1e6, False), (np.inf, False)])
-def test_lifted_poses_beyond_all_places_are_not_said(value: float, sayable: bool) -> None:
-    *_, public, _ = the_spoken()
-    values = np.full(public.values.shape, complex(0.0, value))
-    assert is_sayable(replace(public, values=values)) == sayable
 
 
 # ---- what a peer cannot mean -------------------------------------------------------------------

@@ -1,0 +1,124 @@
+"""One robot's log as another holds it: what is held, what lacks, what is given up."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from drslamd.gossip import replicated_log
+from drslamd.gossip.replicated_log import AHEAD, ReplicatedLog
+
+LAST = 2**31 - 1
+
+
+def holding(*seqs: int) -> ReplicatedLog:
+    log = ReplicatedLog(epoch=1)
+    for seq in seqs:
+        log.put(seq, b"%d" % seq)
+    return log
+
+
+def numbers(log: ReplicatedLog) -> tuple[int, int, int, int]:
+    return log.first, log.complete, log.end, log.newest
+
+
+def test_an_empty_log_lacks_its_first_entry() -> None:
+    assert numbers(holding()) == (0, 0, 0, 0)
+
+
+def test_a_log_is_complete_up_to_its_first_hole() -> None:
+    assert numbers(holding(0, 1, 3)) == (0, 2, 4, 4)
+    assert numbers(holding(3, 1, 0, 2)) == (0, 4, 4, 4)
+
+
+def test_what_was_heard_of_stays_known_when_less_is_held() -> None:
+    log = holding(0)
+    log.newest = 9
+    log.put(1, b"1")
+    assert numbers(log) == (0, 2, 2, 9)
+
+
+def test_what_the_owner_no_longer_holds_is_not_waited_for() -> None:
+    log = holding(0, 5, 6, 8)
+    assert (log.complete, log.lacking) == (1, 5)
+    log.on_owner(first=5, newest=9)
+    assert (log.start, log.complete, log.lacking) == (5, 7, 1)
+    assert sorted(log.sealed) == [0, 5, 6, 8]
+
+
+def test_what_the_owner_says_of_a_log_replaces_what_it_said_before() -> None:
+    log = holding(0, 1, 3)
+    log.on_owner(first=LAST, newest=LAST)
+    assert (log.complete, log.newest, log.lacking) == (LAST, LAST, 0)
+    log.on_owner(first=0, newest=4)
+    assert numbers(log) == (0, 2, 4, 4)
+    assert log.lacking == 1
+
+
+def test_less_than_what_is_held_is_not_believed_of_its_end() -> None:
+    log = holding(0, 1, 2)
+    log.on_owner(first=0, newest=1)
+    assert numbers(log) == (0, 3, 3, 3)
+
+
+def test_an_owner_that_forgot_only_what_is_held_here_changes_nothing() -> None:
+    log = holding(0, 1, 2)
+    for first in (0, 2, 3):
+        log.on_owner(first, newest=3)
+        assert (log.start, *numbers(log)) == (0, 0, 3, 3, 3)
+
+
+@pytest.mark.parametrize("newest", [1, 3, 2 + AHEAD])
+def test_what_somebody_else_has_heard_of_counts(newest: int) -> None:
+    log = holding(0, 1)
+    log.on_hearsay(newest)
+    assert log.newest == max(2, newest)
+
+
+def test_what_somebody_else_has_heard_of_counts_only_so_far_ahead() -> None:
+    log = holding(0, 1)
+    log.on_hearsay(LAST)
+    assert log.newest == 2 + AHEAD
+    log.on_owner(0, newest=4)
+    assert (log.newest, log.lacking) == (4, 2)
+
+
+def test_when_an_entry_was_on_the_air_is_forgotten_with_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(replicated_log, "MAX_ENTRIES", 2)
+    log = holding(0, 1)
+    log.aired = {0: 10, 1: 11}
+    log.put(2, b"2")
+    assert log.aired == {1: 11}
+
+
+def test_an_entry_far_ahead_gives_up_all_before_it_without_counting_to_it() -> None:
+    log = holding(0, 1, LAST)
+    first = LAST + 1 - replicated_log.MAX_ENTRIES
+    assert numbers(log) == (first, first, LAST + 1, LAST + 1)
+    assert sorted(log.sealed) == [LAST]
+
+
+@pytest.mark.parametrize(("last", "first"), [(9, 0), (10, 1), (25, 16)])
+def test_only_so_many_of_the_newest_are_held(
+    last: int, first: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(replicated_log, "MAX_ENTRIES", 10)
+    log = holding(*range(last + 1))
+    assert sorted(log.sealed) == list(range(first, last + 1))
+    assert numbers(log) == (first, last + 1, last + 1, last + 1)
+
+
+def test_every_order_of_arrival_gives_the_same_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(replicated_log, "MAX_ENTRIES", 10)
+    for seed in range(50):
+        order = [*range(6), *range(8, 20)]
+        random.Random(seed).shuffle(order)
+        log = ReplicatedLog(epoch=1)
+        for seq in order:
+            if seq >= log.first:
+                log.put(seq, b"%d" % seq)
+        assert numbers(log) == (10, 20, 20, 20), f"seed {seed}"
+        assert log.sealed == {seq: b"%d" % seq for seq in range(10, 20)}
