@@ -12,11 +12,10 @@ import pytest
 from slam_scenes import NOISE, closure, keyframes, model_of, range_item, small_team, wander
 
 from drslamd.conventions import Chain, Segment
-from drslamd.slam.graph import chain_data, pair_data, tables
+from drslamd.slam.graph import timed_rows
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.graph.pose_graph import PoseGraph
-from drslamd.slam.graph.tables import KeyedRows
 from drslamd.slam.odometry.noise import growth
 from drslamd.slam.robot_model import UNTOLD, RobotModel
 
@@ -133,6 +132,7 @@ def test_a_new_epoch_forgets_the_old_chain_and_what_it_measured() -> None:
     assert [key for key in graph.pairs if key[0] == 0] == []
     # what others measured to the old chain is of no use until they name the new one
     assert [(p.a.robot, p.b.robot) for p in graph.usable()] == [(1, 2)]
+    assert [(p.a.robot, p.b.robot) for p in graph.view.pairs] == [(1, 2)]
 
 
 def test_an_old_epoch_is_not_listened_to() -> None:
@@ -165,49 +165,6 @@ def test_an_item_may_name_a_keyframe_that_has_not_come_yet() -> None:
     assert items.keyframes.find(np.array([10.0, 9.0, 11.0]))[1].tolist() == [True, False, False]
 
 
-@pytest.mark.parametrize("count", [29, 30, 31, 75])
-def test_rows_keep_the_last_ones_in_the_order_of_their_keys(count: int) -> None:
-    shuffled = np.random.default_rng(2).permutation(count)
-    for looked in (False, True):
-        rows = KeyedRows(2, 30)
-        for key in shuffled:
-            rows.add([float(key), -float(key)])
-            if looked:
-                assert len(rows.data) <= 30
-        assert rows.data[:, 0].tolist() == list(range(max(0, count - 30), count))
-        assert np.array_equal(rows.data[:, 0], -rows.data[:, 1])
-
-
-def test_rows_that_nobody_looks_at_are_bounded_too() -> None:
-    rows = KeyedRows(2, 100)
-    for key in range(5_000):
-        rows.add([float(key), 0.0])
-        assert len(rows._new) < tables.WAITING
-    assert len(rows.data) == 100
-
-
-def test_a_chain_keeps_the_last_keyframes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chain_data, "MAX_KEYFRAMES", 50)
-    items = ChainData(A)
-    path = wander(np.random.default_rng(3), 80, 0.4)
-    for k in keyframes(range(80), path):
-        items.add(k)
-        assert len(items.keyframes.rows) == min(50, k.n + 1)
-    assert items.keyframes.n.tolist() == list(range(30, 80))
-
-
-def test_a_pair_keeps_the_last_ranges_and_closures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pair_data, "MAX_RANGES", 10)
-    monkeypatch.setattr(pair_data, "MAX_CLOSURES", 10)
-    graph = PoseGraph()
-    for seq in reversed(range(12)):
-        ranges = (range_item(seq, B, seq, 1.0),)
-        graph.insert(A, GraphEntry(seq, None, (), ranges, (closure(seq, 0, B, 0, (0, 0, 0)),)))
-    pair = graph.pairs[0, 1]
-    assert pair.ranges.a_n.tolist() == list(range(2, 12))
-    assert [c.number for c in pair.kept_closures()] == list(range(2, 12))
-
-
 # ---- sums ----
 
 
@@ -217,11 +174,18 @@ def sums_between(items: ChainData, i: int, k: int) -> np.ndarray:
     return np.asarray(items.sums[at[1]] - items.sums[at[0]])
 
 
-def test_sums_are_those_of_the_whole_chain_however_it_came(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def forty_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Chains hold the newest four blocks of ten samples."""
+    monkeypatch.setattr(timed_rows, "BLOCK", 10)
+    monkeypatch.setattr(timed_rows, "HELD_BLOCKS", 4)
+
+
+@pytest.mark.usefixtures("forty_held")
+def test_sums_are_those_of_the_whole_chain_however_it_came() -> None:
     path = wander(np.random.default_rng(4), 60, 0.4)
     frames = keyframes(range(60), path)
     expected = growth(np.array([[k.x, k.y, k.theta] for k in frames]) * 1e-4)
-    monkeypatch.setattr(chain_data, "MAX_KEYFRAMES", 40)
     shuffle = random.Random(5)
     for _ in range(10):
         order = list(frames)
@@ -231,24 +195,39 @@ def test_sums_are_those_of_the_whole_chain_however_it_came(monkeypatch: pytest.M
             items.add(k)
             if shuffle.random() < 0.5:
                 assert len(items.sums) == len(items.keyframes.rows)
+        assert items.keyframes.n.tolist() == list(range(20, 60))
         assert np.allclose(sums_between(items, 25, 55), expected[55] - expected[25])
 
 
-def test_what_came_late_or_was_dropped_does_not_move_the_sums(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+@pytest.mark.usefixtures("forty_held")
+def test_what_came_late_or_was_dropped_does_not_move_the_sums() -> None:
     """Candidates of module 2 remember them."""
-    monkeypatch.setattr(chain_data, "MAX_KEYFRAMES", 40)
-    frames = keyframes(range(60), wander(np.random.default_rng(6), 60, 0.4))
+    frames = keyframes(range(70), wander(np.random.default_rng(6), 70, 0.4))
     items = ChainData(A)
     for k in frames[20:45]:
         items.add(k)
     remembered = items.sums[items.keyframes.find(np.array([30.0]))[0][0]].copy()
-    for part in (frames[5:20], frames[45:], frames[0:5]):
+    for part in (frames[15:20], frames[45:60], frames[10:15], frames[60:]):
         for k in part:
             items.add(k)
         now = items.sums[items.keyframes.find(np.array([30.0]))[0][0]]
         assert np.allclose(now, remembered, atol=1e-9)
+    assert items.keyframes.n[0] == 30
+
+
+def test_keyframes_that_somebody_took_stay_as_they_were_when_others_come_late() -> None:
+    """A job of another thread may still read them."""
+    frames = keyframes(range(0, 100, 10), wander(np.random.default_rng(7), 10, 0.4))
+    items = ChainData(A)
+    for k in frames[:4] + frames[5:]:
+        items.add(k)
+    taken, sums = items.keyframes.rows, items.sums
+    before, sums_before = taken.copy(), sums.copy()
+    items.add(frames[4])
+    assert len(items.keyframes) == 10
+    assert len(items.sums) == 10
+    assert np.array_equal(taken, before)
+    assert np.array_equal(sums, sums_before)
 
 
 # ---- segments ----
@@ -258,8 +237,8 @@ def test_rows_of_a_segment_are_found_and_of_one_that_is_not_there_are_none() -> 
     graph = graph_of(*some_entries())
     assert graph.chains[0].keyframes.of_segment(0) == slice(0, 12)
     assert graph.chains[0].keyframes.of_segment(1) == slice(12, 20)
-    assert graph.segment(Segment(*A, 1)).n.tolist() == list(range(120, 200, 10))
-    assert len(graph.segment(Segment(*A, 7))) == 0
+    assert graph.view.segment(Segment(*A, 1)).n.tolist() == list(range(120, 200, 10))
+    assert len(graph.view.segment(Segment(*A, 7))) == 0
 
 
 def test_a_segment_never_comes_back_whatever_a_robot_says() -> None:

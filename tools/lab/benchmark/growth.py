@@ -74,7 +74,7 @@ def _driven(marks: dict[str, int]) -> dict[str, tuple[float, int]]:
         taken = _update(back)
         for name in reached:
             at_marks[name].append(taken)
-            held[name] = sum(len(items.keyframes.rows) for items in back.graph.chains.values())
+            held[name] = sum(len(c.keyframes) for c in back.graph.view.chains.values())
     return {name: (float(np.median(ms)), held[name]) for name, ms in at_marks.items()}
 
 
@@ -82,7 +82,7 @@ def _update(back: BackEnd) -> float:
     """ms of CPU for all that a robot does each second with the graph that it holds."""
     started = timing.now_ms()
     back.digest()
-    job = back.begin(set(range(ROBOTS)), {}, {})
+    job = back.begin(set(range(ROBOTS)), {})
     if job is not None:
         back.on_solution(job())
     return timing.now_ms() - started

@@ -19,7 +19,7 @@ from slam_scenes import (
     wander,
 )
 
-from drslamd.conventions import GRID_US, Chain, Segment
+from drslamd.conventions import Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import GraphEntry
@@ -28,7 +28,6 @@ from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer.closures.closure_optimizer import ClosureOptimizer
 from drslamd.slam.optimizer.factors import chain_links
 
-CLOCKS = {0: 0, 1: 1000 * GRID_US, 2: 2000 * GRID_US}
 COUNT = 40
 
 
@@ -53,7 +52,7 @@ class Team:
     def solved(self, previous: TeamEstimate | None = None) -> TeamEstimate:
         graph: PoseGraph = self.team.graph
         members = {Segment(*items.chain, 0) for items in graph.chains.values()}
-        group = Group(members, min(members), CLOCKS)
+        group = Group(members, min(members))
         job = ClosureOptimizer().job(graph, group, previous, {})
         assert job is not None
         return job()
@@ -113,9 +112,9 @@ def test_beside_a_single_closure_a_heading_is_as_uncertain_as_its_odometry() -> 
     only = closure(0, 100, other, 100, np.array([1.0, 2.0, 0.5]))
     graph.insert(one, GraphEntry(1, closures=(only,)))
     members = {Segment(*one, 0), Segment(*other, 0)}
-    job = ClosureOptimizer().job(graph, Group(members, min(members), {}), None, {})
+    job = ClosureOptimizer().job(graph, Group(members, min(members)), None, {})
     assert job is not None
-    links = chain_links(graph.chains[0], calibrated=False).covariance[:, 2, 2].sum()
+    links = chain_links(graph.view.chains[0], calibrated=False).covariance[:, 2, 2].sum()
     assert job().covariances[0][2, 2] == pytest.approx(links, rel=1e-4)
 
 
