@@ -41,7 +41,7 @@ class BackEnd:
     def __init__(self, config: Config, own: Chain, tuning: Tuning = DEFAULTS) -> None:
         self._own = own
         self._optimizer = settings.optimizer(config, own, tuning)
-        self.graph = PoseGraph()
+        self.graph = PoseGraph(tuning.recent_s)
         self.history = History()
         self.group: set[Segment] = set()
         self.estimate: TeamEstimate | None = None

@@ -16,15 +16,20 @@ from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pair_data import PairData
 from drslamd.slam.graph.thinning.graph_view import GraphView, Thinning
+from drslamd.slam.graph.thinning.time_cells import RECENT_S
 
 
 class PoseGraph:
     """All chains and pairs that this robot holds."""
 
-    def __init__(self) -> None:
+    def __init__(self, recent_s: int = RECENT_S) -> None:
+        """
+        Args:
+            recent_s: how long nothing is thinned.
+        """
         self.chains: dict[int, ChainData] = {}
         self.pairs: dict[tuple[int, int], PairData] = {}
-        self._thinning = Thinning()
+        self._thinning = Thinning(recent_s)
         self._view: GraphView | None = None
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +22,15 @@ class KeyframeTable:
     def __len__(self) -> int:
         return len(self.rows)
 
-    @property
+    @cached_property
     def n(self) -> Index:
         """(k,) samples of the 10 Hz grid."""
         return self.rows[:, 0].astype(np.int64)
+
+    @cached_property
+    def _keys(self) -> Array:
+        """The same as they are searched."""
+        return np.ascontiguousarray(self.rows[:, 0])
 
     @property
     def segment(self) -> Index:
@@ -41,11 +47,15 @@ class KeyframeTable:
 
     def find(self, n: Array) -> tuple[Index, NDArray[np.bool_]]:
         """Positions of keyframes n (m,), and which of them are there."""
-        return positions(self.rows[:, 0], n)
+        return positions(self._keys, n)
 
     def of_segment(self, segment: int) -> slice:
         """Which rows a segment is; empty when it is not there."""
         return slice(*np.searchsorted(self.rows[:, 1], [segment, segment + 1]).tolist())
+
+    def between(self, first: int, end: int) -> slice:
+        """Which rows are those of samples first .. end - 1."""
+        return slice(*np.searchsorted(self._keys, [first, end]).tolist())
 
 
 def positions(ascending: Array, wanted: Array) -> tuple[Index, NDArray[np.bool_]]:

@@ -253,6 +253,14 @@ def test_a_segment_never_comes_back_whatever_a_robot_says() -> None:
     ]
 
 
+def test_a_segment_that_ended_minutes_ago_does_not_come_back_either() -> None:
+    """However often somebody looked in between."""
+    items = ChainData(A)
+    for n, segment, expected in ((0, 4, [4]), (9_000, 2, [4, 4]), (18_000, 5, [4, 4, 5])):
+        items.add(Keyframe(n, segment, 0, 0, 0))
+        assert items.keyframes.segment.tolist() == expected
+
+
 # ---- nonsense is not taken in ----
 
 

@@ -62,8 +62,8 @@ class ChainPart:
         stays: (k,) which rows stay.
         own: (r,) for each row, the row that begins its cell.
         near: (r,) for each row, the row that stands for it: r is that which follows the stretch.
-        steps: (r, 6) `noise.step_sums` from each row to the next, in the frame of its `own`; zero
-            across a break.
+        steps: (r, 6) `noise.step_sums` from each row to the next, in the frame of its `own`; what
+            they are across a break nobody asks.
         links: between the rows `stays` and on to the next stretch, numbered as `stays` is.
     """
 
@@ -95,7 +95,6 @@ def thinned(stretch: Stretch, rows: Array, after: Array) -> ChainPart:
     here, there = se2.between(start, poses[:-1])[:, :2], se2.between(start, poses[1:])
     steps = np.zeros((count, 6))
     steps[: len(there)] = step_sums(there[:, :2] - here, (there[:, :2] + here) / 2)
-    steps[: len(there)][~is_joined] = 0.0
     last = stays[1:] - 1
     linked = np.flatnonzero(is_joined[last])
     sums = np.add.reduceat(steps, stays[stays < count]) if count else steps
@@ -240,18 +239,17 @@ class ChainThinning:
         """
         parts = []
         for stretch in reversed(stretches(step, recent)):
-            n = data.keyframes.rows[:, 0]
-            low, high = np.searchsorted(n, [stretch.first, stretch.end]).tolist()
-            if low < high:
-                parts.append(self._part(data, stretch, low, high))
+            rows = data.keyframes.between(stretch.first, stretch.end)
+            if rows.start < rows.stop:
+                parts.append(self._part(data, stretch, rows))
         old = [part for part in parts if part.stretch.level]
         if old != self._old.parts:
             self._old = OldParts(old)
         return ChainView(data, self._old, parts[len(old) :])
 
-    def _part(self, data: ChainData, stretch: Stretch, low: int, high: int) -> ChainPart:
-        rows = data.keyframes.rows[low:high]
-        after = data.keyframes.rows[high : high + 1]
+    def _part(self, data: ChainData, stretch: Stretch, which: slice) -> ChainPart:
+        rows = data.keyframes.rows[which]
+        after = data.keyframes.rows[which.stop : which.stop + 1]
         # (a row in front of a part may change its segments)
         edge = [rows[0, 1], *after.ravel().tolist()]
         made = self._made.get(stretch.level)

@@ -64,7 +64,12 @@ def _rounded(values: Array) -> bytes:
 class Thinning:
     """Makes the view of what is held, again and again; what is old is rarely made anew."""
 
-    def __init__(self) -> None:
+    def __init__(self, recent_s: int) -> None:
+        """
+        Args:
+            recent_s: see `time_cells.RECENT_S`.
+        """
+        self._recent_s = recent_s
         self._chains: dict[Chain, ChainThinning] = {}
         self._pairs: dict[tuple[Chain, Chain], PairThinning] = {}
 
@@ -78,7 +83,7 @@ class Thinning:
         newest = {robot: int(data.keyframes.rows[-1, 0]) for robot, data in known.items()}
         ahead = {(pair.a.robot, pair.b.robot): pair.ahead() for pair in pairs}
         teams = clocks.shifts(set(chains), {k: found for k, found in ahead.items() if found})
-        steps, recent = ages(newest, teams), recent_s(len(chains))
+        steps, recent = ages(newest, teams), recent_s(len(chains), self._recent_s)
         before, self._chains, views = self._chains, {}, {}
         for robot, data in known.items():
             thinning = before.get(data.chain) or ChainThinning()

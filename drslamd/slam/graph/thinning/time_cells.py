@@ -20,8 +20,8 @@ from drslamd.slam.graph.timed_rows import NEVER
 
 RECENT_S = 300
 """Keyframes of the last five minutes all stay ..."""
-TEAM_S = 3_000
-"""... unless the team is large: this is shared among its robots."""
+FULL_TEAM = 10
+"""... unless the team has more robots: then it is half as long each time their number doubles."""
 STEP = 16 * GRID_HZ
 """Samples between two steps of time."""
 LAG_STEPS = 2
@@ -37,12 +37,16 @@ class Stretch(NamedTuple):
     end: int
 
 
-def recent_s(robots: int) -> int:
-    """How long all keyframes stay in a team of so many robots; steps by two, rarely."""
-    shares = max(1, TEAM_S // RECENT_S)
-    while robots > shares:
-        shares *= 2
-    return TEAM_S // shares
+def recent_s(robots: int, most: int = RECENT_S) -> int:
+    """How long all keyframes stay in a team of so many robots, s.
+
+    Args:
+        most: in a small team.
+    """
+    halvings = 0
+    while robots > FULL_TEAM << halvings:
+        halvings += 1
+    return most >> halvings
 
 
 def ages(newest: Mapping[int, int], teams: Iterable[Mapping[int, float]]) -> dict[int, int]:

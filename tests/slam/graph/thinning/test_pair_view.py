@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -270,6 +271,17 @@ def test_a_closure_is_as_much_less_certain_as_odometry_on_both_sides() -> None:
 
 
 # ---- again and again ----
+
+
+def test_what_a_robot_says_of_its_wheels_counts_for_what_was_carried_before() -> None:
+    graph = measured(1_500)
+    before = views(graph)[0].ranges.sigma_m
+    worse = model_of(replace(NOISE, yaw_rad_per_sqrt_m=5 * NOISE.yaw_rad_per_sqrt_m))
+    graph.insert(B, GraphEntry(9_999, worse))
+    after = views(graph)[0].ranges
+    assert (after.sigma_m >= before).all()
+    assert (after.sigma_m > 1.05 * before).sum() > 50
+    assert np.array_equal(after.sigma_m[-300:], before[-300:])
 
 
 def test_a_robot_that_stands_is_measured_at_its_old_keyframe_all_the_while() -> None:

@@ -7,10 +7,10 @@ import itertools
 import pytest
 
 from drslamd.slam.graph.thinning.time_cells import (
+    FULL_TEAM,
     LAG_STEPS,
     RECENT_S,
     STEP,
-    TEAM_S,
     Stretch,
     ages,
     recent_s,
@@ -24,7 +24,8 @@ from drslamd.slam.graph.timed_rows import NEVER
 )
 def test_a_large_team_shares(robots: int, seconds: int) -> None:
     assert recent_s(robots) == seconds
-    assert robots * recent_s(robots) <= TEAM_S
+    assert robots * recent_s(robots) <= FULL_TEAM * RECENT_S
+    assert recent_s(robots, 150) == seconds // 2
 
 
 # ---- stretches of time ----

@@ -125,6 +125,19 @@ def test_the_next_solution_goes_on_from_the_last_one() -> None:
         assert np.abs(trajectory.poses - first.trajectories[robot].poses).max() < 1e-3
 
 
+def test_the_frame_is_where_its_odometry_begins_whatever_anybody_remembers() -> None:
+    """Who solved many times does not carry the frame away by what each solution was off."""
+    team = small_team(12, count=20)
+    group = group_of(team.graph)
+    first = solved(team.graph, group)
+    astray = {
+        r: replace(t, poses=t.poses + [1e-3, 0.0, 1e-3]) for r, t in first.trajectories.items()
+    }
+    problem = build_problem(team.graph, group, replace(first, trajectories=astray), BANDED).problem
+    own = team.graph.chains[0].keyframes.poses[0]
+    assert problem.initial[problem.gauge].tolist() == own.tolist()
+
+
 def test_two_robots_with_the_same_items_agree_whatever_their_history() -> None:
     team = small_team(5, count=60)
     one = solved(team.graph, group_of(team.graph))
