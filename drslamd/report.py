@@ -34,7 +34,7 @@ def status(robot: Robot, utime: int) -> dict[str, Any]:
         "uwb": _uwb(robot, utime),
         "wheels": _wheels(robot, utime),
         "network": _network(robot, utime),
-        "peers": {str(k): _peer(robot, p, utime) for k, p in sorted(robot.team.peers.items())},
+        "peers": _peers(robot, utime),
         "pairs": {str(k): _pair(pair) for k, pair in sorted(robot.front.pairs.items())},
         "graph": _graph(robot),
     }
@@ -117,7 +117,12 @@ def _network(robot: Robot, utime: int) -> dict[str, Any]:
     }
 
 
-def _peer(robot: Robot, peer: Peer, utime: int) -> dict[str, Any]:
+def _peers(robot: Robot, utime: int) -> dict[str, Any]:
+    own_hash, peers = robot.back.digest(), sorted(robot.team.peers.items())
+    return {str(k): _peer(robot, peer, utime, own_hash) for k, peer in peers}
+
+
+def _peer(robot: Robot, peer: Peer, utime: int, own_hash: int) -> dict[str, Any]:
     offset = peer.clock.offset(utime)
     return {
         "epoch": peer.chain.epoch,
@@ -133,7 +138,7 @@ def _peer(robot: Robot, peer: Peer, utime: int) -> dict[str, Any]:
         "pose": state_name(peer.status.state) if peer.status else None,
         "localised": bool(peer.status and peer.status.state),
         "frame": peer.status.frame if peer.status and peer.status.state else None,
-        "same_graph": bool(peer.status and peer.status.graph_hash == robot.back.digest()),
+        "same_graph": bool(peer.status and peer.status.graph_hash == own_hash),
         "log_entries_lacking": robot.team.logs.lacking(peer.chain.robot),
     }
 
@@ -151,7 +156,7 @@ def _graph(robot: Robot) -> dict[str, Any]:
     estimate, learned, own = robot.back.estimate, robot.calibration.latest, robot.own.robot
     out: dict[str, Any] = {
         "group": sorted({segment.robot for segment in robot.back.group}),
-        "keyframes": {str(k): len(c.keyframes) for k, c in sorted(robot.back.graph.chains.items())},
+        "keyframes": {str(k): len(c.keyframes) for k, c in robot.back.graph.view.chains.items()},
     }
     if estimate is not None:
         out |= {

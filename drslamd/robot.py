@@ -263,7 +263,7 @@ class Robot:
         if self.jobs.is_busy(OPTIMIZER) or self.jobs.is_resting(OPTIMIZER, utime):
             return []
         public = {k: peer.public for k, peer in self.team.peers.items() if peer.public}
-        run = self.back.begin(self.team.present(utime), self.team.shifts(utime), public)
+        run = self.back.begin(self.team.present(utime), public)
         return [self.jobs.begin(Job(OPTIMIZER), run)] if run else []
 
     def _on_job(self, event: JobDone) -> list[Effect]:

@@ -298,11 +298,6 @@ class Team:
         }
         return set(direct) | vouched | {self.own.robot}
 
-    def shifts(self, utime: int) -> dict[int, int]:
-        """Clock of each peer minus ours, us, as well as it is known."""
-        offsets = {robot: peer.clock.offset(utime) for robot, peer in self.peers.items()}
-        return {robot: offset.us for robot, offset in offsets.items() if offset is not None}
-
     def compare_radio_clocks(self, own_minus_system: int | None, utime: int) -> None:
         """Use LinkTrack's system_time, where both sides know their clock against it."""
         for peer in self.peers.values():
