@@ -33,12 +33,15 @@ from drslamd.events import (
     PortState,
     Restart,
     Save,
+    SaveDone,
     Send,
     SerialData,
     Stop,
     Tick,
     Write,
 )
+from drslamd.gossip.bounds import is_sayable
+from drslamd.gossip.epochs import kept_epochs
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
@@ -58,6 +61,7 @@ from drslamd.slam.pose_now import pose_now
 from drslamd.slam.settings import closure_method
 from drslamd.slam.tuning import DEFAULTS, Tuning
 from drslamd.timers import Action, Timers
+from drslamd.whereabouts import Whereabouts, whereabouts
 
 POLL_US = 10 * MILLISECOND_US
 """How finely the wheels that must be asked are asked; their driver knows its own rate."""
@@ -106,6 +110,8 @@ class Robot:
         self.health = Health()
         self.ports: dict[str, PortState] = {}
         self.network: NetworkState | None = None
+        self.save_fault = ""
+        """Why nothing is kept over a restart; empty while it is."""
         self.jobs = Jobs()
         self.timers = Timers(self._periods())
         self._saved_epochs = dict(epochs)
@@ -118,6 +124,7 @@ class Robot:
             NetworkState: self._on_network,
             Tick: self._on_tick,
             JobDone: self._on_job,
+            SaveDone: self._on_saved,
             Stop: self._on_stop,
         }
 
@@ -193,8 +200,10 @@ class Robot:
         return list(self.team.repeats(utime)) if is_in_a_graph else []
 
     def _send_status(self, utime: int) -> list[Effect]:
-        clock = self.uwb.system_offset_us(utime)
-        return self.broadcast.heartbeat(self.neighbours(utime), clock, utime)
+        clock, where = self.uwb.system_offset_us(utime), self.whereabouts(utime)
+        status = self.broadcast.heartbeat(self.neighbours(utime), clock, where.state, utime)
+        # solutions come with news; that a pose grew old is said without any
+        return [*status, *(self.broadcast.pose(where, utime) if where.is_old else [])]
 
     def _send_odometry(self, utime: int) -> list[Effect]:
         return self.broadcast.odometry(self.neighbours(utime), utime)
@@ -215,6 +224,8 @@ class Robot:
         closures = self.front.tell_closures()
         if not (keyframe or ranges or closures):
             return []
+        if self.team.is_spent or (keyframe and not is_sayable(keyframe)):
+            return [Restart(self.own.epoch, "it has used up the numbers of its messages")]
         sends: list[Effect] = []
         keyframes = (keyframe,) if keyframe else ()
         for entry in self.team.entries(self.front.model, keyframes, ranges, closures):
@@ -258,7 +269,7 @@ class Robot:
         if self.jobs.is_busy(OPTIMIZER) or self.jobs.is_resting(OPTIMIZER, utime):
             return []
         public = {k: peer.public for k, peer in self.team.peers.items() if peer.public}
-        run = self.back.begin(self.team.present(utime), self.team.shifts(utime), public)
+        run = self.back.begin(self.team.present(utime), public)
         return [self.jobs.begin(Job(OPTIMIZER), run)] if run else []
 
     def _on_job(self, event: JobDone) -> list[Effect]:
@@ -276,8 +287,9 @@ class Robot:
         self.back.on_solution(event.result)
         self.calibration.update(self.back.estimate, self.own.robot, self.front.pairs)
         public = self.back.public_poses()
-        sends = self.team.send_public(public, event.utime) if public else []
-        return [*self.broadcast.pose(self.pose(), event.utime), *sends]
+        can_be_said = public is not None and is_sayable(public)
+        sends = self.team.send_public(public, event.utime) if public and can_be_said else []
+        return [*self.broadcast.pose(self.whereabouts(event.utime), event.utime), *sends]
 
     # ---- what we know of ourselves ----
 
@@ -290,6 +302,11 @@ class Robot:
             estimate, self.own.robot, self.front.reckoning.track, self.front.model.noise
         )
 
+    def whereabouts(self, utime: int) -> Whereabouts:
+        """What that pose is worth now."""
+        most_mps = self.config.wheels.max_speed_mps
+        return whereabouts(self.pose(), self.front.reckoning.track, most_mps, utime)
+
     def _check_health(self, utime: int) -> list[Effect]:
         self.team.forget_silent(utime)
         notes: list[Effect] = []
@@ -298,12 +315,11 @@ class Robot:
         return [*notes, *self._restart_if_superseded(utime)]
 
     def _restart_if_superseded(self, utime: int) -> list[Effect]:
-        """Peers know a later start of ours, so our own memory was lost: begin above it."""
+        """Peers know a later start of ours: our own memory was lost, or a lie is believed."""
         above = self.team.superseded_by
         if above is None or self.team.is_own_id_used(utime):
             return []
-        fields = {"epoch": self.own.epoch, "known_to_peers": above}
-        return [Note(Level.WARNING, "epoch.superseded", fields), Restart(above + 1)]
+        return [Restart(above, "peers know a later start of this robot and refuse this one")]
 
     # ---- time passes, and ends ----
 
@@ -313,7 +329,7 @@ class Robot:
 
     def state(self) -> dict[str, Any]:
         """What must outlive this start."""
-        state = {"epoch": self.own.epoch, "epochs": self.team.seal.epochs}
+        state = {"epoch": self.own.epoch, "epochs": kept_epochs(self.team.seal.epochs)}
         return {**state, "calibration": self.calibration.latest.state()}
 
     def _save(self, utime: int) -> list[Effect]:
@@ -323,7 +339,12 @@ class Robot:
         self._saved_epochs = dict(self.team.seal.epochs)
         return [Save(self.state())]
 
+    def _on_saved(self, event: SaveDone) -> list[Effect]:
+        self.save_fault = event.fault
+        return []
+
     def _on_stop(self, event: Stop) -> list[Effect]:
-        goodbye = self.broadcast.make_status([], None, event.utime, leaving=True)
+        state = self.whereabouts(event.utime).state
+        goodbye = self.broadcast.make_status([], None, state, event.utime, leaving=True)
         sends = [self.team.send(goodbye, event.utime) for _ in range(GOODBYES)]
         return [*sends, Save(self.state())]

@@ -17,7 +17,6 @@ from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
-from drslamd.slam.graph.thinning import Thinning
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.tuning import DEFAULTS, Tuning
 
@@ -42,8 +41,7 @@ class BackEnd:
     def __init__(self, config: Config, own: Chain, tuning: Tuning = DEFAULTS) -> None:
         self._own = own
         self._optimizer = settings.optimizer(config, own, tuning)
-        self.graph = PoseGraph()
-        self._thinning = Thinning(self.graph)
+        self.graph = PoseGraph(tuning.recent_s)
         self.history = History()
         self.group: set[Segment] = set()
         self.estimate: TeamEstimate | None = None
@@ -52,7 +50,6 @@ class BackEnd:
 
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
         self.graph.insert(origin, entry)
-        self._thinning.after(origin.robot)
         self._inserted += 1
 
     def digest(self) -> int:
@@ -63,26 +60,23 @@ class BackEnd:
         """The solved keyframes of a robot, in the frame of the team."""
         return self.estimate.trajectories.get(robot) if self.estimate else None
 
-    def begin(
-        self, present: set[int], shift_us: dict[int, int], public: Mapping[int, PublicPoses]
-    ) -> Job | None:
+    def begin(self, present: set[int], public: Mapping[int, PublicPoses]) -> Job | None:
         """Begin to renew the estimate; None when nothing is new or connected.
 
         An estimate that has not converged is renewed without any news.
 
         Args:
             present: robots that live.
-            shift_us: clock of each robot minus ours, us.
             public: lifted public poses of the peers.
         """
         now = _Known(self._inserted, frozenset(present), dict(public))
         if not _is_news(self._known, now) and (not self.estimate or self.estimate.converged):
             return None
         self._known = now
-        data = self.graph.chains.get(self._own.robot)
-        if data is None or not len(data.keyframes):
+        chain = self.graph.view.chains.get(self._own.robot)
+        if chain is None:
             return None
-        current = Segment(*self._own, int(data.keyframes.segment[-1]))
+        current = Segment(*self._own, int(chain.keyframes.segment[-1]))
         groups = [group for group in team_frame.groups(self.graph) if current in group]
         self.group = groups[0] if groups else set()
         frame = team_frame.gauge_segment(self.group, present)
@@ -90,8 +84,7 @@ class BackEnd:
             self.estimate = None
             return None
         same = {r: p for r, p in public.items() if (p.frame, p.frame_epoch) == frame.chain}
-        group = Group(self.group, frame, {**shift_us, self._own.robot: 0})
-        return self._optimizer.job(self.graph, group, self.estimate, same)
+        return self._optimizer.job(self.graph, Group(self.group, frame), self.estimate, same)
 
     def on_solution(self, result: TeamEstimate) -> None:
         """Module 3 has answered."""

@@ -21,7 +21,12 @@ class Keyframe:
 
 @dataclass(frozen=True)
 class RangeMeasurement:
-    """One distance between two keyframes; q is the antenna in their body frames, metres."""
+    """One distance between two keyframes.
+
+    Attributes:
+        q_a, q_b: the antennas in the body frames of the keyframes, m.
+        turn_a, turn_b: how the robots stood turned against their keyframes, rad.
+    """
 
     a_n: int
     peer: Chain
@@ -30,6 +35,8 @@ class RangeMeasurement:
     q_b: tuple[float, float]
     range_m: float
     sigma_m: float
+    turn_a: float = 0.0
+    turn_b: float = 0.0
 
 
 @dataclass(frozen=True)

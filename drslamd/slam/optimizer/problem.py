@@ -10,7 +10,7 @@ that number. Errors are defined here once, so that every optimiser minimises the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -62,11 +62,38 @@ class OdometryFactors(BetweenFactors):
 
     Attributes:
         robot: (m,) the robot whose calibration applies, as the problem numbers them.
-        path: (m,) metres.
+        by_yaw: (m, 3) how `measured` moves with the constant yaw rate, per rad/m, over the way that
+            was driven; its last column is how long that is.
+        by_turn: (m, 3) likewise when turns are longer by a fraction.
     """
 
     robot: Index
-    path: Array
+    by_yaw: Array
+    by_turn: Array
+
+
+@dataclass(frozen=True)
+class CarriedEnds:
+    """Of ranges that odometry brought to other poses, whose ends move with its constants.
+
+    Attributes:
+        rows: (c,) which ranges, ascending.
+        moves: (c, 2, 2, 2) m: how q_i and q_j (second axis) move with the yaw rate (per rad/m) and
+            the scale of that robot (third axis).
+    """
+
+    rows: Index
+    moves: Array
+
+    @staticmethod
+    def none() -> CarriedEnds:
+        return CarriedEnds(np.zeros(0, dtype=np.int64), np.zeros((0, 2, 2, 2)))
+
+    def chosen(self, which: NDArray[np.bool_]) -> CarriedEnds:
+        """Those of the ranges `which` (m,)."""
+        stay = which[self.rows]
+        place = np.cumsum(which) - 1
+        return CarriedEnds(place[self.rows[stay]], self.moves[stay])
 
 
 @dataclass(frozen=True)
@@ -79,6 +106,7 @@ class RangeFactors:
         pair: (m,) the pair of robots whose bias applies, as the problem numbers them.
         robots: (m, 2) whose poses i and j are, as the problem numbers them.
         turned: (m, 2) by how much both robots stood turned against those poses, rad.
+        carried: those of them whose points move with the constants of odometry.
     """
 
     i: Index
@@ -90,13 +118,44 @@ class RangeFactors:
     pair: Index
     robots: Index
     turned: Array
+    carried: CarriedEnds = field(default_factory=CarriedEnds.none)
 
     def __len__(self) -> int:
         return len(self.i)
 
     def chosen(self, which: NDArray[np.bool_]) -> RangeFactors:
-        columns = (getattr(self, field.name) for field in fields(self))
-        return RangeFactors(*(column[which] for column in columns))
+        return RangeFactors(
+            i=self.i[which],
+            j=self.j[which],
+            q_i=self.q_i[which],
+            q_j=self.q_j[which],
+            measured=self.measured[which],
+            sigma=self.sigma[which],
+            pair=self.pair[which],
+            robots=self.robots[which],
+            turned=self.turned[which],
+            carried=self.carried.chosen(which),
+        )
+
+    @property
+    def is_carried(self) -> NDArray[np.bool_]:
+        """(m,)"""
+        out = np.zeros(len(self), dtype=bool)
+        out[self.carried.rows] = True
+        return out
+
+    def arms(self, calibration: Calibration) -> tuple[Array, Array]:
+        """From the poses to the antennas, x + iy (m,) in the frames of i and j: yaw rate and scale
+        taken out, each antenna where it really is."""
+        ends, carried = np.stack([self.q_i, self.q_j]), self.carried
+        if len(carried.rows):
+            constants = np.stack([calibration.yaw, calibration.scale], axis=-1)
+            of_end = constants[self.robots[carried.rows]]
+            moved = (of_end[..., None] * carried.moves).sum(axis=2)
+            ends[:, carried.rows] -= np.swapaxes(moved, 0, 1)
+        beside = calibration.antenna @ [1, 1j]
+        arm_i, arm_j = ends @ [1, 1j] + (beside[self.robots] * np.exp(1j * self.turned)).T
+        return arm_i, arm_j
 
 
 @dataclass(frozen=True)
@@ -229,36 +288,6 @@ class Calibration:
         )
 
 
-@dataclass(frozen=True)
-class Solution:
-    """Poses (k, 3) in the order of the problem, and how they were reached.
-
-    Attributes:
-        scatter: (pairs,) how many times the configured sigma ranges scatter.
-        joint: (3 k, 3 k) covariance of x, y, theta in w of the k poses that were asked for.
-        spread: sigmas of the calibration.
-        odometry_level: (m,) sigmas of the links of odometry over what was configured, as far as
-            it was seen; feared_level: as far as it must be feared.
-        doubted: whose mountings were let go.
-        is_explained: is the model, with these levels, one of what was measured?
-        contradicted: (pairs,) whose ranges of late do not fit.
-    """
-
-    poses: Array
-    calibration: Calibration
-    cost: float
-    iterations: int
-    converged: bool
-    scatter: Array = field(default_factory=lambda: np.zeros(0))
-    joint: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    spread: Calibration | None = None
-    odometry_level: Array = field(default_factory=lambda: np.zeros(0))
-    feared_level: Array = field(default_factory=lambda: np.zeros(0))
-    is_explained: bool = True
-    contradicted: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
-    doubted: Doubted = field(default_factory=lambda: Doubted.none(0))
-
-
 def pose_errors(poses: Array, factors: BetweenFactors, measured: Array) -> Array:
     """(m, 3) predicted minus measured relative poses, in frame i."""
     error = se2.between(poses[factors.i], poses[factors.j]) - measured
@@ -267,12 +296,14 @@ def pose_errors(poses: Array, factors: BetweenFactors, measured: Array) -> Array
 
 
 def corrected(odometry: OdometryFactors, calibration: Calibration) -> Array:
-    """(m, 3) odometry with scale and yaw rate taken out; the bend acts over half of the way."""
-    x, y, theta = odometry.measured.T
-    keep = 1 - calibration.scale[odometry.robot]
-    bend = calibration.yaw[odometry.robot] * odometry.path
-    bend -= calibration.turn[odometry.robot] * theta
-    return np.stack([keep * x + bend / 2 * y, keep * y - bend / 2 * x, theta - bend], axis=-1)
+    """(m, 3) odometry with scale, yaw rate and turn taken out."""
+    scale, yaw, turn = (
+        constant[odometry.robot, None]
+        for constant in (calibration.scale, calibration.yaw, calibration.turn)
+    )
+    out = odometry.measured - yaw * odometry.by_yaw + turn * odometry.by_turn
+    out[:, :2] -= scale * odometry.measured[:, :2]
+    return np.asarray(out)
 
 
 class RangeErrors(NamedTuple):
@@ -294,11 +325,9 @@ def range_errors(
     poses: Array, ranges: RangeFactors, calibration: Calibration, model: RangeModel
 ) -> RangeErrors:
     """Of all ranges."""
-    beside = calibration.antenna @ [1, 1j]
-    moved = beside[ranges.robots] * np.exp(1j * ranges.turned)
     arm_i, arm_j = (
-        np.exp(1j * poses[k, 2]) * (q @ [1, 1j] + moved[:, end])
-        for end, (k, q) in enumerate(((ranges.i, ranges.q_i), (ranges.j, ranges.q_j)))
+        np.exp(1j * poses[k, 2]) * arm
+        for k, arm in zip((ranges.i, ranges.j), ranges.arms(calibration), strict=True)
     )
     place = poses[:, 0] + 1j * poses[:, 1]
     sight = place[ranges.j] + arm_j - place[ranges.i] - arm_i

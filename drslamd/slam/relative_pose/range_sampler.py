@@ -66,4 +66,6 @@ class RangeSampler:
             q_b=(q_b[0], q_b[1]),
             range_m=metres,
             sigma_m=float(np.hypot(np.hypot(self._sigma_m, near), doubt)),
+            turn_a=float(se2.wrap(anchor_a.keyframe_T_body[2])),
+            turn_b=float(se2.wrap(anchor_b.keyframe_T_body[2])),
         )

@@ -162,7 +162,7 @@ def _optimise(backs: dict[int, BackEnd], progress: Callable[[float], None] | Non
         jobs = 0
         for robot, back in backs.items():
             others = {k: p for k, p in public.items() if k != robot}
-            job = back.begin(robots, dict.fromkeys(robots, 0), others)
+            job = back.begin(robots, others)
             if job is None:
                 continue
             jobs += 1

@@ -21,10 +21,11 @@ from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.banded import banded_solver
+from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.factors import Numbering
-from drslamd.slam.optimizer.problem import Calibration, Doubted, Priors, Problem, Solution
+from drslamd.slam.optimizer.problem import Calibration, Doubted, Priors, Problem
 from drslamd.slam.range_model import LINKTRACK, RangeModel
 from drslamd.slam.se2 import Array
 
@@ -91,9 +92,9 @@ def build_problem(
     graph: PoseGraph, group: Group, previous: TeamEstimate | None, numbers: BandedOptimizer
 ) -> TeamProblem:
     """Number the group's poses by time and collect its factors."""
-    places = factors.numbering(graph, group.members, group.shift_us)
+    places = factors.numbering(graph, group.members)
     robots = sorted({s.robot for s in group.members})
-    chains = [graph.chains[robot] for robot in robots]
+    chains = [graph.view.chains[robot] for robot in robots]
     ranges, pairs = factors.ranges(graph, places)
     closures = factors.closures(graph, places)
     hints = replace(closures, covariance=closures.covariance + HINT * np.eye(3))

@@ -19,7 +19,8 @@ from drslamd.slam.optimizer.banded.misfit import contradicted
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import raised
-from drslamd.slam.optimizer.problem import Calibration, Problem, Solution
+from drslamd.slam.optimizer.banded.solution import Solution
+from drslamd.slam.optimizer.problem import Calibration, Problem
 from drslamd.slam.se2 import Array
 
 

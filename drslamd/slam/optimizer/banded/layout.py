@@ -92,6 +92,12 @@ class BandLayout:
         constants = np.column_stack([self.bias[ranges.pair], near_bias, antennas])
         return np.hstack([self.poses[ranges.i], self.poses[ranges.j], constants])
 
+    def carried_unknowns(self, ranges: RangeFactors) -> Index:
+        """(c, 16) of those that odometry has carried: yaw rate and scale of both robots besides."""
+        carried = ranges.chosen(ranges.is_carried)
+        constants = np.stack([self.yaw, self.scale], axis=-1)[carried.robots].reshape(-1, 4)
+        return np.hstack([self.range_unknowns(carried), constants])
+
     def calibration(self, unknowns: Array) -> Calibration:
         """The part of a vector over all unknowns that belongs to the sensors."""
         parts = (self.bias, self.scale, self.yaw, self.near_bias, self.team_bias)

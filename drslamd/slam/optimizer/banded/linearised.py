@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
@@ -28,6 +29,9 @@ class Linearised(NamedTuple):
     information: Array
     pull: Array
 
+    def chosen(self, which: NDArray[np.bool_]) -> Linearised:
+        return Linearised(*(column[which] for column in self))
+
 
 def odometry_at(problem: Problem, point: Point) -> Linearised:
     """By both poses, scale, yaw rate and turn."""
@@ -40,15 +44,10 @@ def odometry_at(problem: Problem, point: Point) -> Linearised:
 def odometry_jacobian(problem: Problem, poses: Array) -> Array:
     """(m, 3, 9): derivative of the errors by both poses, scale, yaw rate and turn."""
     factors = problem.odometry
-    x, y, theta = factors.measured.T
     jacobian = np.zeros((len(factors), 3, 9))
     jacobian[:, :, :6] = pose_jacobian(poses, factors)
-    jacobian[:, 0, 6], jacobian[:, 1, 6] = x, y
-    jacobian[:, 0, 7] = -factors.path / 2 * y
-    jacobian[:, 1, 7] = factors.path / 2 * x
-    jacobian[:, 2, 7] = factors.path
-    jacobian[:, 0, 8], jacobian[:, 1, 8] = theta / 2 * y, -theta / 2 * x
-    jacobian[:, 2, 8] = -theta
+    jacobian[:, :2, 6] = factors.measured[:, :2]
+    jacobian[:, :, 7], jacobian[:, :, 8] = factors.by_yaw, -factors.by_turn
     return jacobian
 
 
@@ -101,6 +100,22 @@ def _range_jacobian(problem: Problem, point: Point) -> Array:
     seen = u[:, None] * np.exp(-1j * heading) * [-1, 1]
     jacobian[:, 0, 8::2], jacobian[:, 0, 9::2] = seen.real, seen.imag
     return jacobian
+
+
+def carried_part(problem: Problem, point: Point, ranges: Linearised) -> Linearised:
+    """Ranges that odometry has carried depend on its yaw rate and scale at both ends as well.
+
+    Args:
+        ranges: all of them, as if none was carried.
+    """
+    factors = problem.ranges.carried
+    plain = ranges.chosen(problem.ranges.is_carried)
+    ends = np.stack([problem.ranges.i, problem.ranges.j], axis=-1)[factors.rows]
+    sight = point.sight.direction[factors.rows, None]
+    seen = sight * np.exp(-1j * point.poses[ends, 2]) * [1, -1]
+    by = factors.moves[..., 0] * seen.real[..., None] + factors.moves[..., 1] * seen.imag[..., None]
+    jacobian = np.concatenate([plain.jacobian, by.reshape(-1, 1, 4)], axis=2)
+    return plain._replace(jacobian=jacobian)
 
 
 def pose_jacobian(poses: Array, factors: BetweenFactors) -> Array:

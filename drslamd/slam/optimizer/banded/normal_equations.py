@@ -104,15 +104,32 @@ class _Where:
     odometry: _Assembly
     closures: _Assembly
     ranges: _Assembly
+    carried: _Assembly
 
     @staticmethod
     def of(problem: Problem, layout: BandLayout) -> _Where:
+        ranges = problem.ranges
         ends = layout.poses[np.stack([problem.closures.i, problem.closures.j], axis=-1)]
         return _Where(
             _Assembly(layout, layout.odometry_unknowns(problem.odometry)),
             _Assembly(layout, ends.reshape(-1, 6)),
-            _Assembly(layout, layout.range_unknowns(problem.ranges)),
+            _Assembly(layout, layout.range_unknowns(ranges.chosen(~ranges.is_carried))),
+            _Assembly(layout, layout.carried_unknowns(ranges)),
         )
+
+    def of_ranges(
+        self, problem: Problem, point: Point, ranges: Linearised
+    ) -> Iterator[tuple[_Assembly, Linearised]]:
+        """Ranges as they were measured, and those that odometry has carried.
+
+        Args:
+            ranges: all of them, as if none was carried.
+        """
+        if not len(problem.ranges.carried.rows):
+            yield self.ranges, ranges
+            return
+        yield self.ranges, ranges.chosen(~problem.ranges.is_carried)
+        yield self.carried, linearised.carried_part(problem, point, ranges)
 
 
 class Equations:
@@ -210,7 +227,8 @@ class Equations:
         if len(problem.closures):
             self._where.closures.add_matrix(system, linearised.closures_at(problem, point.poses))
         ranges = linearised.weighed_ranges(problem, point, claims)
-        self._where.ranges.add_matrix(system, ranges)
+        for where, factors in self._where.of_ranges(problem, point, ranges):
+            where.add_matrix(system, factors)
         self._add_gaussian_priors(system)
         return system
 
@@ -219,7 +237,8 @@ class Equations:
         yield self._where.odometry, linearised.odometry_at(problem, point)
         if len(problem.closures):
             yield self._where.closures, linearised.closures_at(problem, point.poses)
-        yield self._where.ranges, linearised.ranges_at(problem, point, least)
+        ranges = linearised.ranges_at(problem, point, least)
+        yield from self._where.of_ranges(problem, point, ranges)
 
     def _add_heavy_priors(self, system: System, calibration: Calibration, least: float) -> None:
         layout, priors = self.layout, self.problem.priors

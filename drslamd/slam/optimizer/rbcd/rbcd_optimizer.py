@@ -15,11 +15,11 @@ import numpy as np
 
 from drslamd.conventions import Chain
 from drslamd.slam import se2
-from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.estimate import Lifted, TeamEstimate, Trajectory
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
+from drslamd.slam.graph.thinning.chain_view import ChainView
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.factors import between_factors, chain_links
@@ -78,7 +78,7 @@ class RbcdOptimizer:
         public: Mapping[int, PublicPoses],
     ) -> Job | None:
         """See `Optimizer.job`."""
-        data = graph.chains[self._own.robot]
+        data = graph.view.chains[self._own.robot]
         used = _in_group(data, group)
         fitting = {k: p for k, p in sorted(public.items()) if p.rank == self._rank}
         around = lifted_neighbours(graph, data, used, fitting, self._rank)
@@ -91,7 +91,7 @@ class RbcdOptimizer:
 
     def _start(
         self,
-        data: ChainData,
+        data: ChainView,
         used: Array,
         group: Group,
         previous: TeamEstimate | None,
@@ -122,13 +122,13 @@ class RbcdOptimizer:
         return riemannian_descent.moved(rows[nearest], se2.between(poses[at][nearest], poses))
 
 
-def _in_group(data: ChainData, group: Group) -> Array:
+def _in_group(data: ChainView, group: Group) -> Array:
     """Which of our rows lie in segments of the group."""
     segments = [s.segment for s in group.members if s.chain == data.chain]
     return np.flatnonzero(np.isin(data.keyframes.segment, segments))
 
 
-def _links(data: ChainData, used: Array) -> BetweenFactors:
+def _links(data: ChainView, used: Array) -> BetweenFactors:
     """Our odometry between the rows `used`, numbered as they are."""
     links = chain_links(data, calibrated=False)
     place = np.full(len(data.keyframes), -1)
@@ -153,7 +153,7 @@ def _on_sphere(rows: Array) -> Array:
 
 def lifted_neighbours(
     graph: PoseGraph,
-    data: ChainData,
+    data: ChainView,
     used: Array,
     public: Mapping[int, PublicPoses],
     rank: int,
@@ -172,7 +172,7 @@ def lifted_neighbours(
     rows: list[Array] = []
     carriers: set[int] = set()
     number = {int(n): k for k, n in enumerate(data.keyframes.n[used])}
-    for pair in graph.usable():
+    for pair in graph.view.pairs:
         if own not in (pair.a, pair.b):
             continue
         outward = pair.a == own
