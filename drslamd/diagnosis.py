@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol
 
-from drslamd import mounting_advice
+from drslamd import contradictions
 from drslamd.config import Config
 from drslamd.conventions import SECOND_US
 from drslamd.events import NetworkState, PortCondition, PortState
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.team import Team
 from drslamd.jobs import OPTIMIZER, RELATIVE_POSE, DutyCycle, Jobs
+from drslamd.memory import Memory
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.wheels.wheel_input import WheelInput
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.consistency.pair import PairTracker
+from drslamd.slam.doubt import doubted_partners
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.relative_pose.estimate import Verdict
@@ -46,7 +48,7 @@ class Stages(Protocol):
     outbox: Outbox
     ports: dict[str, PortState]
     network: NetworkState | None
-    save_fault: str
+    memory: Memory
     jobs: Jobs
 
     def neighbours(self, utime: int) -> list[PeerInRange]: ...
@@ -62,6 +64,9 @@ def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
     yield "network", None if network is None or network.up else network.detail
     yield from robot.team.conditions(utime)
     yield "pose", why_not_localised(robot, utime)
+    doubt = robot.whereabouts(utime).doubt
+    yield "doubt", contradictions.doubt(doubt)
+    yield "partners", contradictions.partners(_doubted_partners(robot) if not doubt else ())
     yield "mounting", _mountings(robot)
     yield "load", _load(robot, utime)
     yield "budget", robot.outbox.condition(utime)
@@ -95,13 +100,18 @@ def _load(robot: Stages, utime: int) -> str | None:
     return f"{', '.join(late)}, to leave time for the sensors; the team is large for this computer"
 
 
+def _doubted_partners(robot: Stages) -> Iterable[int]:
+    front = robot.front
+    return doubted_partners(front.own.robot, robot.back.estimate, front.watch.doubted)
+
+
 def _mountings(robot: Stages) -> str | None:
     """What was found wrong with the wheels of whom, and whose windows nothing explains."""
     own, pairs = robot.front.own.robot, robot.front.pairs
     said = [
         sentence
         for peer, pair in pairs.items()
-        if (sentence := mounting_advice.advice(own, peer, pair.search, _is_odd(pairs, peer)))
+        if (sentence := contradictions.mounting(own, peer, pair.search, _is_odd(pairs, peer)))
     ]
     return "; ".join(said) or None
 
@@ -113,11 +123,11 @@ def _is_odd(pairs: dict[int, PairTracker], peer: int) -> bool:
 
 
 def _state(robot: Stages) -> str | None:
-    if not robot.save_fault:
+    if not robot.memory.fault:
         return None
     return (
-        f"{robot.save_fault}: the next start will not know what this one learned, nor its number; "
-        "make room, make the folder writable, or name another in daemon.state_dir"
+        f"{robot.memory.fault}: the next start will not know what this one learned, nor its "
+        "number; make room, make the folder writable, or name another in daemon.state_dir"
     )
 
 

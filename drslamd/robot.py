@@ -41,18 +41,19 @@ from drslamd.events import (
     Write,
 )
 from drslamd.gossip.bounds import is_sayable
-from drslamd.gossip.epochs import kept_epochs
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
 from drslamd.health import Health
 from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, WHAT_IF, Job, Jobs
+from drslamd.memory import Memory
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.samples import Motion
 from drslamd.sensors.wheels.wheel_input import WheelInput
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.calibration.calibration_store import CalibrationStore
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
+from drslamd.slam.doubt import doubt_of, doubted_partners
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.graph.estimate import PoseNow
 from drslamd.slam.graph.measurements import GraphEntry
@@ -110,11 +111,10 @@ class Robot:
         self.health = Health()
         self.ports: dict[str, PortState] = {}
         self.network: NetworkState | None = None
-        self.save_fault = ""
         """Why nothing is kept over a restart; empty while it is."""
         self.jobs = Jobs()
         self.timers = Timers(self._periods())
-        self._saved_epochs = dict(epochs)
+        self.memory = Memory(self.own, self.team.seal, self.calibration)
         self._handlers: dict[type[Any], Callable[[Any], list[Effect]]] = {
             SerialData: self._on_serial,
             CanFrame: self._on_can,
@@ -202,8 +202,9 @@ class Robot:
     def _send_status(self, utime: int) -> list[Effect]:
         clock, where = self.uwb.system_offset_us(utime), self.whereabouts(utime)
         status = self.broadcast.heartbeat(self.neighbours(utime), clock, where.state, utime)
-        # solutions come with news; that a pose grew old is said without any
-        return [*status, *(self.broadcast.pose(where, utime) if where.is_old else [])]
+        # solutions come with news; that a pose grew old or doubtful is said without any
+        is_odd = where.is_old or where.doubt
+        return [*status, *(self.broadcast.pose(where, utime) if is_odd else [])]
 
     def _send_odometry(self, utime: int) -> list[Effect]:
         return self.broadcast.odometry(self.neighbours(utime), utime)
@@ -219,8 +220,9 @@ class Robot:
     def _extend_log(self, utime: int) -> list[Effect]:
         """One entry of our log: where our wheels went, what we ranged, what module 2 kept."""
         neighbours = self.neighbours(utime)
-        keyframe = self.front.make_keyframe()
-        ranges = self.front.sample_ranges(neighbours, self.back.graph, utime)
+        is_own_doubted, is_any_doubted = self._is_doubted()
+        keyframe = self.front.make_keyframe(is_own_doubted)
+        ranges = self.front.sample_ranges(neighbours, self.back.graph, utime, is_any_doubted)
         closures = self.front.tell_closures()
         if not (keyframe or ranges or closures):
             return []
@@ -234,6 +236,12 @@ class Robot:
             if neighbours:
                 sends.append(self.team.send_sealed(self.own.robot, sealed))
         return sends
+
+    def _is_doubted(self) -> tuple[bool, bool]:
+        """Does odometry of ours, or of anybody, say less than what was ranged?"""
+        estimate, off = self.back.estimate, self.front.watch.doubted
+        own = doubt_of(self.own.robot, estimate, self.front.watch.looked_at, off) is not None
+        return own, own or bool(doubted_partners(self.own.robot, estimate, off))
 
     # ---- the three modules ----
 
@@ -275,8 +283,7 @@ class Robot:
     def _on_job(self, event: JobDone) -> list[Effect]:
         job = self.jobs.finish(event)
         if job.module == WHAT_IF and job.pair is not None and job.request is not None:
-            measured = len(job.request.window)
-            job.pair.search.on_costs(job.request.utime, event.result, measured)
+            job.pair.on_costs(job.request, event.result)
             return []
         if job.pair is not None and job.request is not None:
             job.pair.on_estimate(job.request, event.result)
@@ -305,21 +312,23 @@ class Robot:
     def whereabouts(self, utime: int) -> Whereabouts:
         """What that pose is worth now."""
         most_mps = self.config.wheels.max_speed_mps
-        return whereabouts(self.pose(), self.front.reckoning.track, most_mps, utime)
+        track, watch = self.front.reckoning.track, self.front.watch
+        doubt = doubt_of(self.own.robot, self.back.estimate, watch.looked_at, watch.doubted)
+        return whereabouts(self.pose(), track, most_mps, doubt, utime)
 
     def _check_health(self, utime: int) -> list[Effect]:
         self.team.forget_silent(utime)
+        estimate, graph = self.back.estimate, self.back.graph
+        self.front.watch_ranges(self.neighbours(utime), graph, estimate, utime)
         notes: list[Effect] = []
         for key, sentence in diagnosis.conditions(self, utime):
             notes += self.health.set(key, sentence, utime)
-        return [*notes, *self._restart_if_superseded(utime)]
-
-    def _restart_if_superseded(self, utime: int) -> list[Effect]:
-        """Peers know a later start of ours: our own memory was lost, or a lie is believed."""
         above = self.team.superseded_by
         if above is None or self.team.is_own_id_used(utime):
-            return []
-        return [Restart(above, "peers know a later start of this robot and refuse this one")]
+            return notes
+        # our own memory was lost, or a lie is believed
+        why = "peers know a later start of this robot and refuse this one"
+        return [*notes, Restart(above, why)]
 
     # ---- time passes, and ends ----
 
@@ -327,24 +336,15 @@ class Robot:
         due = self.timers.take_due(event.utime)
         return [effect for action in due for effect in action(event.utime)]
 
-    def state(self) -> dict[str, Any]:
-        """What must outlive this start."""
-        state = {"epoch": self.own.epoch, "epochs": kept_epochs(self.team.seal.epochs)}
-        return {**state, "calibration": self.calibration.latest.state()}
-
     def _save(self, utime: int) -> list[Effect]:
-        if self.team.seal.epochs == self._saved_epochs and not self.calibration.is_news():
-            return []
-        self.calibration.on_saved()
-        self._saved_epochs = dict(self.team.seal.epochs)
-        return [Save(self.state())]
+        return list(self.memory.save())
 
     def _on_saved(self, event: SaveDone) -> list[Effect]:
-        self.save_fault = event.fault
+        self.memory.fault = event.fault
         return []
 
     def _on_stop(self, event: Stop) -> list[Effect]:
         state = self.whereabouts(event.utime).state
         goodbye = self.broadcast.make_status([], None, state, event.utime, leaving=True)
         sends = [self.team.send(goodbye, event.utime) for _ in range(GOODBYES)]
-        return [*sends, Save(self.state())]
+        return [*sends, Save(self.memory.state())]

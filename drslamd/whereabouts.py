@@ -15,6 +15,7 @@ import numpy as np
 
 from drslamd.conventions import GRID_HZ, GRID_US, SECOND_US
 from drslamd.gossip.message_types import PoseState
+from drslamd.slam.doubt import Doubt
 from drslamd.slam.graph.estimate import PoseNow
 from drslamd.slam.odometry.track import RESOLUTION, Track
 
@@ -39,11 +40,13 @@ class Whereabouts:
         pose: the last one while it is valid; then the same as the pose of now, with what may have
             been driven since in its covariance. None when it is not localised.
         age_us: of the odometry that it rests on.
+        doubt: what speaks against it.
     """
 
     state: PoseState
     pose: PoseNow | None = None
     age_us: int = 0
+    doubt: Doubt | None = None
 
     @property
     def is_old(self) -> bool:
@@ -53,19 +56,23 @@ class Whereabouts:
 NOWHERE = Whereabouts(PoseState.NOT_LOCALISED)
 
 
-def whereabouts(found: PoseNow | None, track: Track, most_mps: float, utime: int) -> Whereabouts:
+def whereabouts(
+    found: PoseNow | None, track: Track, most_mps: float, doubt: Doubt | None, utime: int
+) -> Whereabouts:
     """What to say of a robot at `utime`.
 
     Args:
         found: its last pose.
         track: its odometry.
         most_mps: what its wheels can do.
+        doubt: what speaks against that pose.
     """
     if found is None:
         return NOWHERE
     age_us = utime - found.utime
     if age_us <= VALID_US:
-        return Whereabouts(PoseState.LOCALISED, found, age_us)
+        state = PoseState.DOUBTFUL if doubt else PoseState.LOCALISED
+        return Whereabouts(state, found, age_us, doubt)
     if age_us > LOST_US:
         return NOWHERE
     speed, turning = likely_speeds(track, most_mps)

@@ -174,8 +174,8 @@ def test_that_nothing_can_be_kept_is_said_until_it_can(
         assert "cannot write" in sentence
         assert "name another in daemon.state_dir" in sentence
         read_only.with_suffix(".new").rmdir()
-        daemon._perform(Save(daemon.robot.state()))
-        await until(lambda: not daemon.robot.save_fault)
+        daemon._perform(Save(daemon.robot.memory.state()))
+        await until(lambda: not daemon.robot.memory.fault)
         clock.utime += 2 * SECOND_US
         daemon.handle(Tick(clock.utime))
         assert not [p for p in daemon._picture()["problems"] if str(read_only) in p]

@@ -22,6 +22,7 @@ from drslamd.slam.odometry.dead_reckoning import DeadReckoning
 from drslamd.slam.odometry.track import RESOLUTION
 from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.range_model import RangeNoise
+from drslamd.slam.range_watch import Partner, RangeWatch
 from drslamd.slam.relative_pose import what_if
 from drslamd.slam.relative_pose.estimate import PairNoise, RelativePoseEstimate
 from drslamd.slam.relative_pose.pair_end import PairEnd
@@ -93,6 +94,7 @@ class FrontEnd:
         self.reckoning = DeadReckoning()
         self.ranges: dict[int, RangeBuffer] = {}
         self.pairs: dict[int, PairTracker] = {}
+        self.watch = RangeWatch(section.range_sigma_m, tuning.ranges)
         self._segment = 0
         self._segment_start: int | None = None
         self._last: Keyframe | None = None
@@ -124,8 +126,12 @@ class FrontEnd:
 
     # ---- keyframes ----
 
-    def make_keyframe(self) -> Keyframe | None:
-        """The latest sample of our odometry, if we moved since the last keyframe."""
+    def make_keyframe(self, is_doubted: bool = False) -> Keyframe | None:
+        """The latest sample of our odometry, if we moved since the last keyframe.
+
+        Args:
+            is_doubted: who may move though its wheels say nothing has a place of its own each time.
+        """
         track = self.reckoning.track
         if not len(track):
             return None
@@ -138,12 +144,32 @@ class FrontEnd:
         if self._last is not None:
             last = self._last
             moved = np.array([x - last.x, y - last.y, theta - last.theta]) * RESOLUTION
-            if np.hypot(moved[0], moved[1]) < KEYFRAME_M and abs(moved[2]) < KEYFRAME_RAD:
+            is_still = np.hypot(moved[0], moved[1]) < KEYFRAME_M and abs(moved[2]) < KEYFRAME_RAD
+            if is_still and (n == last.n or not is_doubted):
                 return None
         self._last = Keyframe(n, self._segment, x, y, theta)
         return self._last
 
     # ---- pairs ----
+
+    def watch_ranges(
+        self,
+        neighbours: list[PeerInRange],
+        graph: PoseGraph,
+        estimate: TeamEstimate | None,
+        utime: int,
+    ) -> None:
+        """Hold the ranges of this second against where everybody should be."""
+        own = graph.chains.get(self.own.robot)
+        partners: dict[int, Partner] = {}
+        for peer in neighbours if own is not None else ():
+            ranges, data = self.ranges.get(peer.uwb_id), graph.chains.get(peer.chain.robot)
+            is_fresh = ranges is not None and ranges.is_fresh(utime, RANGES_FRESH_US)
+            if is_fresh and data is not None and peer.ahead_us is not None:
+                assert ranges is not None
+                partners[peer.chain.robot] = Partner(data, peer.ahead_us, ranges)
+        if own is not None:
+            self.watch.look(estimate, PairEnd(self.reckoning.track, own), partners, utime)
 
     def _owns(self, peer: PeerInRange) -> bool:
         """Are we the one of the two that makes closures?"""
@@ -287,12 +313,20 @@ class FrontEnd:
     # ---- what goes into our log ----
 
     def sample_ranges(
-        self, neighbours: list[PeerInRange], graph: PoseGraph, utime: int
+        self,
+        neighbours: list[PeerInRange],
+        graph: PoseGraph,
+        utime: int,
+        is_doubted: bool = False,
     ) -> list[RangeMeasurement]:
-        """New distances for the graph."""
+        """New distances for the graph.
+
+        Args:
+            is_doubted: see `make_keyframe`; of who makes them or of any other.
+        """
         self.update_pairs(neighbours, graph, utime)
         found = [
-            pair.sampler.sample(pair.ranges, a, b, pair.peer)
+            pair.sampler.sample(pair.ranges, a, b, pair.peer, is_doubted)
             for pair, a, b in self._measurable(neighbours, graph, utime)
         ]
         return [measurement for measurement in found if measurement is not None]

@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from drslamd.conventions import GRID_US, SECOND_US
+from drslamd.conventions import GRID_US
 from drslamd.slam import se2
+from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
 from drslamd.slam.pose_now import noise_of_way
 from drslamd.slam.range_model import RangeModel
@@ -24,10 +25,24 @@ FAR_SIGMAS = 4.0
 """Beyond them a range does not fit."""
 IN_A_ROW = 2
 """So many seconds of them are doubt; a burst is shorter."""
+LEAST_M = 1e-3
+"""Antennas that touch have no direction."""
 MOST_BIAS_M = 1.0
 """Of which nothing is known yet."""
 AT_ONCE = 5
 """Tenths of a second whose median is looked at."""
+
+
+LATE_US = 2_500_000
+"""A peer says where its wheels went every second; one that says nothing for so long stands."""
+
+
+class Partner(NamedTuple):
+    """A robot in range: what its log says, its clock minus ours, us, and the ranges to it."""
+
+    data: ChainData
+    ahead_us: int
+    ranges: RangeBuffer
 
 
 class _End(NamedTuple):
@@ -73,67 +88,100 @@ class RangeWatch:
         self,
         estimate: TeamEstimate | None,
         own: PairEnd,
-        peers: dict[int, tuple[PairEnd, RangeBuffer]],
+        partners: dict[int, Partner],
         utime: int,
     ) -> None:
-        """Once a second.
-
-        Args:
-            own, peers: odometry of both ends, and the ranges between them.
-        """
+        """Once a second."""
         found: dict[int, int] = {}
-        for peer, (end, ranges) in peers.items():
-            if estimate is None:
-                continue
-            sigmas = self._sigmas_off(estimate, own, end, ranges, utime)
+        for robot, partner in partners.items() if estimate is not None else ():
+            assert estimate is not None
+            sigmas = self._sigmas_off(estimate, own, partner, utime)
             if sigmas is not None:
-                found[peer] = self.off.get(peer, 0) + 1 if sigmas > FAR_SIGMAS else 0
+                found[robot] = self.off.get(robot, 0) + 1 if sigmas > FAR_SIGMAS else 0
         self.off = found
 
     def _sigmas_off(
-        self, estimate: TeamEstimate, own: PairEnd, peer: PairEnd, ranges: RangeBuffer, utime: int
+        self, estimate: TeamEstimate, own: PairEnd, partner: Partner, utime: int
     ) -> float | None:
         """How many sigmas the newest ranges are off; None where nothing can be said."""
-        last = min(own.last_us, peer.last_us)
-        found = ranges.between(last - AT_ONCE * GRID_US, last).in_sight(self._model)
-        if not len(found.utime) or last < utime - 3 * SECOND_US:
+        at = _newest(own, partner, utime)
+        if at is None:
             return None
-        middle = int(np.argsort(found.range_m)[len(found.range_m) // 2])
-        at = float(found.utime[middle])
-        a, b = (_antenna(estimate, end, at) for end in (own, peer))
-        pair = (own.data.chain.robot, peer.data.chain.robot)
+        n, when = at
+        near = AT_ONCE * GRID_US
+        found = partner.ranges.between(when - near, when + near).in_sight(self._model)
+        a = _antenna(estimate, own.data, _own_way(estimate, own, when))
+        b = _antenna(estimate, partner.data, _way(estimate, partner.data, n))
+        if not len(found.utime) or a is None or b is None:
+            return None
+        pair = (own.data.chain.robot, partner.data.chain.robot)
         joint = estimate.joint_of(*pair)
-        if a is None or b is None or joint is None:
+        if joint is None:
             return None
-        sight = b.place - a.place
-        distance = max(float(np.hypot(*sight)), 1e-3)
-        u = sight / distance
-        measured = float(level(found.range_m[middle : middle + 1], own, peer)[0])
-        bias = estimate.bias_m.get((min(pair), max(pair)), Learned())
-        near = estimate.near_bias_m.value * float(self._model.near_range_shape(np.array(measured)))
+        models = own.data.model, partner.data.model
+        measured = float(np.median(level(found.range_m, *models)))
+        u = b.place - a.place
+        distance = max(float(np.hypot(*u)), LEAST_M)
+        u = u / distance
         by_pose = np.concatenate([-u @ a.by_pose, u @ b.by_pose])
+        bias = estimate.bias_m.get((min(pair), max(pair)), Learned())
+        strong = estimate.near_bias_m.value * float(
+            self._model.near_range_shape(np.array(measured))
+        )
         variance = by_pose @ joint @ by_pose + u @ (a.added + b.added) @ u
-        near_sigma = float(self._model.near_range_sigma(measured))
-        variance += self._sigma_m**2 + near_sigma**2 + min(bias.sigma, MOST_BIAS_M) ** 2
-        return abs(distance + bias.value + near - measured) / float(np.sqrt(variance))
+        variance += self._sigma_m**2 + float(self._model.near_range_sigma(measured)) ** 2
+        variance += min(bias.sigma, MOST_BIAS_M) ** 2
+        return abs(distance + bias.value + strong - measured) / float(np.sqrt(variance))
 
 
-def _antenna(estimate: TeamEstimate, end: PairEnd, utime: float) -> _End | None:
-    """Where it is at `utime` of our clock."""
-    robot = end.data.chain.robot
-    solved = estimate.trajectories.get(robot)
-    if solved is None or solved.chain != end.data.chain or not len(solved.n):
+def _newest(own: PairEnd, partner: Partner, utime: int) -> tuple[int, int] | None:
+    """The latest keyframe of a partner, and the time of our clock at which it was there."""
+    keyframes = partner.data.keyframes
+    if not len(keyframes) or not len(own.track):
         return None
-    last, now = int(solved.n[-1]), int(end.grid(utime)[0])
-    if now < last or not end.track.covers(last, now):
+    n = int(keyframes.n[-1])
+    said_at = n * GRID_US - partner.ahead_us
+    stands = utime - said_at > LATE_US
+    when = own.last_us if stands else said_at
+    return (n, when) if own.first_us <= when <= own.last_us else None
+
+
+def _way(estimate: TeamEstimate, data: ChainData, n: int) -> Array | None:
+    """(k, 3) odometry from the last solved keyframe of a robot to its keyframe n."""
+    solved = estimate.trajectories.get(data.chain.robot)
+    if solved is None or solved.chain != data.chain or not len(solved.n):
         return None
-    way = end.track.poses[last - end.track.n0 : now - end.track.n0 + 1]
+    keyframes = data.keyframes
+    (first, last), there = keyframes.find(np.array([float(solved.n[-1]), float(n)]))
+    is_whole = there.all() and first <= last and keyframes.segment[first] == keyframes.segment[last]
+    return keyframes.poses[first : last + 1] if is_whole else None
+
+
+def _own_way(estimate: TeamEstimate, own: PairEnd, utime: int) -> Array | None:
+    """(k, 3) odometry from our last solved keyframe to `utime`."""
+    solved = estimate.trajectories.get(own.data.chain.robot)
+    if solved is None or solved.chain != own.data.chain or not len(solved.n):
+        return None
+    last, now, track = int(solved.n[-1]), int(own.grid(utime)[0]), own.track
+    if now < last:
+        # solved already: back along the way, of which the noise is as large
+        last, now = now, last
+        way = track.poses[last - track.n0 : now - track.n0 + 1] if track.covers(last, now) else None
+        return None if way is None else way[::-1]
+    return track.poses[last - track.n0 : now - track.n0 + 1] if track.covers(last, now) else None
+
+
+def _antenna(estimate: TeamEstimate, data: ChainData, way: Array | None) -> _End | None:
+    """Where the antenna of a robot is at the end of a way from its last solved keyframe."""
+    if way is None:
+        return None
+    robot = data.chain.robot
+    start = estimate.trajectories[robot].poses[-1]
     step = se2.between(way[:1], estimate.correction(robot).path(way))
-    start = solved.poses[-1]
     x, y = estimate.antenna_m.get(robot, (Learned(), Learned()))
-    q = end.data.model.antenna + [x.value, y.value]
-    arm = se2.rotate(start[2], se2.transform(step[-1:], q)[0])
+    arm = se2.transform(step[-1], data.model.antenna + [x.value, y.value])
+    arm = se2.rotate(start[2], arm)
     by_pose = np.array([[1.0, 0.0, -arm[1]], [0.0, 1.0, arm[0]]])
     level_now = estimate.odometry_level.get(robot, 1.0)
-    added = noise_of_way(float(start[2]), step, end.data.model.noise, level_now)
+    added = noise_of_way(float(start[2]), step, data.model.noise, level_now)
     return _End(start[:2] + arm, by_pose, added[:2, :2])

@@ -113,7 +113,7 @@ def battered(team: VirtualTeam, folder: Path, later_s: float) -> None:
     team.run(now + 2 * later_s + 4)
     assert is_well(team)
     assert team.member(0).robot.own.epoch == epoch
-    assert all(is_sound(json.loads(json.dumps(m.robot.state()))) for m in members(team))
+    assert all(is_sound(json.loads(json.dumps(m.robot.memory.state()))) for m in members(team))
 
 
 def members(team: VirtualTeam) -> list[Any]:

@@ -263,7 +263,7 @@ def test_a_later_start_goes_on_with_what_was_kept() -> None:
     off = RobotScene(kept=kept, extra="[relative_pose]\nself_calibration = false\n")
     off.drive(1, metres=0.1)
     assert off.robot.front.reckoning.path_m == pytest.approx(10 * 0.1, rel=0.01)
-    assert off.robot.state()["calibration"] == kept.state()
+    assert off.robot.memory.state()["calibration"] == kept.state()
 
 
 def restarts(effects: list[Effect]) -> list[int]:

@@ -19,10 +19,9 @@ from drslamd.slam.consistency.pcm import Candidate, PairConsistency
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import ClosureMeasurement
 from drslamd.slam.odometry.correction import Correction
-from drslamd.slam.odometry.mounting import LEARNED, Fault
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.relative_pose.estimate import RelativePoseEstimate
-from drslamd.slam.relative_pose.mounting_search import MountingSearch
+from drslamd.slam.relative_pose.mounting_search import MountingSearch, is_learned
 from drslamd.slam.relative_pose.pair_end import at_keyframes
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 from drslamd.slam.relative_pose.range_sampler import RangeSampler
@@ -150,9 +149,11 @@ class PairTracker:
     def is_refused(self) -> bool:
         """Is a robot of the pair wired so that nothing of the pair can be believed?"""
         found = self.search.found
-        return found is not None and any(
-            repair.fault not in (Fault.NONE, *LEARNED) for repair in found
-        )
+        return found is not None and not is_learned(found)
+
+    def on_costs(self, request: WindowRequest, costs: Array) -> None:
+        """A search for mistakes has answered."""
+        self.search.on_costs(costs, len(request.window), has_agreed=self.connected)
 
     # ---- module 2 ----
 

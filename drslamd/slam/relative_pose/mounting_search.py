@@ -1,7 +1,9 @@
 """Windows of a pair that disagree again and again: which mistake explains them all?
 
-Three windows that hardly share data are asked `what_if`; the sums of their chi-squared decide. Only
-a clear winner that fits is named. Where there is none only the robots that may be at fault are.
+Several windows are asked `what_if`; the sums of their chi-squared decide. Only a clear winner that
+fits is named. Track and scale look much alike in a window: where one of them wins and it is not
+clear which, nothing is named, and module 3 begins at the best of them. A pair that has agreed had
+the right track and scale, so whatever happens to it later is something else.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from drslamd.conventions import SECOND_US
+from drslamd.slam.odometry.mounting import LEARNED, Fault
 from drslamd.slam.relative_pose.estimate import Verdict
 from drslamd.slam.relative_pose.range_fit import POOR_FIT
 from drslamd.slam.relative_pose.what_if import CASES, Case
@@ -19,23 +22,28 @@ from drslamd.slam.se2 import Array
 
 RECENT = 10
 """Windows that are remembered."""
-MANY = 7
+MANY = 4
 """So many of them must disagree, or the pair counts as one that agrees."""
-FEW = 3
-"""Only so many of them may, or what was found stays."""
+MOST = 7
+"""Where so many do, no new closure is believed."""
 APART_US = 8 * SECOND_US
-"""Between two windows that are asked."""
-ASKED = 3
+"""Between two windows that are asked; a window is up to a minute long."""
+FEWEST_ASKED = 3
 """Windows that decide."""
-CLEAR = 100.0
-"""How many times the best chi-squared per degree of freedom the next kind must be worse: at 0.5 m/s
-this names three of four faults after a minute, and none wrongly."""
+MOST_ASKED = 8
+"""Windows that are asked at the same time, at most."""
+WRONG = 100.0
+"""By how much the chi-squared of three windows must fall, over that of a degree of freedom, for the
+configuration to be wrong."""
+CLEAR = 50.0
+"""By how much the next kind must be worse. Of fifteen robots whose wheels run backwards all are
+named after 48 s (median); of as many healthy ones, and twelve with counters that freeze or wheels
+that spin, none."""
 
 _SAID = (Verdict.UNIQUE, Verdict.AMBIGUOUS, Verdict.POOR_FIT)
 
 
 class _Answer(NamedTuple):
-    utime: int
     costs: Array
     freedom: int
 
@@ -44,13 +52,15 @@ class MountingSearch:
     """Of one pair.
 
     Attributes:
-        found: the clear winner of late; None while there is none.
+        found: what explains the windows of late; None while nothing does.
+        is_clear: is it that and nothing else?
     """
 
     def __init__(self) -> None:
         self.found: Case | None = None
+        self.is_clear = False
         self._fits: deque[bool] = deque(maxlen=RECENT)
-        self._answers: deque[_Answer] = deque(maxlen=ASKED)
+        self._answers: deque[_Answer] = deque(maxlen=MOST_ASKED)
         self._asked_at: int | None = None
 
     def on_verdict(self, verdict: Verdict) -> None:
@@ -66,39 +76,69 @@ class MountingSearch:
     @property
     def is_puzzled(self) -> bool:
         """Do they, and no mistake explains it?"""
-        return self.disagrees and self.found is None and len(self._answers) == ASKED
+        asked = len(self._answers)
+        return self.poor >= MOST and self.found is None and asked >= FEWEST_ASKED
 
     @property
     def disagrees(self) -> bool:
         """Do ranges and odometries of the pair contradict each other again and again?"""
-        return self.poor >= MANY
+        return self.poor >= MOST
 
     def is_due(self, utime: int) -> bool:
         """Is it time to ask?"""
         is_late = self._asked_at is None or utime - self._asked_at >= APART_US
-        return self.disagrees and self.found is None and is_late
+        return self.poor >= MANY and self.found is None and is_late
 
     def begin(self, utime: int) -> None:
         """A window is asked now."""
         self._asked_at = utime
 
-    def on_costs(self, utime: int, costs: Array, measurements: int) -> None:
-        """`what_if.Question.costs` of a window at `utime` are known."""
-        self._answers.append(_Answer(utime, costs, measurements - 3))
-        self.found = self._winner()
-        if self.found is not None:
-            # windows with the repair speak for themselves
-            self._fits.clear()
-            self._answers.clear()
+    def on_costs(self, costs: Array, measurements: int, has_agreed: bool) -> None:
+        """`what_if.Question.costs` of a window are known.
 
-    def _winner(self) -> Case | None:
-        if len(self._answers) < ASKED:
-            return None
-        total = np.sum([answer.costs for answer in self._answers], axis=0)
-        freedom = sum(answer.freedom for answer in self._answers)
-        best = int(np.argmin(total))
-        others = [total[k] for k, case in enumerate(CASES) if case.kind != CASES[best].kind]
-        level = total[best] / freedom
-        if not best or level > POOR_FIT or (min(others) - total[best]) < CLEAR * max(level, 1.0):
-            return None
-        return CASES[best]
+        Args:
+            has_agreed: did the windows of this pair agree with each other before?
+        """
+        self._answers.append(_Answer(costs, measurements - 3))
+        if len(self._answers) < FEWEST_ASKED:
+            return
+        total = np.mean([answer.costs for answer in self._answers], axis=0) * FEWEST_ASKED
+        freedom = FEWEST_ASKED * float(np.mean([answer.freedom for answer in self._answers]))
+        case, is_clear = winner(total, freedom)
+        if case is None or (has_agreed and is_learned(case)):
+            return
+        self.found, self.is_clear = case, is_clear
+        # windows with the repair speak for themselves
+        self._fits.clear()
+        self._answers.clear()
+
+
+def winner(chi2: Array, freedom: float) -> tuple[Case | None, bool]:
+    """Which of `CASES` explains windows, if any does, and whether only that one does.
+
+    Args:
+        chi2: (cases,) of three windows.
+    """
+    best = int(np.argmin(chi2))
+    level = float(chi2[best]) / freedom
+    unit = max(level, 1.0)
+    if level > POOR_FIT or chi2[0] - chi2[best] < WRONG * unit:
+        return None, False
+    case = CASES[best]
+    others = [value for value, other in zip(chi2, CASES, strict=True) if other.kind != case.kind]
+    if min(others) - chi2[best] >= CLEAR * unit:
+        return case, True
+    unlike = [v for v, other in zip(chi2, CASES, strict=True) if not _is_like(other, case)]
+    is_enough = is_learned(case) and min(unlike) - chi2[best] >= CLEAR * unit
+    return (case if is_enough else None), False
+
+
+def is_learned(case: Case) -> bool:
+    """Are these mistakes that module 3 learns?"""
+    return all(repair.fault in (Fault.NONE, *LEARNED) for repair in case)
+
+
+def _is_like(one: Case, other: Case) -> bool:
+    """Are the same robots wrong, by tracks or scales?"""
+    whose = [[repair.fault is not Fault.NONE for repair in case] for case in (one, other)]
+    return is_learned(one) and is_learned(other) and whose[0] == whose[1]

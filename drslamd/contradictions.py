@@ -1,7 +1,14 @@
-"""What is said of wheels that are not mounted as configured: whose, and which key to set."""
+"""What is said where measurements contradict each other: whose, why, and what to do.
+
+Wheels that are not mounted as configured are named with the key to set. A pose in doubt is told
+with what may be the cause, and so are robots to which ranges do not fit.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+from drslamd.slam.doubt import Doubt, Reason
 from drslamd.slam.odometry.mounting import Fault, Repair
 from drslamd.slam.relative_pose.mounting_search import MountingSearch
 
@@ -16,7 +23,7 @@ CHECK = {
 """Of the wheels of a robot."""
 
 
-def advice(own: int, peer: int, search: MountingSearch, peer_is_odd: bool) -> str | None:
+def mounting(own: int, peer: int, search: MountingSearch, peer_is_odd: bool) -> str | None:
     """One sentence on a pair; None while nothing is wrong with it.
 
     Args:
@@ -30,6 +37,8 @@ def advice(own: int, peer: int, search: MountingSearch, peer_is_odd: bool) -> st
             f"ranges and odometry of robots {own} and {peer} contradict each other, and no usual "
             "mistake explains it; look at the wheels and the antennas of both"
         )
+    if not search.is_clear:
+        return None
     if case.b.fault is Fault.MIRRORED:
         whose = f"robot {peer}" if peer_is_odd else f"robot {own} or {peer}"
         return f"the wheels of {whose} {CHECK[Fault.MIRRORED]}"
@@ -49,3 +58,35 @@ def _of_one(robot: int, repair: Repair) -> str:
             "wheels.counts_per_metre (or the radius of its wheels); it is learned meanwhile"
         )
     return f"the wheels of robot {robot} {CHECK[repair.fault]}"
+
+
+def doubt(found: Doubt | None) -> str | None:
+    """One sentence on the own pose; None while nothing speaks against it."""
+    if found is None:
+        return None
+    if found.reason is Reason.ODOMETRY:
+        return (
+            f"the pose is doubtful: odometry is {found.level:.0f} times as wrong as configured; "
+            "the wheels slip or spin, or a counter stands; look at them, or drive more slowly"
+        )
+    if len(found.peers) == 1:
+        return (
+            f"the pose is doubtful: ranges to robot {found.peers[0]} and the odometry of both do "
+            "not fit; wheels of one of them slip, or sight is blocked"
+        )
+    peers = " and ".join(map(str, found.peers))
+    return (
+        f"the pose is doubtful: ranges to robots {peers} do not fit the odometry of this robot; "
+        "its wheels slip or stand, or its antenna is covered so that sight is blocked"
+    )
+
+
+def partners(robots: Iterable[int]) -> str | None:
+    """One sentence on other robots to whom ranges do not fit; None while there are none."""
+    named = " and ".join(str(robot) for robot in sorted(robots))
+    if not named:
+        return None
+    return (
+        f"ranges to robot {named} do not fit where it should be; sight between is blocked, or its "
+        "wheels slip"
+    )
