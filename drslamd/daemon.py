@@ -206,7 +206,7 @@ class Daemon:
                 raise finished.error
             self._succeed(old, finished.result)
 
-        self._worker.submit(partial(self._store.begin, old.state(), effect.above), done)
+        self._worker.submit(partial(self._store.begin, old.memory.state(), effect.above), done)
 
     def _succeed(self, old: Robot, epoch: int) -> None:
         """Begin again under a new epoch; ports and network stay as they are."""

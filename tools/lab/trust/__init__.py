@@ -1,1 +1,1 @@
-"""Does the team ever claim what is not so? Worlds and drives that try it, and what came of them."""
+"""tools/trust: do published poses know what they do not know?"""
