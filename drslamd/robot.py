@@ -283,7 +283,7 @@ class Robot:
     def _on_job(self, event: JobDone) -> list[Effect]:
         job = self.jobs.finish(event)
         if job.module == WHAT_IF and job.pair is not None and job.request is not None:
-            job.pair.on_costs(job.request, event.result)
+            job.pair.on_costs(job.request, *event.result)
             return []
         if job.pair is not None and job.request is not None:
             job.pair.on_estimate(job.request, event.result)

@@ -60,11 +60,16 @@ class WindowJob(NamedTuple):
 
 
 class WhatIfJob(NamedTuple):
-    """A search for mistakes in the mountings of a pair, by one window: chi-squared of each case."""
+    """A search for mistakes in the mountings of a pair, by one window: chi-squared of each case,
+    and how far the robot drove that drove less."""
 
     pair: PairTracker
     request: WindowRequest
-    run: Callable[[], Array]
+    run: Callable[[], tuple[Array, float]]
+
+
+def _asked(question: what_if.Question, noise: PairNoise, delta: float) -> tuple[Array, float]:
+    return question.costs(noise, delta), question.way_m
 
 
 class FrontEnd:
@@ -276,14 +281,17 @@ class FrontEnd:
         """Begin the searches for mistakes in mountings that are due, where windows disagree."""
         out = []
         for pair, a, b in self._measurable(neighbours, graph, utime):
-            if not (self._method.uses_calibration and pair.search.is_due(utime)):
+            if not (
+                self._method.agreement.confirms
+                and pair.search.is_due(utime, pair.awaits_confirmation)
+            ):
                 continue
             found = request(pair.ranges, a, b, self._method.rule, self._range_model)
             if isinstance(found, str):
                 continue
             pair.search.begin(utime)
             question = what_if.ask(found, a, b)
-            run = partial(question.costs, self._noise(pair, b), self._delta)
+            run = partial(_asked, question, self._noise(pair, b), self._delta)
             out.append(WhatIfJob(pair, found, run))
         return out
 

@@ -21,13 +21,15 @@ from drslamd.slam.graph.measurements import ClosureMeasurement
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.relative_pose.estimate import RelativePoseEstimate
-from drslamd.slam.relative_pose.mounting_search import MountingSearch, is_learned
+from drslamd.slam.relative_pose.mounting_search import MOVED_M, MountingSearch, is_learned
 from drslamd.slam.relative_pose.pair_end import at_keyframes
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 from drslamd.slam.relative_pose.range_sampler import RangeSampler
 from drslamd.slam.relative_pose.window_request import WindowRequest
 from drslamd.slam.se2 import Array
 
+FEWEST_KEPT = 2
+"""Closures that agree before it is asked whether the pair is mounted as configured."""
 PENDING = 8
 """Estimates that wait for module 2, which runs as often as module 1 by default."""
 HISTORY = 2_000
@@ -48,10 +50,12 @@ class Agreement:
     Attributes:
         least: so many closures must agree.
         outnumber: and be so many times the largest set that contradicts them; 0 asks for nothing.
+        confirms: and must windows exclude that wheels run backwards?
     """
 
     least: int
     outnumber: int
+    confirms: bool
 
 
 @dataclass(frozen=True)
@@ -151,9 +155,18 @@ class PairTracker:
         found = self.search.found
         return found is not None and not is_learned(found)
 
-    def on_costs(self, request: WindowRequest, costs: Array) -> None:
-        """A search for mistakes has answered."""
-        self.search.on_costs(costs, len(request.window), has_agreed=self.connected)
+    @property
+    def awaits_confirmation(self) -> bool:
+        """Would it be connected if it was known to be mounted as configured?"""
+        return len(self.kept) >= FEWEST_KEPT and not self.connected
+
+    def on_costs(self, request: WindowRequest, costs: Array, way_m: float) -> None:
+        """A search for mistakes has answered.
+
+        Args:
+            way_m: how far the robot drove that drove less.
+        """
+        self.search.on_costs(costs, len(request.window), way_m > MOVED_M)
 
     # ---- module 2 ----
 
@@ -256,7 +269,8 @@ class PairTracker:
         # the rivals are searched last: that takes a while
         rivals = self.agreement.outnumber and checked.consistency.rivals()
         outnumbers = len(self.kept) >= self.agreement.outnumber * rivals
-        self.connected = enough and outnumbers and not self.search.disagrees
+        is_sure = self.search.is_confirmed or not self.agreement.confirms
+        self.connected = enough and outnumbers and is_sure and not self.search.disagrees
 
     def accepted(self) -> set[int]:
         """Numbers of all closures that are kept, of earlier segments too, back to `history`."""

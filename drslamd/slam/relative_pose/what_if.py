@@ -41,10 +41,11 @@ class Case(NamedTuple):
         return self.a.fault.name, self.b.fault.name
 
 
+MIRROR = Case(b=MIRRORED)
+"""a mirrored and b mirrored are one world and its mirror image: the same ranges."""
 CASES = (
     Case(),
-    # a mirrored and b mirrored are one world and its mirror image: the same ranges
-    Case(b=MIRRORED),
+    MIRROR,
     *(Case(a=repair) for repair in (*SIDES, *TRACKS, *SCALES)),
     *(Case(b=repair) for repair in (*SIDES, *TRACKS, *SCALES)),
     # a team that was configured from one file is wrong in the same way
@@ -95,6 +96,12 @@ class Question:
     window: Window
     a: Stretch
     b: Stretch
+
+    @property
+    def way_m(self) -> float:
+        """How far the robot drove that drove less."""
+        ways = (np.diff(stretch.poses[:, :2], axis=0) for stretch in (self.a, self.b))
+        return min(float(np.nansum(np.hypot(*way.T))) for way in ways)
 
     def costs(self, noise: PairNoise, delta: float) -> Array:
         """(cases,) chi-squared of the best pose under each of `CASES`, infinite where none fits."""
