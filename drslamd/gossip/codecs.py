@@ -42,6 +42,10 @@ from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.robot_model import RobotModel
 
 MILLIMETRE_M = 1e-3
+CORRECTION_STEP = 1 / 50
+"""Of the scale and turn with which a closure was found."""
+MOST_STEPS = 127
+"""Of a correction: 2.5 times."""
 
 
 class Codec(NamedTuple):
@@ -225,6 +229,8 @@ def _filled_closure(item: ClosureMeasurement, peer: int) -> Any:
     out.x, out.y = (round(v / TRANSLATION_STEP_M) for v in item.a_T_b[:2])
     out.theta = round(item.a_T_b[2] / ROTATION_STEP_RAD)
     out.covariance = list(item.covariance)
+    steps = (round(part / CORRECTION_STEP) for part in item.corrected)
+    out.corrected = [max(-MOST_STEPS, min(MOST_STEPS, step)) for step in steps]
     return out
 
 
@@ -235,6 +241,8 @@ def _read_closure(c: Any, peers: list[Chain]) -> ClosureMeasurement:
     covariance = tuple(c.covariance)
     if not bounds.is_closure(pose, covariance):
         raise ValueError("closure with a pose or a covariance that is none")
+    a_scale, a_turn, b_scale, b_turn = (part * CORRECTION_STEP for part in c.corrected)
+    corrected = a_scale, a_turn, b_scale, b_turn
     return ClosureMeasurement(
         number=c.number,
         kept=bool(bounds.flag(c.kept)),
@@ -243,6 +251,7 @@ def _read_closure(c: Any, peers: list[Chain]) -> ClosureMeasurement:
         b_n=bounds.sample(c.b_n),
         a_T_b=pose,
         covariance=covariance,
+        corrected=corrected,
     )
 
 

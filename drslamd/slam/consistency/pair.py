@@ -232,6 +232,7 @@ class PairTracker:
             correction.path(data.keyframes.poses[: row[0] + 1])[-1]
             for correction, data, row in zip(self._corrections, (own, peer), (a, b), strict=True)
         )
+        scales, turns = zip(*((c.scale, c.turn) for c in self._corrections), strict=True)
         out = []
         for hypothesis in estimate.hypotheses:
             pose, covariance = at_keyframes(
@@ -246,6 +247,7 @@ class PairTracker:
                 b_n=request.b.n,
                 a_T_b=(x, y, theta),
                 covariance=se2.packed(sendable(covariance)),
+                corrected=(scales[0], turns[0], scales[1], turns[1]),
             )
             candidate = Candidate(
                 closure=number,

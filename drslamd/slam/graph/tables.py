@@ -142,16 +142,16 @@ class RangeTable:
         return RangeTable(self.rows.copy())
 
 
-CLOSURE_COLUMNS = 14
+CLOSURE_COLUMNS = 18
 """Of `ClosureTable`."""
 
 
 @dataclass(frozen=True)
 class ClosureTable:
-    """k closures of one pair by the keyframe of the owner and their number, as rows (k, 14):
+    """k closures of one pair by the keyframe of the owner and their number, as rows (k, 18):
 
     a_n, number, minus the place in the log of the word that counts, kept, b_n, a_T_b (3), xx xy xt
-    yy yt tt.
+    yy yt tt, corrected (4).
     """
 
     rows: Array
@@ -165,7 +165,8 @@ class ClosureTable:
     @staticmethod
     def row(place: int, c: ClosureMeasurement) -> list[float]:
         """One row; the smallest row of one number is that of the latest word."""
-        return [c.a_n, c.number, -place, c.kept, c.b_n, *c.a_T_b, *c.covariance]
+        ends = c.a_n, c.number, -place, c.kept, c.b_n
+        return [*ends, *c.a_T_b, *c.covariance, *c.corrected]
 
     @property
     def a_n(self) -> Array:
@@ -190,7 +191,12 @@ class ClosureTable:
     @property
     def packed(self) -> Array:
         """(k, 6) covariances as `se2.packed` has them."""
-        return self.rows[:, 8:]
+        return self.rows[:, 8:14]
+
+    @property
+    def corrected(self) -> Array:
+        """(k, 4) with which scale and turn of a and of b they were found."""
+        return self.rows[:, 14:]
 
     @property
     def covariance(self) -> Array:
@@ -214,7 +220,8 @@ class ClosureTable:
                 peer=peer,
                 b_n=int(b_n),
                 a_T_b=(x, y, theta),
-                covariance=tuple(covariance),
+                covariance=tuple(rest[:6]),
+                corrected=tuple(rest[6:]),
             )
-            for a_n, number, _, kept, b_n, x, y, theta, *covariance in self.rows.tolist()
+            for a_n, number, _, kept, b_n, x, y, theta, *rest in self.rows.tolist()
         ]

@@ -8,7 +8,9 @@ and a trajectory that was never placed is placed by its closures.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +20,11 @@ from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.tables import ClosureTable, KeyframeTable
-from drslamd.slam.se2 import Array
+from drslamd.slam.odometry.correction import Correction
+from drslamd.slam.se2 import Array, Index
+
+NO_CORRECTIONS: Mapping[int, Correction] = MappingProxyType({})
+"""Everybody is mounted as configured."""
 
 
 @dataclass(frozen=True)
@@ -80,12 +86,21 @@ def gauge_segment(group: set[Segment], living: set[int]) -> Segment | None:
 # ---- where the optimiser starts ----------------------------------------------------------------
 
 
-def placed(graph: PoseGraph, group: Group, previous: TeamEstimate | None) -> dict[Segment, Array]:
-    """w_T_k (k, 3) of all keyframes of each member."""
+def placed(
+    graph: PoseGraph,
+    group: Group,
+    previous: TeamEstimate | None,
+    corrections: Mapping[int, Correction] = NO_CORRECTIONS,
+) -> dict[Segment, Array]:
+    """w_T_k (k, 3) of all keyframes of each member.
+
+    Args:
+        corrections: of the odometry of robots that are not mounted as configured.
+    """
     out: dict[Segment, Array] = {}
     known = _in_frame(graph, group.frame, previous)
     for segment in sorted(group.members):
-        keyframes = graph.view.segment(segment)
+        keyframes = _corrected(graph, segment, corrections)
         trajectory = known.get(segment.robot)
         if trajectory is not None and trajectory.chain == segment.chain:
             there = np.isin(keyframes.n, trajectory.n)
@@ -93,11 +108,26 @@ def placed(graph: PoseGraph, group: Group, previous: TeamEstimate | None) -> dic
                 at = np.searchsorted(trajectory.n, keyframes.n[there])
                 out[segment] = by_odometry(keyframes, keyframes.chosen(there), trajectory.poses[at])
     if group.frame not in out:
-        out = {group.frame: graph.view.segment(group.frame).poses}
+        out = {group.frame: _corrected(graph, group.frame, corrections).poses}
     while len(out) < len(group.members):
-        segment, anchors, poses = _next_to_place(graph, group.members, out)
-        out[segment] = by_odometry(graph.view.segment(segment), anchors, poses)
+        segment, n, poses = _next_to_place(graph, group.members, out)
+        keyframes = _corrected(graph, segment, corrections)
+        anchors = keyframes.chosen(np.searchsorted(keyframes.n, n))
+        out[segment] = by_odometry(keyframes, anchors, poses)
     return out
+
+
+def _corrected(
+    graph: PoseGraph, segment: Segment, corrections: Mapping[int, Correction]
+) -> KeyframeTable:
+    """The keyframes of a segment where odometry should have had them."""
+    keyframes = graph.view.segment(segment)
+    correction = corrections.get(segment.robot)
+    if correction is None:
+        return keyframes
+    rows = keyframes.rows.copy()
+    rows[:, 2:] = correction.path(keyframes.poses)
+    return KeyframeTable(rows)
 
 
 def _in_frame(
@@ -139,8 +169,8 @@ def by_odometry(keyframes: KeyframeTable, anchors: KeyframeTable, w_T_anchor: Ar
 
 def _next_to_place(
     graph: PoseGraph, members: set[Segment], done: dict[Segment, Array]
-) -> tuple[Segment, KeyframeTable, Array]:
-    """The segment that most closures join to what is placed: its anchors and their poses."""
+) -> tuple[Segment, Index, Array]:
+    """The segment that most closures join to what is placed: its anchors (m,), their poses."""
 
     def pose(segment: Segment, n: int) -> Array:
         return np.asarray(done[segment][np.searchsorted(graph.view.segment(segment).n, n)])
@@ -159,7 +189,6 @@ def _next_to_place(
             else:
                 new[int(a_n)] = se2.compose(pose(joint.b, b_n), se2.inverse(a_T_b))
     segment = max(found, key=lambda s: (len(found[s]), s))
-    keyframes, anchors = graph.view.segment(segment), found[segment]
+    anchors = found[segment]
     n = np.array(sorted(anchors))
-    at = np.searchsorted(keyframes.n, n)
-    return segment, keyframes.chosen(at), np.array([anchors[int(k)] for k in n])
+    return segment, n, np.array([anchors[int(k)] for k in n])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +13,10 @@ from drslamd.slam.graph import team_frame
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.tables import CLOSURE_COLUMNS, RANGE_COLUMNS, ClosureTable, RangeTable
-from drslamd.slam.graph.team_frame import Group
+from drslamd.slam.graph.team_frame import NO_CORRECTIONS, Group
 from drslamd.slam.graph.thinning.chain_view import ChainView
 from drslamd.slam.graph.thinning.pair_view import PairView
+from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.noise import by_yaw_rate, link_covariance
 from drslamd.slam.optimizer.problem import (
     BetweenFactors,
@@ -83,12 +84,46 @@ def numbering(graph: PoseGraph, members: set[Segment]) -> Numbering:
     return Numbering(robot_of, n_of, place)
 
 
+def corrections(
+    graph: PoseGraph, robots: list[int], previous: TeamEstimate | None
+) -> dict[int, Correction]:
+    """Of robots that are not mounted as configured, as far as that is known before a solver starts.
+
+    The last solution tells; of who was not in it, the closures do, which were found with it.
+    """
+    out: dict[int, Correction] = {}
+    for robot in robots:
+        if previous is not None and robot in previous.trajectories:
+            if robot in previous.turn:
+                out[robot] = previous.correction(robot)
+            continue
+        found = [
+            pair.closures.corrected[:, at]
+            for pair in graph.view.pairs
+            for chain, at in ((pair.a, slice(0, 2)), (pair.b, slice(2, 4)))
+            if chain.robot == robot
+        ]
+        rows = np.concatenate([np.zeros((0, 2)), *found])
+        if rows.any():
+            scale, turn = np.median(rows, axis=0).tolist()
+            out[robot] = Correction(scale=scale, turn=turn)
+    return out
+
+
 def initial_poses(
-    graph: PoseGraph, group: Group, previous: TeamEstimate | None, places: Numbering
+    graph: PoseGraph,
+    group: Group,
+    previous: TeamEstimate | None,
+    places: Numbering,
+    known: Mapping[int, Correction] = NO_CORRECTIONS,
 ) -> Array:
-    """(k, 3) w_T_k from which a solver may start."""
+    """(k, 3) w_T_k from which a solver may start.
+
+    Args:
+        known: see `corrections`.
+    """
     initial = np.zeros((len(places.n), 3))
-    for segment, poses in team_frame.placed(graph, group, previous).items():
+    for segment, poses in team_frame.placed(graph, group, previous, known).items():
         rows = graph.view.chains[segment.robot].keyframes.of_segment(segment.segment)
         initial[places.place[segment.robot][rows]] = poses
     # where the frame is said nobody's memory of it, but the odometry that defines it

@@ -19,6 +19,7 @@ from drslamd.slam.graph.estimate import Learned, TeamEstimate, Trajectory
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
+from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.banded.solution import Solution
@@ -98,6 +99,7 @@ def build_problem(
     ranges, pairs = factors.ranges(graph, places)
     closures = factors.closures(graph, places)
     hints = replace(closures, covariance=closures.covariance + HINT * np.eye(3))
+    known = factors.corrections(graph, robots, previous)
     priors = Priors(
         bias=BiasPrior.of(numbers.bias_sigma, numbers.model),
         scale=np.array([data.model.noise.scale for data in chains]),
@@ -108,25 +110,47 @@ def build_problem(
     problem = Problem(
         robot=places.robot,
         n=places.n,
-        initial=factors.initial_poses(graph, group, previous, places),
+        initial=factors.initial_poses(graph, group, previous, places, known),
         gauge=factors.gauge_place(graph, group, places),
         pairs=len(pairs),
         odometry=factors.odometry(graph, places, robots),
         closures=hints.chosen(factors.sensible(hints.i, hints.j)),
         ranges=ranges.chosen(factors.sensible(ranges.i, ranges.j)),
         priors=priors,
-        doubted=_doubted(previous, robots),
+        doubted=_doubted(previous, known, robots),
         range_sigma=numbers.range_sigma,
         model=numbers.model,
     )
-    start = (
-        _start(previous, pairs, robots) if previous else Calibration.zero(len(pairs), len(robots))
-    )
+    start = _start(previous, known, pairs, robots)
     return TeamProblem(problem, start, [data.chain for data in chains], pairs, places)
 
 
-def _start(previous: TeamEstimate, pairs: list[tuple[int, int]], robots: list[int]) -> Calibration:
-    """What the last solution learned."""
+def _start(
+    previous: TeamEstimate | None,
+    known: Mapping[int, Correction],
+    pairs: list[tuple[int, int]],
+    robots: list[int],
+) -> Calibration:
+    """What the last solution learned, and what closures were found with."""
+    if previous is None:
+        start = Calibration.zero(len(pairs), len(robots))
+    else:
+        start = _learned(previous, pairs, robots)
+    odometry = [
+        known.get(robot, Correction(start.scale[at], 0.0, start.turn[at]))
+        for at, robot in enumerate(robots)
+    ]
+    return replace(
+        start,
+        scale=np.array([correction.scale for correction in odometry]),
+        turn=np.array([correction.turn for correction in odometry]),
+    )
+
+
+def _learned(
+    previous: TeamEstimate, pairs: list[tuple[int, int]], robots: list[int]
+) -> Calibration:
+    """By the last solution."""
     return Calibration(
         bias=np.array([previous.bias_m.get(pair, Learned()).value for pair in pairs]),
         scale=np.array([previous.scale.get(robot, Learned()).value for robot in robots]),
@@ -140,14 +164,13 @@ def _start(previous: TeamEstimate, pairs: list[tuple[int, int]], robots: list[in
     )
 
 
-def _doubted(previous: TeamEstimate | None, robots: list[int]) -> Doubted:
-    """What the last solution let go."""
-    if previous is None:
-        return Doubted.none(len(robots))
-    return Doubted(
-        np.array([robot in previous.turn for robot in robots]),
-        np.array([robot in previous.antenna_m for robot in robots]),
-    )
+def _doubted(
+    previous: TeamEstimate | None, known: Mapping[int, Correction], robots: list[int]
+) -> Doubted:
+    """What the last solution let go, and what closures were found with."""
+    antennas = previous.antenna_m if previous else {}
+    turns = [robot in known and known[robot].turn != 0 for robot in robots]
+    return Doubted(np.array(turns), np.array([robot in antennas for robot in robots]))
 
 
 def _solve(team: TeamProblem, group: Group) -> TeamEstimate:
