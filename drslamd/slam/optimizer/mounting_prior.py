@@ -2,8 +2,10 @@
 
 A track that is not as configured makes turns too long or too short by a fraction (the wheels of a
 skid-steered robot slide, its track is half as wide again); an antenna that is not where it is said
-to be moves every range. Most configurations are right, some are far off: the distribution is
-Cauchy's with Gauss's tails. The cost is -2 log of the density, without its constant.
+to be moves every range. Most configurations are right, some are far off: the cost of a value v of d
+components is Cauchy's, with Gauss's tails,
+
+    (1 + d) / 2 log(1 + |v|^2 / width^2) + |v|^2 / most^2
 """
 
 from __future__ import annotations

@@ -92,7 +92,9 @@ def test_an_error_of_a_range_is_predicted_minus_measured_with_its_biases(
     poses, r = problem.initial, problem.ranges
     bias = np.array([0.2, -0.1, 0.3])
     # what biases have in common is part of them, and does not count twice
-    known = Calibration(bias, np.zeros(3), np.zeros(3), np.array([-0.25]), np.array([0.7]))
+    known = replace(
+        Calibration.zero(3, 3), bias=bias, near_bias=np.array([-0.25]), team_bias=np.array([0.7])
+    )
     error, sight, arm_i, arm_j = range_errors(poses, r, known, model)
     for m in range(len(r)):
         i, j = (product(poses[k], (*q, 0.0)) for k, q in ((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m])))
@@ -110,7 +112,7 @@ def test_some_of_the_factors_are_chosen_with_all_their_columns() -> None:
     which = np.arange(len(problem.ranges)) % 2 == 0
     few = problem.ranges.chosen(which)
     assert len(few) == 3
-    for name in ("i", "j", "q_i", "q_j", "measured", "sigma", "pair"):
+    for name in ("i", "j", "q_i", "q_j", "measured", "sigma", "pair", "robots", "turned"):
         assert np.array_equal(getattr(few, name), getattr(problem.ranges, name)[which])
     closures = problem.closures.chosen(np.array([False, True, False]))
     assert np.array_equal(closures.measured, problem.closures.measured[1:2])
@@ -147,11 +149,16 @@ def test_priors_cost_the_sum_of_what_each_constant_is_off() -> None:
         yaw=np.array([0.02, -0.02]),
         near_bias=np.array([0.1]),
         team_bias=np.array([0.05]),
+        turn=np.array([0.01, -0.01]),
+        antenna=np.array([[0.012, -0.016], [0.0, 0.0]]),
     )
     own = np.array([0.08, 0.0])
     of_scales = math.log(2) + math.log(10)
     of_others = 4 + 1 + 4
-    assert PRIORS.cost(known) == pytest.approx(PRIORS.bias.cost(own, 0.05) + of_scales + of_others)
+    # half widths of 0.01 and 0.02 m, and tails of 0.5
+    of_mountings = 2 * (math.log(2) + 0.02**2) + 1.5 * math.log(2) + 0.04**2
+    expected = PRIORS.bias.cost(own, 0.05) + of_scales + of_others + of_mountings
+    assert PRIORS.cost(known) == pytest.approx(expected)
     assert PRIORS.cost(Calibration.zero(2, 2)) == 0
 
 
@@ -176,10 +183,13 @@ def test_the_curvature_of_a_scale_is_the_derivative_of_its_pull_and_stays_positi
 
 
 def test_what_was_learned_adds_up() -> None:
-    names = ("bias", "scale", "yaw", "near_bias", "team_bias")
+    names = ("bias", "scale", "yaw", "near_bias", "team_bias", "turn", "antenna")
     zero = Calibration.zero(3, 2)
-    assert [len(getattr(zero, name)) for name in names] == [3, 2, 2, 1, 1]
+    shapes = [(3,), (2,), (2,), (1,), (1,), (2,), (2, 2)]
+    assert [getattr(zero, name).shape for name in names] == shapes
     assert not any(getattr(zero, name).any() for name in names)
-    step = Calibration(*(np.array([value]) for value in (1.0, 2.0, 3.0, 4.0, 5.0)))
+    values = [np.array([value]) for value in (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)]
+    step = Calibration(*values, antenna=np.array([[7.0, 8.0]]))
     twice = Calibration.zero(1, 1).plus(step).plus(step)
-    assert [getattr(twice, name)[0] for name in names] == [2, 4, 6, 8, 10]
+    assert [getattr(twice, name)[0] for name in names[:-1]] == [2, 4, 6, 8, 10, 12]
+    assert twice.antenna.tolist() == [[14, 16]]

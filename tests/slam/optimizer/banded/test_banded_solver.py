@@ -12,7 +12,9 @@ from dense_problems import (
     claimed_information,
     dense_solution,
     known_exactly,
+    learned_information,
     packed,
+    point_at,
     residual_vector,
     thresholds,
     unpacked,
@@ -28,14 +30,16 @@ from slam_problems import (
 )
 from slam_scenes import matrix, same_pose, wander
 
+from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.banded_solver import solve
 from drslamd.slam.optimizer.banded.claims import UNKNOWN, covariances
+from drslamd.slam.optimizer.banded.explanation import explain
 from drslamd.slam.optimizer.banded.misfit import guessed_misfit
-from drslamd.slam.optimizer.banded.newton_descent import Point, descend
+from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.banded.odometry_levels import explain
 from drslamd.slam.optimizer.problem import (
     Calibration,
+    Doubted,
     OdometryFactors,
     Priors,
     Problem,
@@ -98,7 +102,8 @@ def test_the_pose_graph_of_gtsam_has_the_same_minimum_and_marginals() -> None:
     start = truth + rng.normal(0, 0.02, truth.shape)
     start[0] = truth[0]
     robot, n = np.zeros(50, dtype=int), np.arange(50)
-    problem = Problem(robot, n, start, 0, 0, odometry, closures, no_ranges(), priors)
+    edges = (odometry, closures, no_ranges())
+    problem = Problem(robot, n, start, 0, 0, *edges, priors, Doubted.none(1))
     wanted = (0, 7, 48, 49)
     solution = solve(problem, marginals=wanted, tolerance=1e-12)
 
@@ -139,20 +144,24 @@ def test_what_is_claimed_is_the_dense_inverse_with_odometry_as_bad_as_it_looks()
     wanted = np.array([35, 3, 22])
     solution = solve(problem, marginals=tuple(wanted), tolerance=1e-10)
     x, links = packed(solution.poses, solution.calibration), problem.odometry
-    point = Point(solution.poses, solution.calibration, thresholds(problem, x))
-    ratio = np.maximum(guessed_misfit(Equations(problem), point).ratio(links.robot, 3), 1.0)
+    point = point_at(problem, solution.poses, solution.calibration, thresholds(problem, x))
+    equations = Equations(problem)
+    factor = BandFactor.of(equations.weighed(point))
+    assert factor is not None
+    ratio = np.maximum(guessed_misfit(equations, point, factor).ratio(links.robot, 3), 1.0)
     assert 1.2 < ratio.max() < 3
     covariance = ratio[links.robot][:, None, None] * links.covariance
     covariance += (ratio - 1)[links.robot][:, None, None] * 0.004**2 * np.eye(3)
     worse = replace(problem, odometry=replace(links, covariance=covariance))
     claims = math.sqrt(1 + 1.28 / (math.exp(0.4) - 1)) * np.maximum(solution.scatter, 0.3)
     inverse = np.linalg.inv(claimed_information(worse, x, point.threshold, claims))
+    learned = np.linalg.inv(learned_information(worse, x, point.threshold, claims))
     at = (3 * wanted[:, None] + np.arange(3)).ravel()
     expected = inverse[np.ix_(at, at)]
     sigma = np.sqrt(np.diag(expected))
     assert np.abs((solution.joint - expected) / np.outer(sigma, sigma)).max() < 2e-3
     assert solution.spread is not None
-    _, spread = unpacked(problem, np.sqrt(np.diag(inverse)))
+    _, spread = unpacked(problem, np.sqrt(np.diag(learned)))
     for name in ("bias", "scale", "yaw", "near_bias", "team_bias"):
         assert getattr(solution.spread, name) == pytest.approx(getattr(spread, name), rel=2e-3)
     assert solution.odometry_level == pytest.approx(1.0)
@@ -189,7 +198,8 @@ def test_where_nobody_can_say_who_is_wrong_poses_stay_and_their_covariances_grow
     assert np.abs(solution.poses[:, :2] - nominal.poses[:, :2]).max() == 0
     assert solution.calibration is not None
     # at least by how far both explanations are apart
-    other = explain(equations, nominal, 60, 3e-7).point
+    other = explain(equations, nominal, 60, 3e-7).other
+    assert other is not None
     apart = (nominal.poses - other.poses)[wanted]
     apart[:, 2] = np.angle(np.exp(1j * apart[:, 2]))
     plain, _ = covariances(equations, nominal, solution.scatter, wanted)

@@ -13,8 +13,9 @@ from slam_problems import held_at, stuck, team_problem
 from slam_scenes import Array
 
 from drslamd.slam.optimizer.banded import newton_descent
-from drslamd.slam.optimizer.banded.newton_descent import Point, descend
+from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations, System
+from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.bias_prior import WHOLE
 from drslamd.slam.optimizer.problem import Calibration, Problem
 
@@ -60,8 +61,9 @@ def test_wherever_it_starts_it_comes_to_the_same_answer(seed: int) -> None:
     for _ in range(2):
         away = problem.initial + rng.normal(0, 0.3, problem.initial.shape)
         away[0] = problem.initial[0]
-        began = Calibration(*(rng.normal(0, 0.02, n) for n in (3, 3, 3, 1, 1)))
-        ends.append(descend(Equations(replace(problem, initial=away)), began, MOST))
+        began = [rng.normal(0, 0.02, n) for n in (3, 3, 3, 1, 1)]
+        start = Calibration(*began, turn=np.zeros(3), antenna=np.zeros((3, 2)))
+        ends.append(descend(Equations(replace(problem, initial=away)), start, MOST))
     one, other = ends
     assert one.converged
     assert other.converged
@@ -189,7 +191,7 @@ class Indefinite(Equations):
 
     def at(self, *args: Any) -> tuple[System, Array]:
         system, gradient = super().at(*args)
-        if args[3] == WHOLE:
+        if args[1] == WHOLE:
             system.band[0, 4] = -1.0
         return system, gradient
 
@@ -211,7 +213,7 @@ def test_no_step_makes_it_worse_at_the_thresholds_that_it_began_with() -> None:
     before = from_start(problem, 0)
     for most in range(1, 8):
         now = from_start(problem, most)
-        costs = [equations.cost(p.poses, p.calibration, before.threshold) for p in (before, now)]
+        costs = [equations.cost(p, before.threshold) for p in (before, now)]
         assert costs[1] <= costs[0] * (1 + 1e-9)
         before = now
 
