@@ -12,6 +12,7 @@ from slam_scenes import NOISE, Array, curved_window, same_pose
 from drslamd.conventions import Segment
 from drslamd.slam.calibration.window_calibration import (
     LEAST_SCALE,
+    EndCalibration,
     PairCalibration,
     calibrated_window,
     remaining,
@@ -23,7 +24,11 @@ from drslamd.slam.relative_pose.solver import solve
 from drslamd.slam.relative_pose.window import Window
 
 SENSORS = PairNoise(RangeNoise(0.10, 0.30), NOISE, NOISE)
-KNOWN = PairCalibration(Learned(-0.4, 0.01), Learned(0.15, 0.001), Learned(-0.05, 0.001))
+KNOWN = PairCalibration(
+    Learned(-0.4, 0.01),
+    EndCalibration(Learned(0.15, 0.001)),
+    EndCalibration(Learned(-0.05, 0.001)),
+)
 
 
 def uncalibrated(seed: int) -> tuple[Window, Array]:
@@ -67,7 +72,8 @@ def test_what_is_left_is_never_below_what_no_constant_describes() -> None:
 def test_what_module_3_says_of_its_sigmas_is_taken_as_it_is(scatter: float) -> None:
     """How much the ranges of the pair scatter is part of those sigmas, and does not count twice."""
     window, _ = uncalibrated(5)
-    learned = PairCalibration(Learned(0.1, 0.08), Learned(0.05, 0.02), Learned(0.0, 0.01), scatter)
+    a, b = EndCalibration(Learned(0.05, 0.02)), EndCalibration(Learned(0.0, 0.01))
+    learned = PairCalibration(Learned(0.1, 0.08), a, b, scatter)
     wide = replace(NOISE, scale=0.1)
     same, noise = calibrated_window(window, replace(SENSORS, a=wide, b=wide), learned)
     assert np.allclose(same.ranges, window.ranges - 0.1)
@@ -116,7 +122,7 @@ def test_a_pair_is_found_whoever_owns_it() -> None:
     assert sensors.scatter == 0.7
     assert PairCalibration.of(estimate, 0, 1).scatter == 1.0
     assert sensors.near_bias == (-0.1, 0.03)
-    assert sensors.scale_a.value == 0.1
-    assert math.isinf(sensors.scale_b.sigma)
+    assert sensors.a.scale.value == 0.1
+    assert math.isinf(sensors.b.scale.sigma)
     # where module 3 has not come to an end, nothing has been learned
     assert PairCalibration.of(replace(estimate, converged=False), 2, 1) == PairCalibration()

@@ -95,7 +95,8 @@ def test_what_is_claimed_is_named_by_its_robot_and_its_pair() -> None:
             (alone.calibration.bias[number], alone.spread.bias[number])
         )
         assert estimate.scatter[pair] == pytest.approx(alone.scatter[number])
-    assert estimate.team_bias_m.sigma == pytest.approx(BANDED.bias_sigma)
+    common = alone.calibration.team_bias[0], alone.spread.team_bias[0]
+    assert estimate.team_bias_m == pytest.approx(common)
 
 
 def test_biases_are_named_by_their_pairs_and_scales_by_their_robots() -> None:

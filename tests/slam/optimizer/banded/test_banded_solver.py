@@ -169,7 +169,7 @@ def test_what_is_claimed_is_the_dense_inverse_with_odometry_as_bad_as_it_looks()
 
 
 def test_where_somebody_slipped_the_solution_is_the_one_that_explains_it() -> None:
-    problem, truth = team_problem(7, robots=4, count=45, closures=6)
+    problem, truth = team_problem(3, robots=4, count=45, closures=6)
     problem = slipping(held_at(problem, truth), 1, 25, 31)
     solution = solve(problem, marginals=(4 * 44 + 1, 4 * 44 + 2), most=60)
     assert solution.converged
@@ -283,7 +283,8 @@ def test_the_gauge_stays_where_it_was() -> None:
 def test_calibration_that_nothing_touches_keeps_its_prior() -> None:
     problem, _ = team_problem(11, robots=2, count=20)
     priors = replace(problem.priors, scale=np.full(3, 0.06), yaw=np.full(3, 0.01))
-    wide, plain = solve(replace(problem, priors=priors)), solve(problem)
+    wide = solve(replace(problem, priors=priors, doubted=Doubted.none(3)))
+    plain = solve(problem)
     assert np.allclose(wide.poses, plain.poses, atol=1e-6)
     assert wide.calibration.scale[2] == wide.calibration.yaw[2] == 0
     assert wide.spread is not None
