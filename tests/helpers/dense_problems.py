@@ -38,7 +38,8 @@ def unpacked(problem: Problem, x: Array) -> tuple[Array, Calibration]:
     poses, *sensors, turns, antennas = np.split(x, np.cumsum(sizes))
     turn, antenna = np.zeros(robots), np.zeros((robots, 2))
     turn[doubted.track], antenna[doubted.antenna] = turns, antennas.reshape(-1, 2)
-    return poses.reshape(-1, 3), Calibration(*sensors, turn, antenna)
+    bias, scale, yaw, near, team = sensors
+    return poses.reshape(-1, 3), Calibration(bias, scale, yaw, near, team, turn, antenna)
 
 
 def point_at(problem: Problem, poses: Array, c: Calibration, threshold: Array) -> Point:

@@ -15,7 +15,7 @@ from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.pair_data import PairData
 from drslamd.slam.graph.pose_graph import PoseGraph
-from drslamd.slam.graph.tables import RANGE_COLUMNS, RangeTable
+from drslamd.slam.graph.tables import RANGE_COLUMNS, KeyframeTable, RangeTable
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.odometry.noise import link_covariance
 from drslamd.slam.optimizer.problem import BetweenFactors, OdometryFactors, RangeFactors
@@ -33,6 +33,11 @@ FAR = 128
 STANDING = 64
 """So many poses may have such factors: those of robots that stood while the others drove on. What
 is beyond is nonsense, and would make the team's problem too wide to be solved."""
+
+MOST_OF_WAY = 0.6
+"""To the next keyframe: a range belongs to the nearer one, but keyframes are not of one length."""
+TINY = 1e-9
+"""m^2; the way of a robot that stands."""
 
 
 @dataclass(frozen=True)
@@ -211,28 +216,7 @@ def ranges(graph: PoseGraph, numbers: Numbering) -> tuple[RangeFactors, list[tup
     table = RangeTable(np.concatenate([np.zeros((0, RANGE_COLUMNS)), *(r for _, _, r in found)]))
     index = [np.full(len(rows), names.index(name)) for name, _, rows in found]
     pair_of = np.concatenate([np.zeros(0, dtype=np.int64), *index])
-
-    def heading(end: Index, q: Array) -> Array:
-        h = np.zeros(len(end))
-        robots = numbers.robot[end]
-        for robot in set(robots.tolist()):
-            key = graph.chains[robot].keyframes
-            at = np.flatnonzero(robots == robot)
-            k = np.searchsorted(key.n, numbers.n[end[at]])
-            best = np.full(len(at), np.inf)
-            for step in (-1, 1):
-                o = np.clip(k + step, 0, len(key.n) - 1)
-                d = se2.between(key.poses[k], key.poses[o])
-                L = np.maximum((d[:, :2] ** 2).sum(1), 1e-9)
-                f = np.clip((d[:, :2] * q[at]).sum(1) / L, 0, 0.6)
-                miss = np.hypot(*(q[at] - f[:, None] * d[:, :2]).T) + (o == k) * 9
-                better = miss < best
-                h[at[better]] = (f * d[:, 2])[better]
-                best = np.minimum(best, miss)
-        return h
-
-    rob = sorted(set(numbers.robot.tolist()))
-    r_i, r_j = np.searchsorted(rob, numbers.robot[i]), np.searchsorted(rob, numbers.robot[j])
+    robots = np.unique(numbers.robot)
     ranges = RangeFactors(
         i=i,
         j=j,
@@ -241,10 +225,48 @@ def ranges(graph: PoseGraph, numbers: Numbering) -> tuple[RangeFactors, list[tup
         measured=table.range_m,
         sigma=table.sigma_m,
         pair=pair_of,
-        robots=np.stack([r_i, r_j], axis=-1).reshape(-1, 2),
-        turned=np.stack([heading(i, table.q_a), heading(j, table.q_b)], axis=-1).reshape(-1, 2),
+        robots=np.searchsorted(robots, numbers.robot[np.stack([i, j], axis=-1)]),
+        turned=np.stack(
+            [_turned(graph, numbers, i, table.q_a), _turned(graph, numbers, j, table.q_b)], axis=-1
+        ),
     )
     return ranges, names
+
+
+def _turned(graph: PoseGraph, numbers: Numbering, ends: Index, q: Array) -> Array:
+    """(m,) by how much robots stood turned against poses (m,) when their antennas were at q."""
+    out = np.zeros(len(ends))
+    robots = numbers.robot[ends]
+    for robot in np.unique(robots):
+        mine = robots == robot
+        keyframes = graph.chains[int(robot)].keyframes
+        out[mine] = turned_at(keyframes, numbers.n[ends[mine]], q[mine])
+    return out
+
+
+def turned_at(keyframes: KeyframeTable, n: Index, q: Array) -> Array:
+    """(m,) by how much a robot stood turned against its keyframes n (m,), rad.
+
+    A range says where the antenna was and not how the robot stood. So it is taken to have been on
+    the way to the keyframe before or after, whichever passes nearer to the antenna, and to have
+    turned evenly along it.
+
+    Args:
+        q: (m, 2) the antenna in the frames of the keyframes, m.
+    """
+    k = np.searchsorted(keyframes.n, n)
+    out, nearest = np.zeros(len(n)), np.full(len(n), np.inf)
+    for step in (-1, 1):
+        other = np.clip(k + step, 0, len(keyframes.n) - 1)
+        way = se2.between(keyframes.poses[k], keyframes.poses[other])
+        length = np.maximum((way[:, :2] ** 2).sum(axis=1), TINY)
+        share = np.clip((way[:, :2] * q).sum(axis=1) / length, 0, MOST_OF_WAY)
+        beside = np.hypot(*(q - share[:, None] * way[:, :2]).T)
+        is_there = (other != k) & (keyframes.segment[other] == keyframes.segment[k])
+        is_nearer = is_there & (beside < nearest)
+        out[is_nearer] = (share * se2.wrap(way[:, 2]))[is_nearer]
+        nearest[is_nearer] = beside[is_nearer]
+    return out
 
 
 def sensible(i: Index, j: Index) -> NDArray[np.bool_]:

@@ -25,7 +25,14 @@ from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.optimizer import factors
-from drslamd.slam.optimizer.factors import Numbering, chain_links, clock_shifts, numbering, sensible
+from drslamd.slam.optimizer.factors import (
+    Numbering,
+    chain_links,
+    clock_shifts,
+    numbering,
+    sensible,
+    turned_at,
+)
 from drslamd.slam.robot_model import RobotModel
 
 A, B, C = Chain(0, 5), Chain(1, 6), Chain(2, 7)
@@ -194,6 +201,61 @@ def test_ranges_end_at_their_keyframes_with_their_antennas() -> None:
     assert ranges.sigma.tolist() == [0.07, 0.1]
     assert ranges.q_i.tolist() == [[0.1, 0.2], [0, 0]]
     assert ranges.q_j.tolist() == [[0.3, 0.4], [0, 0]]
+    assert ranges.robots.tolist() == [[0, 1], [1, 0]]
+    for end, (chain, n, q) in enumerate(((A, 20, (0.1, 0.2)), (B, 1035, (0.3, 0.4)))):
+        keyframes_of = graph.chains[chain.robot].keyframes
+        expected = turned_at(keyframes_of, np.array([n]), np.array([q]))
+        assert ranges.turned[0, end] == expected[0] != 0
+    assert ranges.turned[1].tolist() == [0, 0]
+
+
+BENDS = np.array([[0.0, 0.0, 0.2], [1.0, 0.0, 0.2], [2.0, 1.0, 0.7], [2.0, 1.0, -2.6]])
+"""Keyframes 0, 10 and 20, and 30, where it turned on the spot by more than half a turn."""
+
+
+def stood(n: int, place: tuple[float, float], segments: list[int] | None = None) -> float:
+    """How a robot stood against keyframe n, whose antenna was at a place of the track's frame."""
+    table = chain_of(BENDS, [0, 10, 20, 30], segments).keyframes
+    pose = BENDS[n // 10]
+    q = product(inverted(pose), (*place, 0.0))[:2]
+    return float(turned_at(table, np.array([n]), q[None])[0])
+
+
+@pytest.mark.parametrize(
+    ("n", "place", "turned"),
+    [
+        (10, (1.0, 0.0), 0.0),
+        # a quarter of the way on, and 0.1 m beside it
+        (10, (1.25, 0.25), 0.25 * 0.5),
+        (10, (1.25 - 0.07, 0.25 + 0.07), 0.25 * 0.5),
+        # on the way back to 0 it does not turn
+        (10, (0.75, 0.0), 0.0),
+        (20, (1.75, 0.75), -0.25 * 0.5),
+        (20, (1.41, 0.41), -0.59 * 0.5),
+        # farther than most of the way it was not
+        (20, (1.2, 0.2), -0.6 * 0.5),
+        # the last turned on the spot, of which a place says nothing
+        (30, (2.0, 1.0), 0.0),
+        (0, (0.25, 0.0), 0.0),
+    ],
+)
+def test_a_robot_is_taken_to_have_turned_along_its_way(
+    n: int, place: tuple[float, float], turned: float
+) -> None:
+    assert stood(n, place) == pytest.approx(turned, abs=1e-9)
+
+
+def test_a_robot_that_turns_by_more_than_half_a_turn_on_paper_takes_the_short_way() -> None:
+    path = np.array([[0.0, 0.0, 3.0], [1.0, 0.0, -3.0]])
+    there = turned_at(chain_of(path, [0, 10]).keyframes, np.array([0]), np.array([[-0.5, 0.0]]))
+    share = 0.5 * math.cos(math.pi - 3.0)
+    assert there[0] == pytest.approx(share * (2 * math.pi - 6.0))
+
+
+def test_nobody_turns_towards_a_keyframe_of_another_segment() -> None:
+    place = (1.75, 0.75)
+    assert stood(20, place, [0, 0, 0, 0]) != 0
+    assert stood(20, place, [0, 0, 1, 1]) == 0
 
 
 def test_items_wait_for_their_keyframes() -> None:

@@ -188,8 +188,8 @@ def test_what_was_learned_adds_up() -> None:
     shapes = [(3,), (2,), (2,), (1,), (1,), (2,), (2, 2)]
     assert [getattr(zero, name).shape for name in names] == shapes
     assert not any(getattr(zero, name).any() for name in names)
-    values = [np.array([value]) for value in (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)]
-    step = Calibration(*values, antenna=np.array([[7.0, 8.0]]))
+    values = {name: np.array([k + 1.0]) for k, name in enumerate(names[:-1])}
+    step = replace(Calibration.zero(1, 1), **values, antenna=np.array([[7.0, 8.0]]))
     twice = Calibration.zero(1, 1).plus(step).plus(step)
     assert [getattr(twice, name)[0] for name in names[:-1]] == [2, 4, 6, 8, 10, 12]
     assert twice.antenna.tolist() == [[14, 16]]

@@ -102,8 +102,8 @@ def test_the_pose_graph_of_gtsam_has_the_same_minimum_and_marginals() -> None:
     start = truth + rng.normal(0, 0.02, truth.shape)
     start[0] = truth[0]
     robot, n = np.zeros(50, dtype=int), np.arange(50)
-    edges = (odometry, closures, no_ranges())
-    problem = Problem(robot, n, start, 0, 0, *edges, priors, Doubted.none(1))
+    factors = (odometry, closures, no_ranges())
+    problem = Problem(robot, n, start, 0, 0, *factors, priors, Doubted.none(1))
     wanted = (0, 7, 48, 49)
     solution = solve(problem, marginals=wanted, tolerance=1e-12)
 

@@ -61,8 +61,9 @@ def test_wherever_it_starts_it_comes_to_the_same_answer(seed: int) -> None:
     for _ in range(2):
         away = problem.initial + rng.normal(0, 0.3, problem.initial.shape)
         away[0] = problem.initial[0]
-        began = [rng.normal(0, 0.02, n) for n in (3, 3, 3, 1, 1)]
-        start = Calibration(*began, turn=np.zeros(3), antenna=np.zeros((3, 2)))
+        names = {"bias": 3, "scale": 3, "yaw": 3, "near_bias": 1, "team_bias": 1}
+        began = {name: rng.normal(0, 0.02, n) for name, n in names.items()}
+        start = replace(nothing(problem), **began)
         ends.append(descend(Equations(replace(problem, initial=away)), start, MOST))
     one, other = ends
     assert one.converged

@@ -42,11 +42,12 @@ def somewhere(problem: Problem, seed: int, sizes: float = 1.0) -> tuple[Array, C
     rng = np.random.default_rng(seed)
     robots = len(problem.priors.scale)
     sensors = ((problem.pairs, 0.1), (robots, 0.03), (robots, 0.01), (1, 0.1), (1, 0.05))
-    known = [rng.normal(0, sizes * sigma, n) for n, sigma in sensors]
+    bias, scale, yaw, near, team = (rng.normal(0, sizes * sigma, n) for n, sigma in sensors)
     track, antenna = problem.doubted.track, problem.doubted.antenna
     # so little that the curvature of their priors is positive
     turn, beside = rng.uniform(-0.008, 0.008, robots), rng.uniform(-0.01, 0.01, (robots, 2))
-    calibration = Calibration(*known, turn=turn * track, antenna=beside * antenna[:, None])
+    mountings = turn * track, beside * antenna[:, None]
+    calibration = Calibration(bias, scale, yaw, near, team, *mountings)
     return problem.initial + rng.normal(0, sizes * 0.05, problem.initial.shape), calibration
 
 
