@@ -46,6 +46,7 @@ SLAM_ORDER = [
     "odometry",
     "robot_model",
     "graph",
+    "pose_now",
     "peer_in_range",
     "relative_pose",
     "consistency",
@@ -61,6 +62,7 @@ SLAM_ORDER = [
 
 OPTIMIZER_ORDER = [
     "bias_prior",
+    "mounting_prior",
     "problem",
     "complex_factors",
     "vertex_cover",
