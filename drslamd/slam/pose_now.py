@@ -21,7 +21,7 @@ def pose_now(
         track, noise: of this robot's odometry.
     """
     solved, known = estimate.trajectories.get(robot), estimate.covariance(robot)
-    if solved is None or known is None or not len(track) or not len(solved.n):
+    if solved is None or known is None or not len(solved.n):
         return None
     last, now = int(solved.n[-1]), track.end - 1
     if last > now or not track.covers(last, now):
