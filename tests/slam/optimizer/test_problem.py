@@ -14,6 +14,7 @@ from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.problem import (
     BetweenFactors,
     Calibration,
+    Doubted,
     OdometryFactors,
     Priors,
     RangeFactors,
@@ -82,6 +83,49 @@ def test_scale_shortens_a_link_and_yaw_rate_bends_it_over_half_of_the_way() -> N
     expected = matrix((0, 0, -yaw * way / 2)) @ [*(1 - scale) * chord[:2], 1]
     assert right[1, :2] == pytest.approx(expected[:2], abs=2 * scale * yaw)
     assert right[1, 2] == pytest.approx(turn - yaw * way)
+
+
+def test_turns_that_are_longer_turn_a_link_on_by_half_of_what_they_lack() -> None:
+    """A turn of 0.3 rad that was one of 0.36, along an arc whose chord then stands 0.03 rad more
+    to the left; in the other direction the same."""
+    chords = np.array([[2.0, 0.3, 0.3], [2.0, -0.3, -0.3], [2.0, 0.3, 0.3]])
+    one = np.zeros(3, dtype=int)
+    odometry = OdometryFactors(
+        one, one, chords, np.tile(np.eye(3), (3, 1, 1)), np.array([1, 1, 0]), np.full(3, 2.0)
+    )
+    right = corrected(odometry, replace(Calibration.zero(0, 2), turn=np.array([0.0, 0.2])))
+    for link, sign in zip(right[:2], (1, -1), strict=True):
+        expected = product((0.0, 0.0, sign * 0.03), (2.0, sign * 0.3, sign * 0.33))
+        # to first order
+        assert link == pytest.approx(expected, abs=1e-3)
+        assert link[2] == pytest.approx(sign * 0.36)
+    assert right[2] == pytest.approx(chords[2])
+
+
+def test_an_antenna_beside_its_place_moves_with_the_robot_as_it_stood() -> None:
+    """Against poses multiplied as matrices; robots stood turned against their keyframes."""
+    problem, _ = team_problem(2, robots=3, count=4)
+    poses, rng = problem.initial, np.random.default_rng(3)
+    ranges = replace(problem.ranges, turned=rng.normal(0, 0.5, problem.ranges.turned.shape))
+    antenna = np.array([[0.2, -0.1], [0.0, 0.3], [-0.2, -0.2]])
+    found = range_errors(poses, ranges, replace(Calibration.zero(3, 3), antenna=antenna), LINKTRACK)
+    for m, robots in enumerate(ranges.robots):
+        ends = []
+        for end, (k, q) in enumerate(((ranges.i, ranges.q_i), (ranges.j, ranges.q_j))):
+            turn = (*q[m], ranges.turned[m, end])
+            ends.append(product(poses[k[m]], turn, (*antenna[robots[end]], 0.0))[:2])
+        apart = float(np.hypot(*(ends[1] - ends[0])))
+        assert found.error[m] == pytest.approx(apart - ranges.measured[m])
+        arms = ends[0] - poses[ranges.i[m], :2], ends[1] - poses[ranges.j[m], :2]
+        assert (found.arm_i[m], found.arm_j[m]) == pytest.approx(tuple(complex(*a) for a in arms))
+
+
+def test_doubts_are_of_any_track_or_antenna() -> None:
+    none, one = np.zeros(2, dtype=bool), np.array([False, True])
+    assert not Doubted.none(2).any()
+    assert Doubted.none(2).track.tolist() == Doubted.none(2).antenna.tolist() == [False, False]
+    assert Doubted(one, none).any()
+    assert Doubted(none, one).any()
 
 
 @pytest.mark.parametrize("model", [LINKTRACK, RangeModel(near_reach_m=6.0)])
