@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from scipy.optimize import brentq, least_squares
@@ -192,21 +191,18 @@ def heavy_curvature(problem: Problem, x: Array) -> Array:
 
 
 def mounting_curvature(problem: Problem, x: Array) -> Array:
-    """Of the priors of turns and antennas, over all unknowns; in all directions as in that in which
-    they are off."""
-    _, c = unpacked(problem, x)
-    doubted, bends = problem.doubted, []
-    turns, antennas = c.turn[doubted.track, None], c.antenna[doubted.antenna]
-    for values, width in ((turns, TRACK), (antennas, ANTENNA)):
-        for value in values:
-            off, heavy = float(np.linalg.norm(value)), partial(cauchy_cost, width)
-            bend = (1 + len(value)) / 2 * second(heavy, off, 1e-5) / 2
-            bends += [bend + MOST**-2] * len(value)
-    return np.diag([*np.zeros(len(x) - len(bends)), *bends])
+    """Of the priors of turns and antennas, over all unknowns."""
+    doubted = problem.doubted
+    mountings = np.arange(len(x) - doubted.track.sum() - 2 * doubted.antenna.sum(), len(x))
 
+    def cost(values: Array) -> float:
+        residuals = np.array(mounting_residuals(problem, np.append(x[: mountings[0]], values)))
+        return float(residuals @ residuals)
 
-def cauchy_cost(width: float, value: float) -> float:
-    return math.log1p((value / width) ** 2)
+    out = np.zeros((len(x), len(x)))
+    if len(mountings):
+        out[np.ix_(mountings, mountings)] = curvature_of(cost, x[mountings])
+    return out
 
 
 def information_of(problem: Problem, x: Array, of_range: Array) -> Array:

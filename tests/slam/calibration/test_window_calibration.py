@@ -77,8 +77,14 @@ def mounted(seed: int, before: int) -> tuple[Window, Window]:
     antennas = np.array([0.1, 0.0]), np.array([0.0, -0.2])
     ranges = np.full(n, 5.0)
     beside = np.array([0.2, -0.1]), np.array([0.0, 0.3])
-    real = Window(t, ranges, *right, antennas[0] + beside[0], antennas[1] + beside[1])
-    return real, Window(t, ranges, *wrong, *antennas)
+    told = Window(t, ranges, wrong[0], wrong[1], antennas[0], antennas[1])
+    return replace(
+        told,
+        a_poses=right[0],
+        b_poses=right[1],
+        a_antenna=antennas[0] + beside[0],
+        b_antenna=antennas[1] + beside[1],
+    ), told
 
 
 MOUNTED = PairCalibration(

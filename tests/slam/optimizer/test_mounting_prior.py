@@ -6,8 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from dense_problems import curvature_of
 from slam_scenes import Array
 
+from drslamd.slam.optimizer.bias_prior import WEIGHT, WHOLE
 from drslamd.slam.optimizer.mounting_prior import ANTENNA, TRACK, MountingPrior
 
 PRIOR = MountingPrior(width=0.1, most=0.8)
@@ -46,36 +48,54 @@ def test_the_pull_is_half_the_derivative_of_the_cost(times: float, components: i
             assert pull[row, part] == pytest.approx(slope / 2, rel=1e-6, abs=1e-6)
 
 
-def bend(prior: MountingPrior, value: Array) -> float:
-    """Half the second derivative of the cost, outwards."""
-    h, away = 1e-4 * prior.width, value / max(float(np.linalg.norm(value)), 1e-12)
-    if not away.any():
-        away = np.eye(len(value))[0]
-    costs = [prior.cost((value + step * away)[None]) for step in (-h, 0.0, h)]
-    return (costs[0] - 2 * costs[1] + costs[2]) / (2 * h**2)
+def hessian(prior: MountingPrior, value: Array) -> Array:
+    """Half the second derivative of the cost of one value, by differences."""
+    return curvature_of(lambda v: prior.cost(v[None]), value, 1e-3 * prior.width)
 
 
-@pytest.mark.parametrize(
-    ("times", "is_bent"), [(0.0, True), (0.5, True), (0.9, True), (0.91, False)]
-)
+def off(times: float, components: int) -> Array:
+    """A value so many half widths off."""
+    direction = np.array([0.6, -0.8])[:components]
+    return np.asarray(times * PRIOR.width * direction / np.linalg.norm(direction))
+
+
+@pytest.mark.parametrize("times", [0.0, 0.5, 0.9, 0.91, 3.0])
 @pytest.mark.parametrize("components", [1, 2])
 def test_the_curvature_is_that_of_the_cost_outwards_down_to_a_tenth_of_its_weight(
-    times: float, is_bent: bool, components: int
+    times: float, components: int
 ) -> None:
-    """(1 - t^2) / (1 + t^2) meets a tenth at 0.9045 half widths."""
-    direction = np.array([0.6, -0.8])[:components]
-    value = times * PRIOR.width * direction / np.linalg.norm(direction)
+    """(1 - t^2) / (1 + t^2) meets a tenth at 0.9045 half widths; sideways all of it counts."""
+    value = off(times, components)
+    away = value / np.linalg.norm(value) if times else np.eye(components)[0]
+    whole, tails = hessian(PRIOR, value), PRIOR.most**-2
     weight = (1 + components) / 2 / (PRIOR.width**2 * (1 + times**2))
-    expected = bend(PRIOR, value) if is_bent else weight / 10 + PRIOR.most**-2
-    assert PRIOR.curvature(value[None]) == pytest.approx([expected], rel=1e-4)
-    # on the other side of that threshold the two differ
-    other = weight / 10 + PRIOR.most**-2 if is_bent else bend(PRIOR, value)
-    assert PRIOR.curvature(value[None])[0] > other * (1 + 1e-4)
+    (found,) = PRIOR.curvature(value[None])
+    outwards = float(away @ found @ away)
+    bent = float(away @ whole @ away)
+    assert outwards == pytest.approx(bent if times < 0.9045 else weight / 10 + tails, rel=1e-4)
+    assert outwards >= bent * (1 - 1e-4)
+    if components == 2:
+        side = np.array([-away[1], away[0]])
+        assert float(side @ found @ side) == pytest.approx(weight + tails, rel=1e-6)
+        assert float(side @ whole @ side) == pytest.approx(weight + tails, rel=1e-4)
+        assert float(side @ found @ away) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_the_curvature_stays_positive_however_far_off() -> None:
-    far = np.array([[0.2], [2.0], [1e3]])
-    assert (PRIOR.curvature(far) >= PRIOR.most**-2).all()
+@pytest.mark.parametrize("times", [0.0, 0.7, 4.0])
+def test_near_a_minimum_it_is_the_second_derivative_and_far_away_the_square_that_pulls_so(
+    times: float,
+) -> None:
+    value = off(times, 2)
+    (whole,) = PRIOR.curvature(value[None], WHOLE)
+    assert np.allclose(whole, hessian(PRIOR, value), rtol=1e-4, atol=1e-3)
+    (square,) = PRIOR.curvature(value[None], WEIGHT)
+    assert np.allclose(square @ value, PRIOR.pull(value[None])[0], rtol=1e-12)
+    assert np.allclose(square, square[0, 0] * np.eye(2))
+
+
+def test_the_curvature_stays_positive_definite_however_far_off() -> None:
+    far = np.array([[0.2, 0.1], [2.0, -1.0], [1e3, 1e3]])
+    assert (np.linalg.eigvalsh(PRIOR.curvature(far)) >= PRIOR.most**-2).all()
 
 
 @pytest.mark.parametrize(
@@ -96,4 +116,4 @@ def test_of_nobody_nothing_is_believed() -> None:
     none = np.zeros((0, 2))
     assert PRIOR.cost(none) == 0
     assert PRIOR.pull(none).shape == (0, 2)
-    assert PRIOR.curvature(none).shape == (0,)
+    assert PRIOR.curvature(none).shape == (0, 2, 2)

@@ -19,10 +19,17 @@ from slam_problems import (
 )
 from slam_scenes import Array
 
-from drslamd.slam.optimizer.banded import explanation, odometry_levels
+from drslamd.slam.optimizer.banded import explanation, mountings, odometry_levels
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.explanation import MUCH, Explanation, explain
-from drslamd.slam.optimizer.banded.misfit import Misfit, guessed_misfit, misfit, outlier_share, runs
+from drslamd.slam.optimizer.banded.misfit import (
+    Misfit,
+    Run,
+    guessed_misfit,
+    misfit,
+    outlier_share,
+    runs,
+)
 from drslamd.slam.optimizer.banded.mountings import Scores
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
@@ -230,6 +237,9 @@ def test_what_was_let_go_before_is_no_longer_asked_for() -> None:
     assert explain(equations, point, 60, TOLERANCE).equations is equations
 
 
+RUN = Run(0, 1, 0, 0, 10)
+
+
 class Asked:
     """What is asked of solutions, and what is answered: a model of a model that fails."""
 
@@ -244,20 +254,26 @@ class Asked:
         self.is_passed_later = False
         monkeypatch.setattr(explanation, "_checked", self.check)
         monkeypatch.setattr(explanation, "_gain", lambda *_: gain)
-        monkeypatch.setattr(explanation.mountings, "fitted", self.fitted)
-        monkeypatch.setattr(explanation.odometry_levels, "levelled", self.level)
+        monkeypatch.setattr(mountings, "fitted", self.fitted)
+        monkeypatch.setattr(odometry_levels, "levelled", self.level)
 
     def check(self, equations: Equations, point: Point) -> explanation._Check:
         none = np.zeros(2)
         is_first = equations is self.equations
-        ratio = np.array([1.0, 9.0 if is_first or not self.is_passed_later else 1.0])
+        ratio = np.array([1.0, 9.0 if is_first else 1.0 if self.is_passed_later else 8.0])
         asked = Scores(np.array([99.0, 0.0]) if is_first else none, none)
-        return explanation._Check(ratio, [], asked)
+        return explanation._Check(ratio, [RUN] if is_first else [], asked)
 
     def fitted(self, *_: object) -> tuple[Equations, Point]:
         return self.mounted, self.better
 
-    def level(self, equations: Equations, point: Point, ratio: Array, *_: object) -> Levels:
+    def level(
+        self, equations: Equations, point: Point, ratio: Array, found: list[Run], *limits: float
+    ) -> Levels:
+        # what stands out is what did so in the solution that is gone on from
+        assert ratio[1] == (9 if equations is self.equations else 8)
+        assert len(found) == (1 if equations is self.equations else 0)
+        assert limits == (60, TOLERANCE)
         self.levelled.append(equations)
         many = np.ones(len(self.problem.odometry))
         return Levels(point, 4 * many, 9 * many, equations in self.explaining)

@@ -17,7 +17,6 @@ from dense_problems import (
     range_weights,
 )
 from slam_problems import held_at, mismounted, team_problem
-from slam_scenes import Array
 
 from drslamd.slam.optimizer.banded import mountings
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
@@ -96,6 +95,8 @@ def test_scores_are_those_of_the_dense_matrices(doubted: Doubted) -> None:
     problem, truth = team_problem(3, robots=3, count=12)
     beside = ((0.0, 0.0), (0.1, 0.15), (0.0, 0.0))
     problem = mismounted(problem, truth, (0.0, 0.3, 0.0), beside, turned_sigma=0.2)
+    # the gauge is none of the first unknowns, which everybody can name by mistake
+    problem = replace(problem, gauge=17, initial=truth)
     equations, point = solved(replace(problem, doubted=doubted))
     found = scores(equations, point, weighed(equations, point))
     expected = dense_scores(equations.problem, point)
@@ -237,14 +238,25 @@ def test_mountings_are_let_go_round_by_round_but_not_for_ever(
 def test_each_round_goes_on_from_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, _ = team_problem(1, robots=2, count=10)
     equations, point = solved(problem)
-    began: list[Array] = []
+    ends, asked = [point], []
 
     def watched(e: Equations, start: Calibration, most: int, tolerance: float) -> Point:
-        began.append(e.problem.initial)
+        assert e.problem.initial is ends[-1].poses
+        assert start is ends[-1].calibration
         assert (most, tolerance) == (MOST, TOLERANCE)
-        return descend(e, start, most, tolerance)
+        ends.append(descend(e, start, most, tolerance))
+        return ends[-1]
+
+    def asking(e: Equations, p: Point, factor: BandFactor) -> Scores:
+        assert p is ends[-1]
+        asked.append(e)
+        return Scores(np.array([0.0, 99.0]), np.zeros(2))
 
     monkeypatch.setattr(mountings, "descend", watched)
-    fitted(equations, point, Scores(np.array([99.0, 0]), np.zeros(2)), MOST, TOLERANCE)
-    assert len(began) == 1
-    assert began[0] is point.poses
+    monkeypatch.setattr(mountings, "scores", asking)
+    found = Scores(np.array([99.0, 0]), np.zeros(2))
+    end, where = fitted(equations, point, found, MOST, TOLERANCE)
+    # the third time nobody asks who was not let go
+    assert len(asked) == 2
+    assert len(ends) == 3
+    assert (end, where) == (asked[-1], ends[-1])

@@ -32,6 +32,7 @@ from drslamd.slam.optimizer.banded.banded_solver import solve
 from drslamd.slam.optimizer.banded.layout import BandLayout
 from drslamd.slam.optimizer.banded.normal_equations import Equations, System
 from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE, WEIGHT, WHOLE
+from drslamd.slam.optimizer.mounting_prior import ANTENNA, TRACK
 from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem
 
 THRESHOLD = np.array([2.5, 1.5, 0.9])
@@ -133,7 +134,11 @@ def test_by_weights_the_matrix_is_nowhere_less_than_what_the_cost_can_bend() -> 
     poses, calibration = somewhere(problem, 2)
     x, prior = packed(poses, calibration, problem.doubted), problem.priors.bias
     expected = information_of(problem, x, range_weights(problem, x, THRESHOLD))
-    expected += mounting_curvature(problem, x)
+    mountings = ((doubted_turns(problem), TRACK), (doubted_antennas(problem), ANTENNA))
+    for numbers, believed in mountings:
+        for at in numbers:
+            weight = (1 + len(at)) / 2 / (believed.width**2 + float(x[at] @ x[at]))
+            expected[at, at] += weight + believed.most**-2
     first, team = 3 * len(poses), float(calibration.team_bias[0])
     own = calibration.bias - team
     held = (3 + 3) / (3 * prior.spread**2 + float(own @ own)) + prior.sigma**-2
@@ -147,6 +152,18 @@ def test_by_weights_the_matrix_is_nowhere_less_than_what_the_cost_can_bend() -> 
     equations = Equations(problem)
     system, _ = equations.at(point_at(problem, poses, calibration, THRESHOLD), WEIGHT)
     assert close(dense(system, equations.layout), expected, 1e-5)
+
+
+def doubted_turns(problem: Problem) -> list[list[int]]:
+    """Where they are in the order of `packed`, one by one."""
+    first = int(bias_places(problem)[-1]) + 1
+    return [[first + k] for k in range(int(problem.doubted.track.sum()))]
+
+
+def doubted_antennas(problem: Problem) -> list[list[int]]:
+    first = int(bias_places(problem)[-1]) + 1 + int(problem.doubted.track.sum())
+    count = int(problem.doubted.antenna.sum())
+    return [[first + 2 * k, first + 2 * k + 1] for k in range(count)]
 
 
 def close(found: Array, expected: Array, tolerance: float) -> bool:
@@ -240,6 +257,17 @@ def test_priors_are_added_where_their_unknowns_stand() -> None:
     assert np.diag(system.corner).tolist() == [0, 3, 0, 0]
     assert not system.band[1:].any()
     assert not system.border.any()
+
+
+def test_groups_of_unknowns_of_the_border_are_held_each_by_its_own_matrix() -> None:
+    system = System(np.zeros((3, 3)), np.zeros((3, 5)), np.ones((5, 5)))
+    blocks = np.array([[[4.0, 1.0], [1.0, 3.0]], [[5.0, 2.0], [2.0, 6.0]]])
+    system.add_blocks(np.array([[3, 7], [4, 5]]), blocks)
+    expected = np.ones((5, 5))
+    expected[np.ix_([0, 4], [0, 4])] += blocks[0]
+    expected[np.ix_([1, 2], [1, 2])] += blocks[1]
+    assert np.array_equal(system.corner, expected)
+    assert not system.band.any()
 
 
 def test_unknowns_are_held_beside_one_other() -> None:
