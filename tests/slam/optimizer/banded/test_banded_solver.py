@@ -23,6 +23,7 @@ from slam_problems import (
     BIAS,
     held_at,
     links_of,
+    mismounted,
     no_ranges,
     pose_edges,
     slipping,
@@ -54,6 +55,49 @@ def loose(problem: Problem) -> Problem:
 
 
 # ---- the minimum ----
+
+
+def test_with_mountings_in_doubt_the_solution_is_that_of_a_dense_solver_too() -> None:
+    problem, truth = team_problem(
+        6, robots=2, count=8, range_error=0.01, link_sigma=(0.004, 0.004, 0.001)
+    )
+    beside = ((0.0, 0.0), (0.4, 0.3))
+    problem = mismounted(held_at(problem, truth), truth, (0.5, 0.0), beside, turned_sigma=0.2)
+    doubted = Doubted(np.array([True, False]), np.array([False, True]))
+    problem = replace(problem, doubted=doubted)
+    solution = solve(problem, tolerance=1e-10, most=100)
+    x, _ = dense_solution(problem)
+    poses, known = unpacked(problem, x)
+    assert solution.converged
+    assert np.abs(solution.poses[:, :2] - poses[:, :2]).max() < 1e-4
+    assert solution.calibration.turn == pytest.approx(known.turn, abs=1e-4)
+    assert solution.calibration.antenna == pytest.approx(known.antenna, abs=1e-4)
+    assert abs(known.turn[0]) > 0.1
+    assert np.abs(known.antenna[1]).min() > 0.1
+
+
+def test_a_track_that_is_far_off_is_let_go_and_said() -> None:
+    """Beside who stays as configured; what is claimed of poses and turn is true."""
+    problem, truth = team_problem(7, robots=3, count=120)
+    problem = mismounted(held_at(problem, truth), truth, (0.0, 0.35, 0.0))
+    last = 3 * 119 + 1
+    solution = solve(problem, marginals=(last,))
+    assert solution.converged
+    assert solution.is_explained
+    assert solution.doubted.track.tolist() == [False, True, False]
+    assert not solution.doubted.antenna.any()
+    assert solution.spread is not None
+    off = solution.calibration.turn[1] - 0.35
+    assert abs(off) < 3 * solution.spread.turn[1] < 0.15
+    error = solution.poses[last] - truth[last]
+    error[2] = math.remainder(error[2], 2 * math.pi)
+    assert error @ np.linalg.solve(solution.joint, error) < 14.2
+    assert (solution.odometry_level == 1).all()
+    assert solution.feared_level.min() >= 1
+    assert solution.feared_level.max() < 1.5
+    plain = solve(team_problem(7, robots=3, count=120)[0])
+    assert not plain.doubted.any()
+    assert (plain.calibration.turn == 0).all()
 
 
 @pytest.mark.parametrize(("seed", "robots"), [(0, 2), (1, 2), (2, 3)])
@@ -177,6 +221,8 @@ def test_where_somebody_slipped_the_solution_is_the_one_that_explains_it() -> No
     slipped = links_of(problem, 1, 25, 31)
     assert solution.odometry_level[slipped].min() > 10
     assert np.median(solution.odometry_level) == 1
+    assert (solution.feared_level >= solution.odometry_level).all()
+    assert not solution.doubted.any()
     error = solution.poses - truth
     error[:, 2] = np.angle(np.exp(1j * error[:, 2]))
     assert np.hypot(*error[:, :2].T).max() < 0.7

@@ -10,6 +10,7 @@ from dense_problems import link_misfit, packed
 from slam_problems import CLOCKS, no_ranges, pose_edges, team_problem
 from slam_scenes import Array
 
+from drslamd.slam.optimizer.banded import misfit as misfit_module
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.misfit import (
     OF_RUN,
@@ -25,7 +26,7 @@ from drslamd.slam.optimizer.banded.misfit import (
 from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
-from drslamd.slam.optimizer.problem import Calibration, Problem
+from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem
 
 
 def solved(problem: Problem) -> tuple[Equations, Point]:
@@ -50,12 +51,19 @@ def far_edges() -> Problem:
 # ---- squares, and what could be checked ----
 
 
-@pytest.mark.parametrize("kind", ["band", "border"])
+def mounted() -> Problem:
+    """A track and an antenna are unknowns."""
+    problem, _ = team_problem(1, robots=3, count=7)
+    return replace(problem, doubted=Doubted(np.arange(3) == 1, np.arange(3) == 2))
+
+
+@pytest.mark.parametrize("kind", ["band", "border", "mountings"])
 def test_misfit_is_that_of_the_dense_matrices(kind: str) -> None:
-    problem = team_problem(1, robots=3, count=7)[0] if kind == "band" else far_edges()
+    problem = team_problem(1, robots=3, count=7)[0]
+    problem = {"band": problem, "border": far_edges(), "mountings": mounted()}[kind]
     equations, point = solved(problem)
     found = misfit(equations, point, weighed(equations, point))
-    x = packed(point.poses, point.calibration)
+    x = packed(point.poses, point.calibration, problem.doubted)
     squares, checked = link_misfit(problem, x, point.threshold)
     assert found.squares == pytest.approx(squares, rel=1e-4, abs=1e-6)
     assert found.checked == pytest.approx(checked, abs=1e-4)
@@ -74,6 +82,21 @@ def test_a_guess_of_what_a_robot_could_check_is_near_and_always_the_same() -> No
         assert sums[1] == pytest.approx(sums[0], abs=0.15 * sums[0] + 1)
     assert guess.ratio(robot, 3) == pytest.approx(exact.ratio(robot, 3), rel=0.2)
     assert np.array_equal(guessed_misfit(equations, point, factor).checked, guess.checked)
+
+
+@pytest.mark.parametrize("doubted", [Doubted.none(3), Doubted(np.arange(3) == 1, np.arange(3) < 2)])
+def test_with_many_signs_a_guess_is_what_is_computed(
+    doubted: Doubted, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The gauge is none of the first unknowns, which everybody can name by mistake."""
+    problem, _ = team_problem(2, robots=3, count=20)
+    equations, point = solved(replace(problem, gauge=25, doubted=doubted))
+    factor, robot = weighed(equations, point), problem.odometry.robot
+    monkeypatch.setattr(misfit_module, "PROBES", 4000)
+    sums = [
+        np.bincount(robot, of(equations, point, factor).checked) for of in (misfit, guessed_misfit)
+    ]
+    assert sums[1] == pytest.approx(sums[0], rel=0.05)
 
 
 @pytest.mark.parametrize("is_guessed", [False, True])

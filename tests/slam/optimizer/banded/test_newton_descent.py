@@ -144,6 +144,19 @@ def test_from_poses_a_third_of_a_radian_off_it_takes_few_steps(seed: int) -> Non
     assert point.converged
 
 
+def test_a_step_counts_as_long_as_it_moves_a_bias_or_an_antenna() -> None:
+    """Of what else is learned the units are others."""
+    step = Calibration.zero(2, 2)
+    assert newton_descent._metres_of_sensors(step) == 0
+    step.scale[:], step.yaw[:], step.turn[:], step.near_bias[:] = 9, 9, 9, 9
+    assert newton_descent._metres_of_sensors(step) == 0
+    step.bias[1] = -0.3
+    assert newton_descent._metres_of_sensors(step) == 0.3
+    step.antenna[1, 0] = -0.4
+    assert newton_descent._metres_of_sensors(step) == 0.4
+    assert newton_descent._metres_of_sensors(Calibration.zero(0, 0)) == 0
+
+
 def test_where_many_ranges_are_outliers_the_last_steps_shrink_fast_too() -> None:
     """Robots that were stuck, so that Cauchy's cost bends down where many ranges are: by a tenth of
     their weight it took 86 steps."""

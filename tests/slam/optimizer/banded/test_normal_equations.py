@@ -188,6 +188,23 @@ def test_at_the_solution_the_matrix_is_nearly_the_derivative_of_the_gradient() -
     assert close(dense(system, equations.layout), hessian, 0.03)
 
 
+def test_equations_of_another_belief_share_where_all_stands_and_are_the_same_as_new_ones() -> None:
+    problem = small(3)
+    links = problem.odometry
+    other = replace(problem, odometry=replace(links, covariance=4 * links.covariance))
+    first = Equations(problem)
+    shared, fresh = Equations(other, like=first), Equations(other)
+    assert shared.layout is first.layout
+    point = point_at(problem, *somewhere(problem, 2), THRESHOLD)
+    assert shared.cost(point, THRESHOLD) == fresh.cost(point, THRESHOLD)
+    (one, pull), (two, same_pull) = (equations.at(point) for equations in (shared, fresh))
+    assert np.array_equal(one.band, two.band)
+    assert np.array_equal(one.border, two.border)
+    assert np.array_equal(one.corner, two.corner)
+    assert np.array_equal(pull, same_pull)
+    assert shared.cost(point, THRESHOLD) < first.cost(point, THRESHOLD)
+
+
 # ---- what may be claimed, and what weighs ----
 
 
