@@ -18,6 +18,7 @@ from drslamd.slam.consistency.pair import Checked, PairTracker
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import ClosureMeasurement, Keyframe, RangeMeasurement
 from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.dead_reckoning import DeadReckoning
 from drslamd.slam.odometry.track import RESOLUTION
 from drslamd.slam.peer_in_range import PeerInRange
@@ -232,6 +233,17 @@ class FrontEnd:
         """What was learned, where it serves modules 1 and 2."""
         return estimate if self._method.uses_calibration else None
 
+    def _corrections(
+        self, estimate: TeamEstimate | None, peer: int
+    ) -> tuple[Correction, Correction] | None:
+        """Of our odometry and a peer's; a solution that was not reached says nothing of them, and
+        nothing that was found along corrected tracks is given up for it."""
+        team = self._used(estimate)
+        if team is None or not team.converged:
+            return None
+        known = PairCalibration.of(team, self._own.robot, peer)
+        return known.a.correction, known.b.correction
+
     # ---- module 2 ----
 
     def module2(
@@ -248,8 +260,7 @@ class FrontEnd:
             data = graph.chains.get(robot)
             if own is None or data is None or data.chain != pair.peer:
                 continue
-            known = PairCalibration.of(self._used(estimate), self._own.robot, robot)
-            corrections = known.a.correction, known.b.correction
+            corrections = self._corrections(estimate, robot)
             job = pair.begin_check(own, data, self.model.noise, corrections)
             if job is not None:
                 out.append((pair, job))

@@ -345,6 +345,15 @@ def test_a_correction_that_changes_the_way_begins_a_new_set(
     assert all(kept for _, kept in pair.told())
 
 
+def test_where_nothing_is_said_of_odometry_it_is_as_it_was_before() -> None:
+    pair = Circling()
+    pair.see_all(Circling.KNOWN, 5)
+    a, b = pair.true[5]
+    pair.answer(60, tuple(product(inverted(a), b)))
+    pair.check()
+    assert pair.kept() == [0, 1, 2, 3, 4, 5]
+
+
 def test_while_a_check_runs_a_correction_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     pair = Circling()
     a, b = pair.true[0]
