@@ -262,7 +262,7 @@ def turned_at(keyframes: KeyframeTable, n: Index, q: Array) -> Array:
         length = np.maximum((way[:, :2] ** 2).sum(axis=1), TINY)
         share = np.clip((way[:, :2] * q).sum(axis=1) / length, 0, MOST_OF_WAY)
         beside = np.hypot(*(q - share[:, None] * way[:, :2]).T)
-        is_there = (other != k) & (keyframes.segment[other] == keyframes.segment[k])
+        is_there = keyframes.segment[other] == keyframes.segment[k]
         is_nearer = is_there & (beside < nearest)
         out[is_nearer] = (share * se2.wrap(way[:, 2]))[is_nearer]
         nearest[is_nearer] = beside[is_nearer]
