@@ -234,6 +234,8 @@ def stood(n: int, place: tuple[float, float], segments: list[int] | None = None)
         (20, (1.41, 0.41), -0.59 * 0.5),
         # farther than most of the way it was not
         (20, (1.2, 0.2), -0.6 * 0.5),
+        # on from there it would be a way that it did not go
+        (20, (2.25, 1.25), 0.0),
         # the last turned on the spot, of which a place says nothing
         (30, (2.0, 1.0), 0.0),
         (0, (0.25, 0.0), 0.0),
