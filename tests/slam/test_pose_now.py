@@ -47,7 +47,7 @@ def known(noise: OdometryNoise = NOISE, team: TeamEstimate | None = None) -> Pos
     return found
 
 
-# ---- where ----
+# where
 
 
 def test_it_is_the_last_solved_pose_and_the_way_of_the_track_since_then() -> None:
@@ -106,7 +106,7 @@ def test_across_a_hole_the_way_is_not_known(hole: int, is_led: bool) -> None:
     assert (found is not None) is is_led
 
 
-# ---- how sure ----
+# how sure
 
 
 def test_who_stands_is_as_sure_as_the_solution() -> None:

@@ -47,7 +47,7 @@ def test_what_nobody_has_learned_is_as_uncertain_as_can_be() -> None:
     assert TeamEstimate(Segment(4, 1, 0), {}).team_bias_m == Learned()
 
 
-# ---- pairs ----
+# pairs
 
 POSES = {4: np.array([1.0, 2.0, 0.5]), 9: np.array([-3.0, 4.0, -2.5]), 2: np.array([0.5, 0, 3.0])}
 
@@ -117,7 +117,7 @@ def test_of_pairs_with_a_robot_of_which_nothing_is_claimed_nothing_is_known() ->
     assert team.relative(4, 7) is None
 
 
-# ---- wheels ----
+# wheels
 
 
 def test_what_was_learned_of_the_wheels_corrects_odometry() -> None:

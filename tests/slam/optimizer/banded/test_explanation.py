@@ -68,7 +68,7 @@ def worst(point: Point, truth: Array) -> float:
     return float(np.hypot(*(point.poses - truth)[:, :2].T).max())
 
 
-# ---- as configured ----
+# as configured
 
 
 @pytest.mark.parametrize("seed", [1, 2, 7])
@@ -138,7 +138,7 @@ def test_of_poses_that_nothing_holds_nothing_is_asked() -> None:
     assert (found.feared == 1).all()
 
 
-# ---- odometry that was worse for a while ----
+# odometry that was worse for a while
 
 
 @pytest.mark.parametrize(("times", "is_raised"), [(1.001, False), (0.999, True)])
@@ -194,7 +194,7 @@ def test_who_slipped_is_believed_less_by_sigmas_as_it_was_seen_and_by_variances_
     assert worst(found.point, truth) < 0.7
 
 
-# ---- mountings ----
+# mountings
 
 
 def long_team() -> tuple[Problem, Array]:

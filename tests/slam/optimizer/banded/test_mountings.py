@@ -51,7 +51,7 @@ def doubts(track: tuple[int, ...] = (), antenna: tuple[int, ...] = (), robots: i
     return Doubted(np.isin(number, track), np.isin(number, antenna))
 
 
-# ---- scores ----
+# scores
 
 
 def dense_scores(problem: Problem, point: Point) -> Scores:
@@ -160,7 +160,7 @@ def test_of_a_system_that_cannot_be_solved_nothing_asks() -> None:
     assert found.track.tolist() == found.antenna.tolist() == [0, 0]
 
 
-# ---- who is let go ----
+# who is let go
 
 
 @pytest.mark.parametrize(("score", "asks"), [(29.9, False), (30.1, True)])
