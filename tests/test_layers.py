@@ -49,6 +49,7 @@ SLAM_ORDER = [
     "odometry",
     "robot_model",
     "graph",
+    "pose_now",
     "peer_in_range",
     "relative_pose",
     "consistency",
@@ -60,6 +61,7 @@ SLAM_ORDER = [
     "pose_now",
     "range_watch",
     "doubt",
+    "keyframe_selector",
     "front_end",
     "back_end",
 ]
@@ -67,6 +69,7 @@ SLAM_ORDER = [
 
 OPTIMIZER_ORDER = [
     "bias_prior",
+    "mounting_prior",
     "problem",
     "complex_factors",
     "vertex_cover",
@@ -78,7 +81,7 @@ OPTIMIZER_ORDER = [
 ]
 """Inside module 3: the three solvers know what is common to them."""
 
-KNOWS_CONFIG = {"front_end", "back_end", "settings"}
+KNOWS_CONFIG = {"keyframe_selector", "front_end", "back_end", "settings"}
 """Where the configuration ends; rooms get numbers."""
 
 MAX_MODULES = 16

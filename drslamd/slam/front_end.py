@@ -6,8 +6,6 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import NamedTuple
 
-import numpy as np
-
 from drslamd.config import Config
 from drslamd.conventions import SECOND_US, Chain
 from drslamd.sensors.samples import Motion, RangeSample
@@ -18,8 +16,9 @@ from drslamd.slam.consistency.pair import Checked, PairTracker
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import ClosureMeasurement, Keyframe, RangeMeasurement
 from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.keyframe_selector import KeyframeSelector
+from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.dead_reckoning import DeadReckoning
-from drslamd.slam.odometry.track import RESOLUTION
 from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.range_model import RangeNoise
 from drslamd.slam.range_watch import Partner, RangeWatch
@@ -32,11 +31,6 @@ from drslamd.slam.relative_pose.window_request import WindowRequest, request
 from drslamd.slam.se2 import Array
 from drslamd.slam.tuning import DEFAULTS, Tuning
 
-KEYFRAME_M = 0.05
-"""A robot that moved less than this since its last keyframe, and turned less than `KEYFRAME_RAD`,
-makes no new one."""
-KEYFRAME_RAD = 0.05
-"""See `KEYFRAME_M`."""
 MAX_UWB_IDS = 64
 """Modules whose ranges are remembered, 2 MB; a radio cell holds no more."""
 RANGES_FRESH_US = 3 * SECOND_US
@@ -100,9 +94,7 @@ class FrontEnd:
         self.ranges: dict[int, RangeBuffer] = {}
         self.pairs: dict[int, PairTracker] = {}
         self.watch = RangeWatch(section.range_sigma_m, tuning.ranges)
-        self._segment = 0
-        self._segment_start: int | None = None
-        self._last: Keyframe | None = None
+        self._keyframes = KeyframeSelector()
 
     # ---- sensors ----
 
@@ -129,31 +121,9 @@ class FrontEnd:
         """UWB ids to which ranges came in of late."""
         return [u for u, b in self.ranges.items() if b.is_fresh(utime, RANGES_FRESH_US)]
 
-    # ---- keyframes ----
-
     def make_keyframe(self, is_doubted: bool = False) -> Keyframe | None:
-        """The latest sample of our odometry, if we moved since the last keyframe.
-
-        Args:
-            is_doubted: who may move though its wheels say nothing has a place of its own each time.
-        """
-        track = self.reckoning.track
-        if not len(track):
-            return None
-        if self._segment_start is not None and track.segment_start > self._segment_start:
-            self._segment += 1
-            self._last = None
-        self._segment_start = track.segment_start
-        n = track.end - 1
-        x, y, theta = (int(v) for v in track.steps(n, 1)[0])
-        if self._last is not None:
-            last = self._last
-            moved = np.array([x - last.x, y - last.y, theta - last.theta]) * RESOLUTION
-            is_still = np.hypot(moved[0], moved[1]) < KEYFRAME_M and abs(moved[2]) < KEYFRAME_RAD
-            if is_still and (n == last.n or not is_doubted):
-                return None
-        self._last = Keyframe(n, self._segment, x, y, theta)
-        return self._last
+        """See `KeyframeSelector.next`."""
+        return self._keyframes.next(self.reckoning.track, is_doubted)
 
     # ---- pairs ----
 
@@ -275,6 +245,17 @@ class FrontEnd:
         """What was learned, where it serves modules 1 and 2."""
         return estimate if self._method.uses_calibration else None
 
+    def _corrections(
+        self, pair: PairTracker, estimate: TeamEstimate | None
+    ) -> tuple[Correction, Correction] | None:
+        """Of our odometry and a peer's; a solution that was not reached says nothing of them, and
+        nothing that was found along corrected tracks is given up for it."""
+        team = self._used(estimate)
+        if pair.search.found is None and (team is None or not team.converged):
+            return None
+        known = self._calibration(pair, estimate)
+        return known.a.correction, known.b.correction
+
     def what_if(
         self, neighbours: list[PeerInRange], graph: PoseGraph, utime: int
     ) -> list[WhatIfJob]:
@@ -311,8 +292,7 @@ class FrontEnd:
             data = graph.chains.get(robot)
             if own is None or data is None or data.chain != pair.peer:
                 continue
-            known = self._calibration(pair, estimate)
-            corrections = known.a.correction, known.b.correction
+            corrections = self._corrections(pair, estimate)
             job = pair.begin_check(own, data, self.model.noise, corrections)
             if job is not None:
                 out.append((pair, job))

@@ -21,10 +21,10 @@ def pose_now(
         track, noise: of this robot's odometry.
     """
     solved, known = estimate.trajectories.get(robot), estimate.covariance(robot)
-    if solved is None or known is None or not len(track) or not len(solved.n):
+    if solved is None or known is None or not len(solved.n):
         return None
     last, now = int(solved.n[-1]), track.end - 1
-    if not track.covers(last, now):
+    if last > now or not track.covers(last, now):
         return None
     way = estimate.correction(robot).path(track.poses[last - track.n0 : now - track.n0 + 1])
     step = se2.between(way[:1], way)

@@ -10,25 +10,40 @@ import numpy as np
 from scipy.optimize import brentq, least_squares
 from slam_scenes import Array
 
-from drslamd.slam.optimizer.banded.layout import BandLayout
+from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout
 from drslamd.slam.optimizer.banded.normal_equations import GAUGE_SIGMA, System
-from drslamd.slam.optimizer.problem import Calibration, Problem
+from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem
 from drslamd.slam.range_model import LINKTRACK
 
 CUT = 2.5
 """Sigmas at which a range has half of its weight."""
+TRACK, ANTENNA, MOST = 0.01, 0.02, 0.5
+"""Half widths of what is believed of turns and antennas, a fraction and m, and their tails."""
 
 
-def packed(poses: Array, c: Calibration) -> Array:
-    """All unknowns in one vector: poses, biases, scales, yaw rates, near-range and common bias."""
-    return np.concatenate([poses.ravel(), c.bias, c.scale, c.yaw, c.near_bias, c.team_bias])
+def packed(poses: Array, c: Calibration, doubted: Doubted | None = None) -> Array:
+    """All unknowns in one vector: poses, biases, scales, yaw rates, near-range and common bias,
+    then the turns and antennas that are in doubt."""
+    known = [poses.ravel(), c.bias, c.scale, c.yaw, c.near_bias, c.team_bias]
+    if doubted is not None:
+        known += [c.turn[doubted.track], c.antenna[doubted.antenna].ravel()]
+    return np.concatenate(known)
 
 
 def unpacked(problem: Problem, x: Array) -> tuple[Array, Calibration]:
-    robots = len(problem.priors.scale)
-    ends = np.cumsum([3 * len(problem.initial), problem.pairs, robots, robots, 1])
-    poses, *sensors = np.split(x, ends)
-    return poses.reshape(-1, 3), Calibration(*sensors)
+    robots, doubted = len(problem.priors.scale), problem.doubted
+    sizes = [3 * len(problem.initial), problem.pairs, robots, robots, 1, 1, doubted.track.sum()]
+    poses, *sensors, turns, antennas = np.split(x, np.cumsum(sizes))
+    turn, antenna = np.zeros(robots), np.zeros((robots, 2))
+    turn[doubted.track], antenna[doubted.antenna] = turns, antennas.reshape(-1, 2)
+    bias, scale, yaw, near, team = sensors
+    return poses.reshape(-1, 3), Calibration(bias, scale, yaw, near, team, turn, antenna)
+
+
+def point_at(problem: Problem, poses: Array, c: Calibration, threshold: Array) -> Point:
+    """A point where ranges lose weight at thresholds of the test's own."""
+    return replace(Point.of(problem, poses, c), threshold=threshold)
 
 
 # ---- residuals ----
@@ -39,7 +54,7 @@ def link_residuals(problem: Problem, x: Array) -> list[float]:
     poses, c = unpacked(problem, x)
     links, closures = problem.odometry, problem.closures
     mx, my, mt = links.measured.T
-    s, b = c.scale[links.robot], c.yaw[links.robot] * links.path
+    s, b = c.scale[links.robot], c.yaw[links.robot] * links.path - c.turn[links.robot] * mt
     right = np.stack([(1 - s) * mx + b / 2 * my, (1 - s) * my - b / 2 * mx, mt - b], axis=1)
     return [
         *whitened(poses[links.i], poses[links.j], right, links.covariance),
@@ -63,13 +78,17 @@ def range_residuals(problem: Problem, x: Array) -> list[float]:
     poses, c = unpacked(problem, x)
     r = problem.ranges
     ends = []
-    for k, q in ((r.i, r.q_i), (r.j, r.q_j)):
-        cos, sin = np.cos(poses[k, 2]), np.sin(poses[k, 2])
-        across = np.stack([cos * q[:, 0] - sin * q[:, 1], sin * q[:, 0] + cos * q[:, 1]], axis=1)
-        ends.append(poses[k, :2] + across)
+    for end, (k, q) in enumerate(((r.i, r.q_i), (r.j, r.q_j))):
+        beside = rotated(c.antenna[r.robots[:, end]], r.turned[:, end])
+        ends.append(poses[k, :2] + rotated(q + beside, poses[k, 2]))
     near = c.near_bias[0] * np.exp(-r.measured / LINKTRACK.near_reach_m)
     seen = np.hypot(*(ends[1] - ends[0]).T) + c.bias[r.pair] + near
     return [float(v) for v in (seen - r.measured) / r.sigma]
+
+
+def rotated(q: Array, angle: Array) -> Array:
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.stack([cos * q[:, 0] - sin * q[:, 1], sin * q[:, 0] + cos * q[:, 1]], axis=1)
 
 
 def cauchy_root(e: float, c: float) -> float:
@@ -106,12 +125,24 @@ def heavy_residuals(problem: Problem, x: Array) -> list[float]:
     return [float(v) for v in out]
 
 
+def mounting_residuals(problem: Problem, x: Array) -> list[float]:
+    """Of turns and antennas, Cauchy's of one and of two components, with Gauss's tails."""
+    _, c = unpacked(problem, x)
+    out = []
+    for values, width in ((c.turn[:, None], TRACK), (c.antenna, ANTENNA)):
+        for value in values:
+            # half of what Student's distribution of one degree of freedom costs
+            out += [*(student_roots(value, width, 1.0) / math.sqrt(2)), *(value / MOST)]
+    return [float(v) for v in out]
+
+
 def residual_vector(problem: Problem, x: Array, threshold: Array) -> Array:
     """Whose sum of squares is the cost, one residual after the other."""
     c = threshold[problem.ranges.pair]
     ranges = [cauchy_root(*pair) for pair in zip(range_residuals(problem, x), c, strict=True)]
     parts = link_residuals(problem, x) + ranges
-    return np.array(parts + heavy_residuals(problem, x) + gaussian_residuals(problem, x))
+    parts += heavy_residuals(problem, x) + mounting_residuals(problem, x)
+    return np.array(parts + gaussian_residuals(problem, x))
 
 
 # ---- derivatives ----
@@ -145,14 +176,32 @@ def curvature_of(f: Callable[[Array], float], x: Array, h: float = 3e-5) -> Arra
 
 def heavy_curvature(problem: Problem, x: Array) -> Array:
     """Of the priors of biases and scales, over all unknowns."""
-    sensors = np.arange(3 * len(problem.initial), len(x))
+    first = 3 * len(problem.initial)
+    sensors = np.arange(first, first + problem.pairs + 2 * len(problem.priors.scale) + 2)
 
     def cost(values: Array) -> float:
-        residuals = np.array(heavy_residuals(problem, np.append(x[: sensors[0]], values)))
+        moved = x.copy()
+        moved[sensors] = values
+        residuals = np.array(heavy_residuals(problem, moved))
         return float(residuals @ residuals)
 
     out = np.zeros((len(x), len(x)))
     out[np.ix_(sensors, sensors)] = curvature_of(cost, x[sensors])
+    return out
+
+
+def mounting_curvature(problem: Problem, x: Array) -> Array:
+    """Of the priors of turns and antennas, over all unknowns."""
+    doubted = problem.doubted
+    mountings = np.arange(len(x) - doubted.track.sum() - 2 * doubted.antenna.sum(), len(x))
+
+    def cost(values: Array) -> float:
+        residuals = np.array(mounting_residuals(problem, np.append(x[: mountings[0]], values)))
+        return float(residuals @ residuals)
+
+    out = np.zeros((len(x), len(x)))
+    if len(mountings):
+        out[np.ix_(mountings, mountings)] = curvature_of(cost, x[mountings])
     return out
 
 
@@ -176,21 +225,43 @@ def range_weights(problem: Problem, x: Array, threshold: Array) -> Array:
 
 
 def claimed_information(problem: Problem, x: Array, threshold: Array, claims: Array) -> Array:
-    """Ranges so many times less certain, and every prior as wide as configured."""
+    """Ranges so many times less certain, and every prior as wide as configured; but those of
+    mountings are as they are believed."""
     weights = range_weights(problem, x, threshold) / claims[problem.ranges.pair] ** 2
-    information = information_of(problem, x, weights)
-    first, priors = 3 * len(problem.initial), problem.priors
-    sigmas = [*np.full(problem.pairs, priors.bias.sigma), *priors.scale]
-    at = first + np.arange(len(sigmas))
-    information[at, at] += np.array(sigmas) ** -2.0
-    information[-1, -1] += priors.bias.sigma**-2
+    information = information_of(problem, x, weights) + mounting_curvature(problem, x)
+    biases, scales = bias_places(problem), scale_places(problem)
+    information[biases, biases] += problem.priors.bias.sigma**-2
+    information[scales, scales] += problem.priors.scale**-2.0
     return information
+
+
+def learned_information(problem: Problem, x: Array, threshold: Array, claims: Array) -> Array:
+    """The same, but that biases resemble each other."""
+    information = claimed_information(problem, x, threshold, claims)
+    biases = bias_places(problem)
+    information[biases, biases] -= problem.priors.bias.sigma**-2
+    at = np.ix_(biases, biases)
+    information[at] += heavy_curvature(problem, x)[at]
+    return information
+
+
+def bias_places(problem: Problem) -> Array:
+    """Of the bias of each pair and of what is common, in the order of `packed`."""
+    first = 3 * len(problem.initial)
+    team = first + problem.pairs + 2 * len(problem.priors.scale) + 1
+    return np.array([*range(first, first + problem.pairs), team])
+
+
+def scale_places(problem: Problem) -> Array:
+    first = 3 * len(problem.initial) + problem.pairs
+    return np.arange(first, first + len(problem.priors.scale))
 
 
 def link_misfit(problem: Problem, x: Array, threshold: Array) -> tuple[Array, Array]:
     """(m,) of each link of odometry: its squares, and how far the rest could check it."""
     information = information_of(problem, x, range_weights(problem, x, threshold))
-    covariance = np.linalg.inv(information + heavy_curvature(problem, x))
+    information += heavy_curvature(problem, x) + mounting_curvature(problem, x)
+    covariance = np.linalg.inv(information)
     m = len(problem.odometry)
     errors = np.array(link_residuals(problem, x))[: 3 * m].reshape(m, 3)
     ways = jacobian(lambda v: link_residuals(problem, v)[: 3 * m], x).reshape(m, 3, -1)
@@ -223,7 +294,7 @@ def thresholds(problem: Problem, x: Array) -> Array:
 def dense_solution(problem: Problem) -> tuple[Array, Array]:
     """The unknowns and thresholds that go together, by scipy, from the same poses."""
     robots = len(problem.priors.scale)
-    x = packed(problem.initial, Calibration.zero(problem.pairs, robots))
+    x = packed(problem.initial, Calibration.zero(problem.pairs, robots), problem.doubted)
     for _ in range(12):
         c = thresholds(problem, x)
         found = least_squares(
@@ -256,7 +327,9 @@ def matrix_of(system: System) -> Array:
 def places(layout: BandLayout) -> Array:
     """Where the unknowns of `packed` stand in a layout."""
     sensors = [layout.bias, layout.scale, layout.yaw, layout.near_bias, layout.team_bias]
-    return np.concatenate([layout.poses.ravel(), *sensors])
+    mountings = np.concatenate([layout.turn, layout.antenna.ravel()])
+    known = mountings[mountings != NOWHERE]
+    return np.concatenate([layout.poses.ravel(), *sensors, known])
 
 
 def known_exactly(problem: Problem) -> Problem:

@@ -11,6 +11,7 @@ from slam_scenes import Array, inverted, product, wander
 from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.problem import (
     BetweenFactors,
+    Doubted,
     OdometryFactors,
     Priors,
     Problem,
@@ -50,7 +51,15 @@ def pose_edges(
 def no_ranges() -> RangeFactors:
     none = np.zeros(0, dtype=np.int64)
     return RangeFactors(
-        none, none, np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0), none
+        none,
+        none,
+        np.zeros((0, 2)),
+        np.zeros((0, 2)),
+        np.zeros(0),
+        np.zeros(0),
+        none,
+        np.zeros((0, 2), dtype=np.int64),
+        np.zeros((0, 2)),
     )
 
 
@@ -114,6 +123,8 @@ def team_problem(
         table[:, 6] + range_error * rng.normal(size=len(table)),
         np.full(len(table), 0.05),
         table[:, 7].astype(int),
+        table[:, :2].astype(int) % robots,
+        np.zeros((len(table), 2)),
     )
     joined = [(robots * k, robots * k + 1) for k in np.linspace(1, count - 2, closures).astype(int)]
     priors = Priors(
@@ -135,6 +146,7 @@ def team_problem(
         closures=pose_edges(rng, truth, [(int(i), int(j)) for i, j in joined], (0.05, 0.05, 0.03)),
         ranges=ranges,
         priors=priors,
+        doubted=Doubted.none(robots),
         range_sigma=0.05,
     )
     return problem, truth
@@ -170,6 +182,48 @@ def slipping(problem: Problem, robot: int, first: int, last: int) -> Problem:
     """Wheels that turn two and a half times as fast as the robot drives."""
     links = links_of(problem, robot, first, last)
     return mismeasured(problem, links, problem.odometry.measured[links] * [2.5, 2.5, 1])
+
+
+def mismounted(
+    problem: Problem,
+    truth: Array,
+    turn: tuple[float, ...] | None = None,
+    antenna: tuple[tuple[float, float], ...] | None = None,
+    turned_sigma: float = 0.0,
+) -> Problem:
+    """Robots whose mountings are not as configured.
+
+    Args:
+        turn: of each robot, by which fraction its turns are longer than its wheels say.
+        antenna: of each robot, where its antenna is beside the place that is said, m.
+        turned_sigma: ranges are measured where robots stand turned against their keyframes, rad.
+    """
+    robots = len(problem.priors.scale)
+    fraction = np.array(turn or (0.0,) * robots)[problem.odometry.robot]
+    x, y, theta = problem.odometry.measured.T
+    bend = theta / (1 + fraction) - theta
+    measured = np.stack([x - bend / 2 * y, y + bend / 2 * x, theta + bend], axis=-1)
+    odometry = replace(problem.odometry, measured=measured)
+    r, beside = problem.ranges, np.array(antenna or ((0.0, 0.0),) * robots)
+    turned = np.random.default_rng(5).normal(0, turned_sigma, r.turned.shape)
+    said, seen, real = [], [], []
+    for m in range(len(r)):
+        for end, (k, q) in enumerate(((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m]))):
+            there = (0.0, 0.0, turned[m, end])
+            said.append(product(there, (*q, 0.0))[:2])
+            seen.append(product(truth[k], (*q, 0.0))[:2])
+            place = (*(q + beside[r.robots[m, end]]), 0.0)
+            real.append(product(truth[k], there, place)[:2])
+    q_ends, before, after = (np.reshape(v, (-1, 2, 2)) for v in (said, seen, real))
+    lengths = [np.hypot(*(v[:, 1] - v[:, 0]).T) for v in (before, after)]
+    ranges = replace(
+        r,
+        q_i=q_ends[:, 0],
+        q_j=q_ends[:, 1],
+        turned=turned,
+        measured=r.measured - lengths[0] + lengths[1],
+    )
+    return replace(problem, odometry=odometry, ranges=ranges)
 
 
 def held_at(problem: Problem, truth: Array) -> Problem:

@@ -197,6 +197,23 @@ def test_a_pose_is_as_uncertain_as_the_estimate_says() -> None:
     assert np.array_equal(found.covariance, covariance)
 
 
+def test_a_pose_is_the_more_uncertain_the_farther_odometry_went_since() -> None:
+    scene = RobotScene()
+    scene.drive(1)
+    covariance = np.diag([0.04, 0.09, 0.0025])
+    scene.localise(covariance=covariance)
+    traces = []
+    for _ in range(3):
+        found = scene.robot.pose()
+        assert found is not None
+        traces.append(np.trace(found.covariance[:2, :2]))
+        scene.drive(5)
+    assert traces[0] == pytest.approx(0.13)
+    # half a metre a second, whose heading was known to 0.05 rad
+    assert traces[1] > 0.13 + (0.05 * 2.4) ** 2
+    assert traces[2] > traces[1] + (0.05 * 2.4) ** 2
+
+
 def test_a_pose_across_a_hole_in_the_odometry_is_not_known() -> None:
     scene = RobotScene()
     scene.drive(1)

@@ -175,16 +175,16 @@ class PairTracker:
         own: ChainData,
         peer: ChainData,
         noise: OdometryNoise,
-        known: tuple[Correction, Correction] = UNCORRECTED,
+        known: tuple[Correction, Correction] | None = None,
     ) -> Callable[[], Checked] | None:
         """Module 2 on what came in since; the pair's set belongs to the job until `on_check`.
 
         Args:
-            known: of our odometry and the peer's.
+            known: of our odometry and the peer's; what was known before where nothing is said.
         """
         if self._is_busy:
             return None
-        if _differ(known, self._corrections):
+        if known is not None and _differ(known, self._corrections):
             self._corrections = known
             self._begin_anew()
         work: list[tuple[Candidate, ClosureMeasurement]] = []

@@ -2,8 +2,10 @@
 
 A track that is not as configured makes turns too long or too short by a fraction (the wheels of a
 skid-steered robot slide, its track is half as wide again); an antenna that is not where it is said
-to be moves every range. Most configurations are right, some are far off: the distribution is
-Cauchy's with Gauss's tails. The cost is -2 log of the density, without its constant.
+to be moves every range. Most configurations are right, some are far off: the cost of a value v of d
+components is Cauchy's, with Gauss's tails,
+
+    (1 + d) / 2 log(1 + |v|^2 / width^2) + |v|^2 / most^2
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
+from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE, TINY
 from drslamd.slam.se2 import Array
 
 
@@ -37,12 +39,17 @@ class MountingPrior:
         """(k, d) half the derivative."""
         return np.asarray(self._stiffness(values)[:, None] * values)
 
-    def curvature(self, values: Array) -> Array:
-        """(k,) as far as half the second derivative is the same in all directions, and positive."""
-        squares = (values**2).sum(axis=1)
-        bend = (self.width**2 - squares) / (self.width**2 + squares)
-        kept = np.maximum(bend, LEAST_CURVATURE)
-        return np.asarray(kept * self._head(values) + self.most**-2)
+    def curvature(self, values: Array, least: float = LEAST_CURVATURE) -> Array:
+        """(k, d, d) half the second derivative, kept positive definite.
+
+        Args:
+            least: see `LEAST_CURVATURE`.
+        """
+        squares, d = (values**2).sum(axis=1), values.shape[1]
+        bend = np.minimum(2 / (self.width**2 + squares), (1 - least) / np.maximum(squares, TINY))
+        outer = values[:, :, None] * values[:, None, :]
+        rounded = self._head(values)[:, None, None] * (np.eye(d) - bend[:, None, None] * outer)
+        return np.asarray(rounded + self.most**-2 * np.eye(d))
 
     def _stiffness(self, values: Array) -> Array:
         return self._head(values) + self.most**-2

@@ -161,4 +161,4 @@ def test_another_round_of_weighing_would_change_little(monkeypatch: pytest.Monke
     errors[::7] += 0.5
     once = inlier_ratios(errors, np.full(MANY, 0.1), ONE, 1)
     monkeypatch.setattr(range_scatter, "ROUNDS", 16)
-    assert inlier_ratios(errors, np.full(MANY, 0.1), ONE, 1) == pytest.approx(once, rel=2e-3)
+    assert inlier_ratios(errors, np.full(MANY, 0.1), ONE, 1) == pytest.approx(once, rel=0.02)

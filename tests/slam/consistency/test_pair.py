@@ -15,6 +15,7 @@ from drslamd.slam.consistency import pair as pair_module
 from drslamd.slam.consistency.pair import PENDING, Agreement, sendable
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import Keyframe
+from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.settings import closure_method
 
 TWO = Agreement(least=2, outnumber=2)
@@ -272,6 +273,97 @@ def test_answers_of_the_old_piece_that_still_wait_are_dropped_with_it() -> None:
     pair.answer(20, BESIDE, segments=(1, 0))
     pair.check()
     assert pair.kept() == [1]
+
+
+class Circling(OwnedPair):
+    """Both drive on circles, with tracks that are wider than their wheels say: a third of each turn
+    is missing in what odometry tells."""
+
+    KNOWN = Correction(turn=0.5), Correction(turn=0.5)
+
+    def __init__(self) -> None:
+        super().__init__(TWO)
+        self.own, self.peer = (ChainData(data.chain) for data in (self.own, self.peer))
+        self.true = []
+        step, told = (0.5, 0.0, 0.3), (0.5, 0.0, 0.2)
+        here, said = np.zeros(3), np.zeros(3)
+        for n in range(10, 200, 10):
+            self.true.append((here, product((4.0, 3.0, 1.0), here)))
+            for data in (self.own, self.peer):
+                x, y, theta = (round(1e4 * float(v)) for v in said)
+                data.add(Keyframe(n, 0, x, y, theta))
+            here, said = product(here, step), product(said, told)
+
+    def see_all(self, known: tuple[Correction, Correction], count: int = 19) -> None:
+        for k, (a, b) in enumerate(self.true[:count]):
+            self.answer(10 * k + 10, tuple(product(inverted(a), b)))
+            self.check_with(known)
+
+    def check_with(self, known: tuple[Correction, Correction]) -> None:
+        run = self.tracker.begin_check(self.own, self.peer, self.own.model.noise, known)
+        assert run is not None
+        self.tracker.on_check(run())
+
+
+def test_closures_agree_along_ways_as_they_should_have_been() -> None:
+    pair = Circling()
+    pair.see_all(Circling.KNOWN)
+    assert len(pair.kept()) == 19
+    for known in ((Correction(), Correction()), (Circling.KNOWN[0], Correction())):
+        other = Circling()
+        other.see_all(known)
+        assert len(other.kept()) < 10
+
+
+@pytest.mark.parametrize("is_peer", [False, True])
+@pytest.mark.parametrize(
+    ("changed", "begins_anew"),
+    [
+        (Correction(turn=0.529), False),
+        (Correction(turn=0.531), True),
+        (Correction(turn=0.469), True),
+        (Correction(scale=0.029, turn=0.5), False),
+        (Correction(scale=-0.031, turn=0.5), True),
+    ],
+)
+def test_a_correction_that_changes_the_way_begins_a_new_set(
+    changed: Correction, begins_anew: bool, is_peer: bool
+) -> None:
+    """Beyond three percent; what is kept until then stays in the graph."""
+    pair = Circling()
+    pair.see_all(Circling.KNOWN, 5)
+    assert pair.tracker.connected
+    assert pair.told() == [(k, True) for k in range(5)]
+    known = (Circling.KNOWN[0], changed) if is_peer else (changed, Circling.KNOWN[1])
+    a, b = pair.true[5]
+    pair.answer(60, tuple(product(inverted(a), b)))
+    pair.check_with(known)
+    assert pair.kept() == ([5] if begins_anew else [0, 1, 2, 3, 4, 5])
+    assert pair.tracker.connected is not begins_anew
+    assert pair.tracker.accepted() >= {0, 1, 2, 3, 4}
+    # nothing that was told is taken back
+    assert all(kept for _, kept in pair.told())
+
+
+def test_where_nothing_is_said_of_odometry_it_is_as_it_was_before() -> None:
+    pair = Circling()
+    pair.see_all(Circling.KNOWN, 5)
+    a, b = pair.true[5]
+    pair.answer(60, tuple(product(inverted(a), b)))
+    pair.check()
+    assert pair.kept() == [0, 1, 2, 3, 4, 5]
+
+
+def test_while_a_check_runs_a_correction_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    pair = Circling()
+    a, b = pair.true[0]
+    pair.answer(10, tuple(product(inverted(a), b)))
+    run = pair.tracker.begin_check(pair.own, pair.peer, pair.own.model.noise)
+    assert run is not None
+    other = pair.tracker.begin_check(pair.own, pair.peer, pair.own.model.noise, Circling.KNOWN)
+    assert other is None
+    pair.tracker.on_check(run())
+    assert pair.kept() == [0]
 
 
 def test_a_covariance_stays_one_when_it_is_rounded_to_be_sent() -> None:

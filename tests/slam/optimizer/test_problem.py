@@ -14,6 +14,7 @@ from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.problem import (
     BetweenFactors,
     Calibration,
+    Doubted,
     OdometryFactors,
     Priors,
     RangeFactors,
@@ -84,6 +85,49 @@ def test_scale_shortens_a_link_and_yaw_rate_bends_it_over_half_of_the_way() -> N
     assert right[1, 2] == pytest.approx(turn - yaw * way)
 
 
+def test_turns_that_are_longer_turn_a_link_on_by_half_of_what_they_lack() -> None:
+    """A turn of 0.3 rad that was one of 0.36, along an arc whose chord then stands 0.03 rad more
+    to the left; in the other direction the same."""
+    chords = np.array([[2.0, 0.3, 0.3], [2.0, -0.3, -0.3], [2.0, 0.3, 0.3]])
+    one = np.zeros(3, dtype=int)
+    odometry = OdometryFactors(
+        one, one, chords, np.tile(np.eye(3), (3, 1, 1)), np.array([1, 1, 0]), np.full(3, 2.0)
+    )
+    right = corrected(odometry, replace(Calibration.zero(0, 2), turn=np.array([0.0, 0.2])))
+    for link, sign in zip(right[:2], (1, -1), strict=True):
+        expected = product((0.0, 0.0, sign * 0.03), (2.0, sign * 0.3, sign * 0.33))
+        # to first order
+        assert link == pytest.approx(expected, abs=1e-3)
+        assert link[2] == pytest.approx(sign * 0.36)
+    assert right[2] == pytest.approx(chords[2])
+
+
+def test_an_antenna_beside_its_place_moves_with_the_robot_as_it_stood() -> None:
+    """Against poses multiplied as matrices; robots stood turned against their keyframes."""
+    problem, _ = team_problem(2, robots=3, count=4)
+    poses, rng = problem.initial, np.random.default_rng(3)
+    ranges = replace(problem.ranges, turned=rng.normal(0, 0.5, problem.ranges.turned.shape))
+    antenna = np.array([[0.2, -0.1], [0.0, 0.3], [-0.2, -0.2]])
+    found = range_errors(poses, ranges, replace(Calibration.zero(3, 3), antenna=antenna), LINKTRACK)
+    for m, robots in enumerate(ranges.robots):
+        ends = []
+        for end, (k, q) in enumerate(((ranges.i, ranges.q_i), (ranges.j, ranges.q_j))):
+            turn = (*q[m], ranges.turned[m, end])
+            ends.append(product(poses[k[m]], turn, (*antenna[robots[end]], 0.0))[:2])
+        apart = float(np.hypot(*(ends[1] - ends[0])))
+        assert found.error[m] == pytest.approx(apart - ranges.measured[m])
+        arms = ends[0] - poses[ranges.i[m], :2], ends[1] - poses[ranges.j[m], :2]
+        assert (found.arm_i[m], found.arm_j[m]) == pytest.approx(tuple(complex(*a) for a in arms))
+
+
+def test_doubts_are_of_any_track_or_antenna() -> None:
+    none, one = np.zeros(2, dtype=bool), np.array([False, True])
+    assert not Doubted.none(2).any()
+    assert Doubted.none(2).track.tolist() == Doubted.none(2).antenna.tolist() == [False, False]
+    assert Doubted(one, none).any()
+    assert Doubted(none, one).any()
+
+
 @pytest.mark.parametrize("model", [LINKTRACK, RangeModel(near_reach_m=6.0)])
 def test_an_error_of_a_range_is_predicted_minus_measured_with_its_biases(
     model: RangeModel,
@@ -92,7 +136,9 @@ def test_an_error_of_a_range_is_predicted_minus_measured_with_its_biases(
     poses, r = problem.initial, problem.ranges
     bias = np.array([0.2, -0.1, 0.3])
     # what biases have in common is part of them, and does not count twice
-    known = Calibration(bias, np.zeros(3), np.zeros(3), np.array([-0.25]), np.array([0.7]))
+    known = replace(
+        Calibration.zero(3, 3), bias=bias, near_bias=np.array([-0.25]), team_bias=np.array([0.7])
+    )
     error, sight, arm_i, arm_j = range_errors(poses, r, known, model)
     for m in range(len(r)):
         i, j = (product(poses[k], (*q, 0.0)) for k, q in ((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m])))
@@ -110,7 +156,7 @@ def test_some_of_the_factors_are_chosen_with_all_their_columns() -> None:
     which = np.arange(len(problem.ranges)) % 2 == 0
     few = problem.ranges.chosen(which)
     assert len(few) == 3
-    for name in ("i", "j", "q_i", "q_j", "measured", "sigma", "pair"):
+    for name in ("i", "j", "q_i", "q_j", "measured", "sigma", "pair", "robots", "turned"):
         assert np.array_equal(getattr(few, name), getattr(problem.ranges, name)[which])
     closures = problem.closures.chosen(np.array([False, True, False]))
     assert np.array_equal(closures.measured, problem.closures.measured[1:2])
@@ -147,11 +193,16 @@ def test_priors_cost_the_sum_of_what_each_constant_is_off() -> None:
         yaw=np.array([0.02, -0.02]),
         near_bias=np.array([0.1]),
         team_bias=np.array([0.05]),
+        turn=np.array([0.01, -0.01]),
+        antenna=np.array([[0.012, -0.016], [0.0, 0.0]]),
     )
     own = np.array([0.08, 0.0])
     of_scales = math.log(2) + math.log(10)
     of_others = 4 + 1 + 4
-    assert PRIORS.cost(known) == pytest.approx(PRIORS.bias.cost(own, 0.05) + of_scales + of_others)
+    # half widths of 0.01 and 0.02 m, and tails of 0.5
+    of_mountings = 2 * (math.log(2) + 0.02**2) + 1.5 * math.log(2) + 0.04**2
+    expected = PRIORS.bias.cost(own, 0.05) + of_scales + of_others + of_mountings
+    assert PRIORS.cost(known) == pytest.approx(expected)
     assert PRIORS.cost(Calibration.zero(2, 2)) == 0
 
 
@@ -176,10 +227,13 @@ def test_the_curvature_of_a_scale_is_the_derivative_of_its_pull_and_stays_positi
 
 
 def test_what_was_learned_adds_up() -> None:
-    names = ("bias", "scale", "yaw", "near_bias", "team_bias")
+    names = ("bias", "scale", "yaw", "near_bias", "team_bias", "turn", "antenna")
     zero = Calibration.zero(3, 2)
-    assert [len(getattr(zero, name)) for name in names] == [3, 2, 2, 1, 1]
+    shapes = [(3,), (2,), (2,), (1,), (1,), (2,), (2, 2)]
+    assert [getattr(zero, name).shape for name in names] == shapes
     assert not any(getattr(zero, name).any() for name in names)
-    step = Calibration(*(np.array([value]) for value in (1.0, 2.0, 3.0, 4.0, 5.0)))
+    values = {name: np.array([k + 1.0]) for k, name in enumerate(names[:-1])}
+    step = replace(Calibration.zero(1, 1), **values, antenna=np.array([[7.0, 8.0]]))
     twice = Calibration.zero(1, 1).plus(step).plus(step)
-    assert [getattr(twice, name)[0] for name in names] == [2, 4, 6, 8, 10]
+    assert [getattr(twice, name)[0] for name in names[:-1]] == [2, 4, 6, 8, 10, 12]
+    assert twice.antenna.tolist() == [[14, 16]]

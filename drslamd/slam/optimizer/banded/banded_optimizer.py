@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import compress
 from typing import TypeVar
 
 import numpy as np
@@ -178,8 +179,10 @@ def _solve(team: TeamProblem, group: Group) -> TeamEstimate:
     mine = {chain.robot: team.places.of_robot(chain.robot) for chain in team.chains}
     last = tuple(int(at[-1]) for at in mine.values())
     solution = banded_solver.solve(team.problem, team.start, last)
-    learned, spread = solution.calibration, solution.spread
+    learned, spread, doubted = solution.calibration, solution.spread, solution.doubted
     assert spread is not None
+    turn = _named(list(mine), learned.turn, spread.turn)
+    x, y = (_named(list(mine), learned.antenna[:, k], spread.antenna[:, k]) for k in (0, 1))
     return TeamEstimate(
         frame=group.frame,
         trajectories={
@@ -194,22 +197,8 @@ def _solve(team: TeamProblem, group: Group) -> TeamEstimate:
         yaw=_named(list(mine), learned.yaw, spread.yaw),
         near_bias_m=Learned(float(learned.near_bias[0]), float(spread.near_bias[0])),
         team_bias_m=Learned(float(learned.team_bias[0]), float(spread.team_bias[0])),
-        turn={
-            robot: learned_turn
-            for robot, learned_turn in _named(list(mine), learned.turn, spread.turn).items()
-            if solution.doubted.track[list(mine).index(robot)]
-        },
-        antenna_m={
-            robot: (Learned(v[0], s[0]), Learned(v[1], s[1]))
-            for robot, v, s, let_go in zip(
-                mine,
-                learned.antenna.tolist(),
-                spread.antenna.tolist(),
-                solution.doubted.antenna,
-                strict=True,
-            )
-            if let_go
-        },
+        turn={robot: turn[robot] for robot in compress(mine, doubted.track)},
+        antenna_m={robot: (x[robot], y[robot]) for robot in compress(mine, doubted.antenna)},
         scatter=dict(zip(team.pairs, solution.scatter.tolist(), strict=True)),
         odometry_level=_latest(team, solution),
         contradicted=frozenset(

@@ -78,7 +78,7 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
     check = _checked(equations, nominal)
     if check.is_passed() and not check.scores.ask():
         return _as_is(equations, nominal, check.ratio)
-    base, point, ratio = equations, nominal, check.ratio
+    bases = [(equations, nominal, check)]
     if check.scores.ask():
         mounted, better = mountings.fitted(equations, nominal, check.scores, most, tolerance)
         again = _checked(mounted, better)
@@ -86,11 +86,13 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
         if better.converged and few and again.is_passed():
             return _as_is(mounted, better, again.ratio)
         if better.converged and _gain(equations, nominal, mounted, better) > MUCH:
-            base, point, check, ratio = mounted, better, again, again.ratio
-    levels = odometry_levels.levelled(base, point, ratio, check.runs, most, tolerance)
-    seen = np.sqrt(levels.seen)
-    if levels.is_odometry:
-        return Explanation(base, levels.point, None, seen, levels.feared)
+            bases.insert(0, (mounted, better, again))
+    for base, point, said in bases:
+        levels = odometry_levels.levelled(base, point, said.ratio, said.runs, most, tolerance)
+        seen = np.sqrt(levels.seen)
+        if levels.is_odometry:
+            return Explanation(base, levels.point, None, seen, levels.feared)
+    # what was tried last is what remains of the nominal solution
     return Explanation(equations, nominal, levels.point, seen, levels.feared)
 
 

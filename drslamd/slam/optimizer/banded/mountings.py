@@ -15,6 +15,7 @@ import numpy as np
 
 from drslamd.slam.optimizer.banded import linearised
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
+from drslamd.slam.optimizer.banded.layout import NOWHERE
 from drslamd.slam.optimizer.banded.linearised import Linearised
 from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
@@ -44,7 +45,8 @@ class Scores:
 
 
 def scores(equations: Equations, point: Point, factor: BandFactor) -> Scores:
-    """What the cost would lose with each mounting let go, at the solution without.
+    """What the cost would lose with each mounting let go, at the solution without; 0 of those that
+    are unknowns already.
 
     Args:
         factor: of the system at that point.
@@ -72,7 +74,9 @@ def scores(equations: Equations, point: Point, factor: BandFactor) -> Scores:
     pairs = robots + np.arange(2 * robots).reshape(-1, 2)
     blocks = left[pairs[:, :, None], pairs[:, None, :]]
     moved = np.linalg.solve(blocks, pull[pairs][..., None])[..., 0]
-    return Scores(np.asarray(track), np.asarray((pull[pairs] * moved).sum(axis=1)))
+    antenna = (pull[pairs] * moved).sum(axis=1)
+    doubted = problem.doubted
+    return Scores(np.where(doubted.track, 0.0, track), np.where(doubted.antenna, 0.0, antenna))
 
 
 def _add(
@@ -91,8 +95,9 @@ def _add(
     """
     mine = factors.jacobian[:, :, first : first + which.shape[1]]
     weighed = np.swapaxes(mine, 1, 2) @ factors.information
-    shared = weighed @ factors.jacobian[:, :, :first]
-    at = unknowns[:, None, :first] * coupling.shape[1] + which[:, :, None]
+    is_unknown = (unknowns != NOWHERE)[:, None, :]
+    shared = np.where(is_unknown, weighed @ factors.jacobian, 0.0)
+    at = np.where(is_unknown, unknowns[:, None, :], 0) * coupling.shape[1] + which[:, :, None]
     coupling += np.bincount(at.ravel(), shared.ravel(), coupling.size).reshape(coupling.shape)
     both = which[:, :, None] * len(own) + which[:, None, :]
     own += np.bincount(both.ravel(), (weighed @ mine).ravel(), own.size).reshape(own.shape)

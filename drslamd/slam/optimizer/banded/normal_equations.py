@@ -45,6 +45,11 @@ class System:
         outside = unknowns[~inside] - len(self.border)
         self.corner[outside, outside] += stiffness[~inside]
 
+    def add_blocks(self, unknowns: Index, stiffness: Array) -> None:
+        """Hold m groups of unknowns (m, d) of the border with information (m, d, d)."""
+        at = unknowns - len(self.border)
+        self.corner[at[:, :, None], at[:, None, :]] += stiffness
+
     def add_difference(self, unknowns: Index, one: Index, stiffness: Array) -> None:
         """Hold unknowns (k,) of the border beside one other (1,) with information (k, k)."""
         n = len(self.border)
@@ -201,7 +206,7 @@ class Equations:
         system.add_prior(layout.bias, priors.bias.sigma**-2)
         system.add_prior(layout.team_bias, priors.bias.sigma**-2)
         system.add_prior(layout.scale, priors.scale**-2.0)
-        self._add_mounting_priors(system, point.calibration)
+        self._add_mounting_priors(system, point.calibration, LEAST_CURVATURE)
         return system
 
     def bias_belief(self, point: Point) -> Array:
@@ -244,7 +249,7 @@ class Equations:
         layout, priors = self.layout, self.problem.priors
         self._add_bias_prior(system, calibration, least)
         system.add_prior(layout.scale, priors.scale_curvature(calibration.scale, least))
-        self._add_mounting_priors(system, calibration)
+        self._add_mounting_priors(system, calibration, least)
 
     def _add_bias_prior(self, system: System, calibration: Calibration, least: float) -> None:
         layout, prior = self.layout, self.problem.priors.bias
@@ -253,12 +258,13 @@ class Equations:
         system.add_difference(layout.bias, layout.team_bias, own)
         system.add_prior(layout.team_bias, prior.team_curvature(team, least))
 
-    def _add_mounting_priors(self, system: System, calibration: Calibration) -> None:
+    def _add_mounting_priors(self, system: System, calibration: Calibration, least: float) -> None:
         layout, doubted = self.layout, self.problem.doubted
-        turn = TRACK.curvature(calibration.turn[:, None])
-        system.add_prior(layout.turn[doubted.track], turn[doubted.track])
-        antenna = np.repeat(ANTENNA.curvature(calibration.antenna)[:, None], 2, axis=1)
-        system.add_prior(layout.antenna[doubted.antenna].ravel(), antenna[doubted.antenna].ravel())
+        for prior, numbers, values in (
+            (TRACK, layout.turn[doubted.track, None], calibration.turn[doubted.track, None]),
+            (ANTENNA, layout.antenna[doubted.antenna], calibration.antenna[doubted.antenna]),
+        ):
+            system.add_blocks(numbers, prior.curvature(values, least))
 
     def _add_gaussian_priors(self, system: System) -> None:
         layout, priors = self.layout, self.problem.priors

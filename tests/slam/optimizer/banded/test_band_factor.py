@@ -9,6 +9,7 @@ from scipy.linalg import cholesky_banded
 from slam_scenes import Array
 
 from drslamd.slam.optimizer.banded.band_factor import ROOM, BandFactor, selected_inverse
+from drslamd.slam.optimizer.banded.layout import NOWHERE
 from drslamd.slam.optimizer.banded.normal_equations import System
 
 
@@ -112,6 +113,24 @@ def test_links_whose_one_end_is_at_the_border_are_among_them() -> None:
     assert found is not None
     for block, unknowns in zip(found, at, strict=True):
         assert np.allclose(block, inverse[np.ix_(unknowns, unknowns)])
+
+
+def test_what_is_known_covaries_with_nothing() -> None:
+    """A link whose last sensor is no unknown, one that ends at the border, and one that depends on
+    nothing."""
+    system = a_system(6, 1, 5)
+    inverse = np.linalg.inv(matrix_of(system))
+    at = np.array(
+        [[0, 1, 2, 3, 4, 5, 21, NOWHERE], [18, 19, 20, 3, 4, 5, NOWHERE, 22], [NOWHERE] * 8]
+    )
+    found = factorised(system).covariance_blocks(at)
+    assert found is not None
+    for block, unknowns in zip(found, at, strict=True):
+        is_known = unknowns == NOWHERE
+        expected = inverse[np.ix_(unknowns, unknowns)]
+        expected[is_known] = 0
+        expected[:, is_known] = 0
+        assert np.allclose(block, expected)
 
 
 @pytest.mark.parametrize("reach", [0, 1, 4])

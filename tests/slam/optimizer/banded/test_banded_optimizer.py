@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from slam_scenes import (
     CLOCKS,
     NOISE,
     Array,
+    SmallTeam,
     closure,
     group_of,
     inverted,
@@ -23,7 +25,7 @@ from slam_scenes import (
 )
 
 from drslamd.conventions import GRID_US, Chain, Segment
-from drslamd.slam.graph.estimate import TeamEstimate
+from drslamd.slam.graph.estimate import Learned, TeamEstimate
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
@@ -34,6 +36,7 @@ from drslamd.slam.optimizer.banded.banded_optimizer import (
     build_problem,
 )
 from drslamd.slam.optimizer.bias_prior import BiasPrior
+from drslamd.slam.optimizer.problem import Doubted, Solution
 from drslamd.slam.range_model import LINKTRACK
 from drslamd.slam.robot_model import RobotModel
 
@@ -95,7 +98,80 @@ def test_what_is_claimed_is_named_by_its_robot_and_its_pair() -> None:
             (alone.calibration.bias[number], alone.spread.bias[number])
         )
         assert estimate.scatter[pair] == pytest.approx(alone.scatter[number])
-    assert estimate.team_bias_m.sigma == pytest.approx(BANDED.bias_sigma)
+    common = alone.calibration.team_bias[0], alone.spread.team_bias[0]
+    assert estimate.team_bias_m == pytest.approx(common)
+
+
+def mounted(
+    turn: dict[int, Learned] | None = None,
+    antenna: dict[int, tuple[Learned, Learned]] | None = None,
+) -> TeamEstimate:
+    return TeamEstimate(Segment(0, 10, 0), {}, turn=turn or {}, antenna_m=antenna or {})
+
+
+def test_the_next_solution_begins_with_the_mountings_that_were_let_go() -> None:
+    team = small_team(1, count=12)
+    x, y = Learned(0.3, 0.02), Learned(-0.1, 0.02)
+    previous = mounted({1: Learned(0.4, 0.05)}, {2: (x, y)})
+    built = build_problem(team.graph, group_of(team.graph, CLOCKS), previous, BANDED)
+    assert built.problem.doubted.track.tolist() == [False, True, False]
+    assert built.problem.doubted.antenna.tolist() == [False, False, True]
+    assert built.start.turn.tolist() == [0, 0.4, 0]
+    assert built.start.antenna.tolist() == [[0, 0], [0, 0], [0.3, -0.1]]
+    first = build_problem(team.graph, group_of(team.graph, CLOCKS), None, BANDED)
+    assert not first.problem.doubted.any()
+
+
+def test_mountings_that_are_still_in_doubt_are_named_by_their_robots(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of the others nothing is said, whatever their unknowns are."""
+    team = small_team(1, count=12)
+    group = group_of(team.graph, CLOCKS)
+    plain = banded_solver.solve
+
+    def solve(*args: Any) -> Solution:
+        found = plain(*args)
+        assert found.spread is not None
+        values = replace(
+            found.calibration, turn=np.array([0.1, 0.2, 0.3]), antenna=np.arange(6.0).reshape(3, 2)
+        )
+        spread = replace(
+            found.spread, turn=np.array([1.0, 2.0, 3.0]), antenna=np.arange(6.0, 12.0).reshape(3, 2)
+        )
+        doubted = Doubted(np.array([False, True, True]), np.array([True, False, False]))
+        level = 3.0 + team_problem_links(team, group)
+        return replace(
+            found, calibration=values, spread=spread, doubted=doubted, feared_level=level
+        )
+
+    monkeypatch.setattr(banded_solver, "solve", solve)
+    estimate = solved(team.graph, group)
+    assert estimate.turn == {1: Learned(0.2, 2.0), 2: Learned(0.3, 3.0)}
+    assert estimate.antenna_m == {0: (Learned(0.0, 6.0), Learned(1.0, 7.0))}
+    # of the last link of each robot, as far as it must be feared
+    assert estimate.odometry_level == {0: 13.0, 1: 14.0, 2: 15.0}
+
+
+def team_problem_links(team: SmallTeam, group: Group) -> Array:
+    """A number of each link: of its robot, and ten more of the last one."""
+    links = build_problem(team.graph, group, None, BANDED).problem.odometry
+    is_last = np.isin(links.j, [links.j[links.robot == r].max() for r in range(3)])
+    return np.asarray(links.robot + 10.0 * is_last)
+
+
+def test_a_mounting_that_turns_out_as_configured_is_in_doubt_no_longer() -> None:
+    team = small_team(1, count=60)
+    group = group_of(team.graph, CLOCKS)
+    previous = replace(
+        solved(team.graph, group),
+        turn={1: Learned(0.3, 0.1)},
+        antenna_m={0: (Learned(0.2, 0.1), Learned(0.0, 0.1))},
+    )
+    again = solved(team.graph, group, previous)
+    assert again.converged
+    assert again.turn == {}
+    assert again.antenna_m == {}
 
 
 def test_biases_are_named_by_their_pairs_and_scales_by_their_robots() -> None:

@@ -12,7 +12,9 @@ from dense_problems import (
     claimed_information,
     dense_solution,
     known_exactly,
+    learned_information,
     packed,
+    point_at,
     residual_vector,
     thresholds,
     unpacked,
@@ -21,6 +23,7 @@ from slam_problems import (
     BIAS,
     held_at,
     links_of,
+    mismounted,
     no_ranges,
     pose_edges,
     slipping,
@@ -28,14 +31,16 @@ from slam_problems import (
 )
 from slam_scenes import matrix, same_pose, wander
 
+from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.banded_solver import solve
 from drslamd.slam.optimizer.banded.claims import UNKNOWN, covariances
+from drslamd.slam.optimizer.banded.explanation import explain
 from drslamd.slam.optimizer.banded.misfit import guessed_misfit
-from drslamd.slam.optimizer.banded.newton_descent import Point, descend
+from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.banded.odometry_levels import explain
 from drslamd.slam.optimizer.problem import (
     Calibration,
+    Doubted,
     OdometryFactors,
     Priors,
     Problem,
@@ -50,6 +55,49 @@ def loose(problem: Problem) -> Problem:
 
 
 # ---- the minimum ----
+
+
+def test_with_mountings_in_doubt_the_solution_is_that_of_a_dense_solver_too() -> None:
+    problem, truth = team_problem(
+        6, robots=2, count=8, range_error=0.01, link_sigma=(0.004, 0.004, 0.001)
+    )
+    beside = ((0.0, 0.0), (0.4, 0.3))
+    problem = mismounted(held_at(problem, truth), truth, (0.5, 0.0), beside, turned_sigma=0.2)
+    doubted = Doubted(np.array([True, False]), np.array([False, True]))
+    problem = replace(problem, doubted=doubted)
+    solution = solve(problem, tolerance=1e-10, most=100)
+    x, _ = dense_solution(problem)
+    poses, known = unpacked(problem, x)
+    assert solution.converged
+    assert np.abs(solution.poses[:, :2] - poses[:, :2]).max() < 1e-4
+    assert solution.calibration.turn == pytest.approx(known.turn, abs=1e-4)
+    assert solution.calibration.antenna == pytest.approx(known.antenna, abs=1e-4)
+    assert abs(known.turn[0]) > 0.1
+    assert np.abs(known.antenna[1]).min() > 0.1
+
+
+def test_a_track_that_is_far_off_is_let_go_and_said() -> None:
+    """Beside who stays as configured; what is claimed of poses and turn is true."""
+    problem, truth = team_problem(7, robots=3, count=120)
+    problem = mismounted(held_at(problem, truth), truth, (0.0, 0.35, 0.0))
+    last = 3 * 119 + 1
+    solution = solve(problem, marginals=(last,))
+    assert solution.converged
+    assert solution.is_explained
+    assert solution.doubted.track.tolist() == [False, True, False]
+    assert not solution.doubted.antenna.any()
+    assert solution.spread is not None
+    off = solution.calibration.turn[1] - 0.35
+    assert abs(off) < 3 * solution.spread.turn[1] < 0.15
+    error = solution.poses[last] - truth[last]
+    error[2] = math.remainder(error[2], 2 * math.pi)
+    assert error @ np.linalg.solve(solution.joint, error) < 14.2
+    assert (solution.odometry_level == 1).all()
+    assert solution.feared_level.min() >= 1
+    assert solution.feared_level.max() < 1.5
+    plain = solve(team_problem(7, robots=3, count=120)[0])
+    assert not plain.doubted.any()
+    assert (plain.calibration.turn == 0).all()
 
 
 @pytest.mark.parametrize(("seed", "robots"), [(0, 2), (1, 2), (2, 3)])
@@ -98,7 +146,8 @@ def test_the_pose_graph_of_gtsam_has_the_same_minimum_and_marginals() -> None:
     start = truth + rng.normal(0, 0.02, truth.shape)
     start[0] = truth[0]
     robot, n = np.zeros(50, dtype=int), np.arange(50)
-    problem = Problem(robot, n, start, 0, 0, odometry, closures, no_ranges(), priors)
+    factors = (odometry, closures, no_ranges())
+    problem = Problem(robot, n, start, 0, 0, *factors, priors, Doubted.none(1))
     wanted = (0, 7, 48, 49)
     solution = solve(problem, marginals=wanted, tolerance=1e-12)
 
@@ -139,20 +188,24 @@ def test_what_is_claimed_is_the_dense_inverse_with_odometry_as_bad_as_it_looks()
     wanted = np.array([35, 3, 22])
     solution = solve(problem, marginals=tuple(wanted), tolerance=1e-10)
     x, links = packed(solution.poses, solution.calibration), problem.odometry
-    point = Point(solution.poses, solution.calibration, thresholds(problem, x))
-    ratio = np.maximum(guessed_misfit(Equations(problem), point).ratio(links.robot, 3), 1.0)
+    point = point_at(problem, solution.poses, solution.calibration, thresholds(problem, x))
+    equations = Equations(problem)
+    factor = BandFactor.of(equations.weighed(point))
+    assert factor is not None
+    ratio = np.maximum(guessed_misfit(equations, point, factor).ratio(links.robot, 3), 1.0)
     assert 1.2 < ratio.max() < 3
     covariance = ratio[links.robot][:, None, None] * links.covariance
     covariance += (ratio - 1)[links.robot][:, None, None] * 0.004**2 * np.eye(3)
     worse = replace(problem, odometry=replace(links, covariance=covariance))
     claims = math.sqrt(1 + 1.28 / (math.exp(0.4) - 1)) * np.maximum(solution.scatter, 0.3)
     inverse = np.linalg.inv(claimed_information(worse, x, point.threshold, claims))
+    learned = np.linalg.inv(learned_information(worse, x, point.threshold, claims))
     at = (3 * wanted[:, None] + np.arange(3)).ravel()
     expected = inverse[np.ix_(at, at)]
     sigma = np.sqrt(np.diag(expected))
     assert np.abs((solution.joint - expected) / np.outer(sigma, sigma)).max() < 2e-3
     assert solution.spread is not None
-    _, spread = unpacked(problem, np.sqrt(np.diag(inverse)))
+    _, spread = unpacked(problem, np.sqrt(np.diag(learned)))
     for name in ("bias", "scale", "yaw", "near_bias", "team_bias"):
         assert getattr(solution.spread, name) == pytest.approx(getattr(spread, name), rel=2e-3)
     assert solution.odometry_level == pytest.approx(1.0)
@@ -160,7 +213,7 @@ def test_what_is_claimed_is_the_dense_inverse_with_odometry_as_bad_as_it_looks()
 
 
 def test_where_somebody_slipped_the_solution_is_the_one_that_explains_it() -> None:
-    problem, truth = team_problem(7, robots=4, count=45, closures=6)
+    problem, truth = team_problem(3, robots=4, count=45, closures=6)
     problem = slipping(held_at(problem, truth), 1, 25, 31)
     solution = solve(problem, marginals=(4 * 44 + 1, 4 * 44 + 2), most=60)
     assert solution.converged
@@ -168,6 +221,8 @@ def test_where_somebody_slipped_the_solution_is_the_one_that_explains_it() -> No
     slipped = links_of(problem, 1, 25, 31)
     assert solution.odometry_level[slipped].min() > 10
     assert np.median(solution.odometry_level) == 1
+    assert (solution.feared_level >= solution.odometry_level).all()
+    assert not solution.doubted.any()
     error = solution.poses - truth
     error[:, 2] = np.angle(np.exp(1j * error[:, 2]))
     assert np.hypot(*error[:, :2].T).max() < 0.7
@@ -189,7 +244,8 @@ def test_where_nobody_can_say_who_is_wrong_poses_stay_and_their_covariances_grow
     assert np.abs(solution.poses[:, :2] - nominal.poses[:, :2]).max() == 0
     assert solution.calibration is not None
     # at least by how far both explanations are apart
-    other = explain(equations, nominal, 60, 3e-7).point
+    other = explain(equations, nominal, 60, 3e-7).other
+    assert other is not None
     apart = (nominal.poses - other.poses)[wanted]
     apart[:, 2] = np.angle(np.exp(1j * apart[:, 2]))
     plain, _ = covariances(equations, nominal, solution.scatter, wanted)
@@ -273,7 +329,8 @@ def test_the_gauge_stays_where_it_was() -> None:
 def test_calibration_that_nothing_touches_keeps_its_prior() -> None:
     problem, _ = team_problem(11, robots=2, count=20)
     priors = replace(problem.priors, scale=np.full(3, 0.06), yaw=np.full(3, 0.01))
-    wide, plain = solve(replace(problem, priors=priors)), solve(problem)
+    wide = solve(replace(problem, priors=priors, doubted=Doubted.none(3)))
+    plain = solve(problem)
     assert np.allclose(wide.poses, plain.poses, atol=1e-6)
     assert wide.calibration.scale[2] == wide.calibration.yaw[2] == 0
     assert wide.spread is not None

@@ -7,15 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dense_problems import claimed_information, packed, unpacked
-from slam_problems import no_ranges, pose_edges, team_problem
+from dense_problems import claimed_information, learned_information, packed, unpacked
+from slam_problems import held_at, no_ranges, pose_edges, team_problem
 from slam_scenes import Array
 
 from drslamd.slam.optimizer.banded import claims
 from drslamd.slam.optimizer.banded.banded_solver import solve
-from drslamd.slam.optimizer.banded.newton_descent import Point, descend
+from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.problem import Calibration, Problem
+from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem
 from drslamd.slam.range_model import LINKTRACK
 
 SHARED = math.sqrt(1 + 2 * 0.64 * math.exp(-0.4) / (1 - math.exp(-0.4)))
@@ -29,9 +30,15 @@ def solved(problem: Problem) -> tuple[Equations, Point]:
 
 
 def dense_claim(problem: Problem, point: Point, scatter: Array) -> Array:
-    x = packed(point.poses, point.calibration)
+    x = packed(point.poses, point.calibration, problem.doubted)
     ratio = SHARED * scatter
     return np.asarray(np.linalg.inv(claimed_information(problem, x, point.threshold, ratio)))
+
+
+def dense_sigmas(problem: Problem, point: Point, scatter: Array) -> Array:
+    x = packed(point.poses, point.calibration, problem.doubted)
+    information = learned_information(problem, x, point.threshold, SHARED * scatter)
+    return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
 
 
 def far_edges() -> Problem:
@@ -66,12 +73,58 @@ def test_sigmas_of_the_sensors_are_those_of_the_dense_inverse() -> None:
     equations, point = solved(problem)
     scatter = np.array([0.5, 1.0, 1.4])
     _, spread = claims.covariances(equations, point, scatter, np.array([0]))
-    sigmas = np.sqrt(np.diag(dense_claim(problem, point, scatter)))
-    _, expected = unpacked(problem, sigmas)
-    for name in ("bias", "scale", "yaw", "near_bias", "team_bias"):
+    _, expected = unpacked(problem, dense_sigmas(problem, point, scatter))
+    for name in ("bias", "scale", "yaw", "near_bias", "team_bias", "turn", "antenna"):
         assert getattr(spread, name) == pytest.approx(getattr(expected, name), rel=1e-3)
-    # nothing is measured of what biases have in common beside the biases themselves
-    assert spread.team_bias == pytest.approx([problem.priors.bias.sigma])
+    # far less than the 0.6 m that are configured
+    assert spread.bias.max() < 0.3
+
+
+def test_a_bias_is_told_as_the_likeness_of_the_team_leaves_it_and_feared_as_configured() -> None:
+    """Poses are so uncertain as if each bias could be of any size that is configured."""
+    problem, _ = team_problem(5, robots=3, count=8)
+    equations, point = solved(problem)
+    joint, spread = claims.covariances(equations, point, np.ones(3), np.array([22]))
+    prior = replace(problem.priors.bias, spread=0.01, team=0.01)
+    alike = replace(problem, priors=replace(problem.priors, bias=prior))
+    other, narrow = claims.covariances(Equations(alike), point, np.ones(3), np.array([22]))
+    assert np.allclose(joint, other, rtol=1e-9)
+    assert narrow.bias.max() < 0.5 * spread.bias.max()
+
+
+def test_sigmas_of_mountings_in_doubt_are_those_of_the_dense_inverse() -> None:
+    problem, truth = team_problem(5, robots=2, count=20)
+    doubted = Doubted(np.array([True, False]), np.array([False, True]))
+    equations, point = solved(replace(held_at(problem, truth), doubted=doubted))
+    assert point.converged
+    assert np.hypot(*point.calibration.antenna[1]) < 0.018
+    joint, spread = claims.covariances(equations, point, np.ones(1), np.array([39]))
+    problem = equations.problem
+    _, expected = unpacked(problem, dense_sigmas(problem, point, np.ones(1)))
+    assert spread.turn == pytest.approx(expected.turn, rel=2e-3)
+    assert spread.antenna == pytest.approx(expected.antenna, rel=2e-3)
+    assert spread.turn[1] == 0
+    assert spread.turn[0] > 0
+    at = 3 * 39 + np.arange(3)
+    assert np.allclose(joint, dense_claim(problem, point, np.ones(1))[np.ix_(at, at)], rtol=2e-3)
+
+
+@pytest.mark.parametrize("sigmas", [2.99, 3.01, -2.99, -3.01])
+def test_a_mounting_stays_in_doubt_where_it_is_three_sigmas_off(sigmas: float) -> None:
+    is_off = abs(sigmas) > 3
+    spread = replace(Calibration.zero(0, 2), turn=np.full(2, 0.1), antenna=np.full((2, 2), 0.02))
+    learned = replace(
+        Calibration.zero(0, 2),
+        turn=np.array([0.1 * sigmas, 0.1 * sigmas]),
+        antenna=np.array([[0.0, 0.02 * sigmas], [0.02 * sigmas, 0.0]]),
+    )
+    doubted = Doubted(np.array([True, False]), np.array([False, True]))
+    found = claims.still_doubted(doubted, learned, spread)
+    # those that were no unknowns cannot have become any
+    assert found.track.tolist() == [is_off, False]
+    assert found.antenna.tolist() == [False, is_off]
+    one_axis = claims.still_doubted(Doubted(doubted.track, ~doubted.antenna), learned, spread)
+    assert one_axis.antenna.tolist() == [is_off, False]
 
 
 @pytest.mark.parametrize(("scatter", "counted"), [(0.1, 0.3), (0.29, 0.3), (0.31, 0.31)])
@@ -122,7 +175,8 @@ def test_scatter_is_that_of_the_errors_over_what_is_configured() -> None:
 
 
 def test_two_explanations_differ_by_the_short_way_around() -> None:
-    one = Point(np.array([[1.0, 2.0, 3.1], [0.0, 0.0, 0.0]]), Calibration.zero(0, 1), np.zeros(0))
+    _, point = solved(team_problem(5, robots=2, count=2, closures=0)[0])
+    one = replace(point, poses=np.array([[1.0, 2.0, 3.1], [0.0, 0.0, 0.0]]))
     other = replace(one, poses=np.array([[1.5, 2.0, -3.1], [9.0, 9.0, 9.0]]))
     apart = np.array([-0.5, 0.0, 6.2 - 2 * math.pi])
     found = claims.disagreement(one, other, np.array([0]))

@@ -9,7 +9,8 @@ import pytest
 from dense_problems import places
 from slam_problems import no_ranges, pose_edges, team_problem
 
-from drslamd.slam.optimizer.banded.layout import BandLayout, border_poses
+from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout, border_poses
+from drslamd.slam.optimizer.problem import Doubted
 
 
 def test_every_unknown_stands_somewhere_and_only_once() -> None:
@@ -33,8 +34,37 @@ def test_a_link_depends_on_its_poses_and_on_the_wheels_of_its_robot() -> None:
         layout.odometry_unknowns(links), links.i, links.j, links.robot, strict=True
     ):
         ends = [3 * i, 3 * i + 1, 3 * i + 2, 3 * j, 3 * j + 1, 3 * j + 2]
-        # biases of three pairs stand before the scales of three robots and their yaw rates
-        assert row.tolist() == [*ends, 36 + 3 + robot, 36 + 3 + 3 + robot]
+        # biases of three pairs stand before the scales of three robots and their yaw rates; turns
+        # are known
+        assert row.tolist() == [*ends, 36 + 3 + robot, 36 + 3 + 3 + robot, NOWHERE]
+
+
+def test_mountings_in_doubt_stand_last_and_the_others_nowhere() -> None:
+    problem, _ = team_problem(6, robots=3, count=4)
+    doubted = Doubted(np.array([False, True, True]), np.array([True, False, True]))
+    problem = replace(problem, doubted=doubted)
+    layout = BandLayout.of(problem)
+    assert np.array_equal(np.sort(places(layout)), np.arange(layout.band + layout.border))
+    # behind twelve poses, three biases, scales and yaw rates, and two constants of the team
+    first = 36 + 9 + 2
+    assert layout.turn.tolist() == [NOWHERE, first, first + 1]
+    assert layout.antenna.tolist() == [
+        [first + 2, first + 3],
+        [NOWHERE] * 2,
+        [first + 4, first + 5],
+    ]
+    assert layout.border == 11 + 6
+    turns = layout.odometry_unknowns(problem.odometry)[:, 8]
+    assert np.array_equal(turns, layout.turn[problem.odometry.robot])
+    ranges = problem.ranges
+    for row, pair, (a, b) in zip(
+        layout.range_unknowns(ranges), ranges.pair, ranges.robots, strict=True
+    ):
+        constants = [layout.bias[pair], *layout.near_bias]
+        assert row[6:].tolist() == [*constants, *layout.antenna[a], *layout.antenna[b]]
+    sensors = layout.calibration(np.arange(layout.band + layout.border, dtype=float))
+    assert sensors.turn.tolist() == [0, first, first + 1]
+    assert sensors.antenna.tolist() == [[first + 2, first + 3], [0, 0], [first + 4, first + 5]]
 
 
 def test_a_group_of_one_pose_has_a_layout() -> None:

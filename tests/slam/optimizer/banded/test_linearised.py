@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from slam_problems import team_problem
+from dense_problems import point_at
+from slam_problems import mismounted, team_problem
 from slam_scenes import Array
 
 from drslamd.slam.optimizer.banded import linearised
@@ -20,7 +21,7 @@ from drslamd.slam.optimizer.problem import (
 )
 from drslamd.slam.range_model import LINKTRACK
 
-PROBLEM, _ = team_problem(1, robots=3, count=5)
+PROBLEM = mismounted(*team_problem(1, robots=3, count=5), turned_sigma=0.2)
 POSES = PROBLEM.initial + np.random.default_rng(2).normal(0, 0.1, PROBLEM.initial.shape)
 KNOWN = Calibration(
     bias=np.array([0.1, -0.2, 0.05]),
@@ -28,8 +29,11 @@ KNOWN = Calibration(
     yaw=np.array([0.01, -0.02, 0.005]),
     near_bias=np.array([-0.2]),
     team_bias=np.array([0.03]),
+    turn=np.array([0.2, -0.1, 0.05]),
+    antenna=np.array([[0.1, -0.2], [0.3, 0.05], [-0.1, 0.2]]),
 )
 THRESHOLD = np.array([2.5, 1.0, 0.8])
+HERE = point_at(PROBLEM, POSES, KNOWN, THRESHOLD)
 
 
 def moved(k: int, part: int, h: float) -> Array:
@@ -50,7 +54,9 @@ def by_poses(errors: Callable[[Array], Array], m: int, ends: tuple[int, int]) ->
     return np.stack(columns, axis=-1)
 
 
-def by_sensor(errors: Callable[[Calibration], Array], m: int, name: str, at: int) -> Array:
+def by_sensor(
+    errors: Callable[[Calibration], Array], m: int, name: str, at: int | tuple[int, int]
+) -> Array:
     """(d,) derivative of the errors of factor m by one constant."""
     h = 1e-6
     ends = []
@@ -69,14 +75,14 @@ def of_ranges(problem: Problem, poses: Array, known: Calibration) -> Array:
     return range_errors(poses, problem.ranges, known, problem.model)[0]
 
 
-def test_links_are_differentiated_by_both_poses_scale_and_yaw_rate() -> None:
+def test_links_are_differentiated_by_both_poses_scale_yaw_rate_and_turn() -> None:
     links = PROBLEM.odometry
-    found = linearised.odometry_at(PROBLEM, POSES, KNOWN)
+    found = linearised.odometry_at(PROBLEM, HERE)
     assert np.array_equal(found.jacobian, linearised.odometry_jacobian(PROBLEM, POSES))
     for m in range(len(links)):
         poses = by_poses(lambda p: of_links(PROBLEM, p, KNOWN), m, (links.i[m], links.j[m]))
         assert np.allclose(found.jacobian[m, :, :6], poses, atol=1e-7)
-        for column, name in ((6, "scale"), (7, "yaw")):
+        for column, name in ((6, "scale"), (7, "yaw"), (8, "turn")):
             each = by_sensor(lambda c: of_links(PROBLEM, POSES, c), m, name, links.robot[m])
             assert np.allclose(found.jacobian[m, :, column], each, atol=1e-7)
 
@@ -95,7 +101,7 @@ def test_links_and_closures_pull_by_their_information() -> None:
     links, edges = PROBLEM.odometry, PROBLEM.closures
     of_edges = pose_errors(POSES, edges, edges.measured)
     for found, errors, factors in (
-        (linearised.odometry_at(PROBLEM, POSES, KNOWN), of_links(PROBLEM, POSES, KNOWN), links),
+        (linearised.odometry_at(PROBLEM, HERE), of_links(PROBLEM, POSES, KNOWN), links),
         (linearised.closures_at(PROBLEM, POSES), of_edges, edges),
     ):
         for m in range(len(factors)):
@@ -106,21 +112,25 @@ def test_links_and_closures_pull_by_their_information() -> None:
             )
 
 
-def test_ranges_are_differentiated_by_both_poses_bias_and_near_range_bias() -> None:
+def test_ranges_are_differentiated_by_both_poses_biases_and_antennas() -> None:
     ranges = PROBLEM.ranges
-    found = linearised.ranges_at(PROBLEM, POSES, KNOWN, THRESHOLD)
-    assert found.jacobian.shape == (15, 1, 8)
+    found = linearised.ranges_at(PROBLEM, HERE)
+    assert found.jacobian.shape == (15, 1, 12)
     for m in range(len(ranges)):
         poses = by_poses(lambda p: of_ranges(PROBLEM, p, KNOWN), m, (ranges.i[m], ranges.j[m]))
         assert np.allclose(found.jacobian[m, 0, :6], poses, atol=1e-7)
         for column, name, at in ((6, "bias", ranges.pair[m]), (7, "near_bias", 0)):
             each = by_sensor(lambda c: of_ranges(PROBLEM, POSES, c), m, name, at)
             assert found.jacobian[m, 0, column] == pytest.approx(each, abs=1e-7)
+        for column in range(8, 12):
+            at = (ranges.robots[m, (column - 8) // 2], column % 2)
+            each = by_sensor(lambda c: of_ranges(PROBLEM, POSES, c), m, "antenna", at)
+            assert found.jacobian[m, 0, column] == pytest.approx(each, abs=1e-7)
 
 
 def test_the_near_range_bias_is_that_of_the_model_of_the_problem() -> None:
     other = replace(PROBLEM, model=replace(LINKTRACK, near_reach_m=1.0))
-    found = linearised.ranges_at(other, POSES, KNOWN, THRESHOLD).jacobian[:, 0, 7]
+    found = linearised.ranges_at(other, HERE).jacobian[:, 0, 7]
     assert found == pytest.approx(np.exp(-PROBLEM.ranges.measured))
 
 
@@ -131,7 +141,8 @@ def a_range(sigmas: float) -> linearised.Linearised:
     known = replace(KNOWN, near_bias=np.zeros(1))
     error = of_ranges(replace(PROBLEM, ranges=ranges), POSES, known)
     ranges = replace(ranges, measured=ranges.measured + error - sigmas * ranges.sigma)
-    return linearised.ranges_at(replace(PROBLEM, ranges=ranges), POSES, known, np.full(3, 2.0))
+    problem = replace(PROBLEM, ranges=ranges)
+    return linearised.ranges_at(problem, point_at(problem, POSES, known, np.full(3, 2.0)))
 
 
 @pytest.mark.parametrize("sigmas", [0.0, 0.5, -1.7, 2.5, -9.0])
@@ -158,8 +169,8 @@ def test_a_range_bends_as_its_cost_does_down_to_a_tenth_of_its_weight(sigmas: fl
 
 def test_what_may_be_claimed_of_ranges_is_their_weight_over_what_they_are_as_wrong_by() -> None:
     claims = np.array([1.0, 2.0, 0.5])
-    found = linearised.weighed_ranges(PROBLEM, POSES, KNOWN, THRESHOLD, claims)
-    plain = linearised.ranges_at(PROBLEM, POSES, KNOWN, THRESHOLD)
+    found = linearised.weighed_ranges(PROBLEM, HERE, claims)
+    plain = linearised.ranges_at(PROBLEM, HERE)
     assert np.array_equal(found.jacobian, plain.jacobian)
     errors = of_ranges(PROBLEM, POSES, KNOWN)
     pair, sigma = PROBLEM.ranges.pair, PROBLEM.ranges.sigma
@@ -172,4 +183,5 @@ def test_what_may_be_claimed_of_ranges_is_their_weight_over_what_they_are_as_wro
 def test_of_no_factors_nothing_is_said() -> None:
     none = np.zeros(len(PROBLEM.ranges), dtype=bool)
     problem = replace(PROBLEM, ranges=PROBLEM.ranges.chosen(none))
-    assert linearised.ranges_at(problem, POSES, KNOWN, THRESHOLD).jacobian.shape == (0, 1, 8)
+    point = point_at(problem, POSES, KNOWN, THRESHOLD)
+    assert linearised.ranges_at(problem, point).jacobian.shape == (0, 1, 12)

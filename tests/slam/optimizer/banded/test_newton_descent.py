@@ -13,8 +13,9 @@ from slam_problems import held_at, stuck, team_problem
 from slam_scenes import Array
 
 from drslamd.slam.optimizer.banded import newton_descent
-from drslamd.slam.optimizer.banded.newton_descent import Point, descend
+from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations, System
+from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.bias_prior import WHOLE
 from drslamd.slam.optimizer.problem import Calibration, Problem
 
@@ -60,8 +61,10 @@ def test_wherever_it_starts_it_comes_to_the_same_answer(seed: int) -> None:
     for _ in range(2):
         away = problem.initial + rng.normal(0, 0.3, problem.initial.shape)
         away[0] = problem.initial[0]
-        began = Calibration(*(rng.normal(0, 0.02, n) for n in (3, 3, 3, 1, 1)))
-        ends.append(descend(Equations(replace(problem, initial=away)), began, MOST))
+        names = {"bias": 3, "scale": 3, "yaw": 3, "near_bias": 1, "team_bias": 1}
+        began = {name: rng.normal(0, 0.02, n) for name, n in names.items()}
+        start = replace(nothing(problem), **began)
+        ends.append(descend(Equations(replace(problem, initial=away)), start, MOST))
     one, other = ends
     assert one.converged
     assert other.converged
@@ -141,6 +144,19 @@ def test_from_poses_a_third_of_a_radian_off_it_takes_few_steps(seed: int) -> Non
     assert point.converged
 
 
+def test_a_step_counts_as_long_as_it_moves_a_bias_or_an_antenna() -> None:
+    """Of what else is learned the units are others."""
+    step = Calibration.zero(2, 2)
+    assert newton_descent._metres_of_sensors(step) == 0
+    step.scale[:], step.yaw[:], step.turn[:], step.near_bias[:] = 9, 9, 9, 9
+    assert newton_descent._metres_of_sensors(step) == 0
+    step.bias[1] = -0.3
+    assert newton_descent._metres_of_sensors(step) == 0.3
+    step.antenna[1, 0] = -0.4
+    assert newton_descent._metres_of_sensors(step) == 0.4
+    assert newton_descent._metres_of_sensors(Calibration.zero(0, 0)) == 0
+
+
 def test_where_many_ranges_are_outliers_the_last_steps_shrink_fast_too() -> None:
     """Robots that were stuck, so that Cauchy's cost bends down where many ranges are: by a tenth of
     their weight it took 86 steps."""
@@ -189,7 +205,7 @@ class Indefinite(Equations):
 
     def at(self, *args: Any) -> tuple[System, Array]:
         system, gradient = super().at(*args)
-        if args[3] == WHOLE:
+        if args[1] == WHOLE:
             system.band[0, 4] = -1.0
         return system, gradient
 
@@ -211,7 +227,7 @@ def test_no_step_makes_it_worse_at_the_thresholds_that_it_began_with() -> None:
     before = from_start(problem, 0)
     for most in range(1, 8):
         now = from_start(problem, most)
-        costs = [equations.cost(p.poses, p.calibration, before.threshold) for p in (before, now)]
+        costs = [equations.cost(p, before.threshold) for p in (before, now)]
         assert costs[1] <= costs[0] * (1 + 1e-9)
         before = now
 
