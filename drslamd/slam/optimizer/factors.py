@@ -37,9 +37,6 @@ STANDING = 64
 """So many poses may have such factors: those of robots that stood while the others drove on. What
 is beyond is nonsense, and would make the team's problem too wide to be solved."""
 
-TINY = 1e-9
-"""m^2; the way of a robot that stands."""
-
 
 @dataclass(frozen=True)
 class Numbering:
