@@ -31,21 +31,25 @@ APART_US = 4 * SECOND_US
 """Between two windows that are asked; a window is up to a minute long."""
 EXCLUDED = 20.0
 """By how much chi-squared of the newest three windows must be worse where wheels run backwards. Of
-fifteen teams all are confirmed after 11 to 40 s (median 20 s), and of forty with wheels that run
-backwards or count wrongly none ever is."""
+fifteen teams all are confirmed after 12 to 44 s (median 20 s), and of forty with wheels that run
+backwards or count wrongly none is."""
 MOVED_M = 1.0
 """A robot that drove less in a window looks the same in a mirror."""
-ASKED = 3
+FEWEST_ASKED, MOST_ASKED = 3, 12
 """Windows that decide."""
-WRONG, CLEAR = 100.0, 50.0
-"""By how much the chi-squared of three windows must fall, over that of a degree of freedom, for the
-configuration to be wrong, and by how much the next kind must be worse, for a mistake to be named.
-Of fifteen robots whose wheels run backwards all are named after 23 to 84 s."""
-BETTER, UNLIKE = 60.0, 20.0
+SHARED = 3
+"""So many windows beyond the third are worth one: they share most of their data."""
+WRONG, CLEAR = 60.0, 30.0
+"""By how much chi-squared must fall, over that of a degree of freedom, for the configuration to be
+wrong, and by how much the next kind must be worse, for wheels that run backwards to be named. Of
+twenty-one such robots all are, after 20 to 48 s, and in eighty pairs without such wheels none."""
+BETTER, UNLIKE = 100.0, 40.0
 """Likewise for a track or a scale to begin with, and by how much all that is no track or scale of
 the same robot must be worse. Of eighteen robots that count wrongly all begin near the truth after
-23 to 48 s; of fifteen healthy ones, and twelve whose counters freeze or wheels spin later, none
-begins elsewhere than configured."""
+24 to 72 s; of fifteen healthy pairs none begins elsewhere than configured, and of six whose sight
+is blocked half of the time one does."""
+INDIFFERENT = -5.0
+"""Who drives straight for long is the same in a mirror: then what is configured is believed."""
 
 _SAID = (Verdict.UNIQUE, Verdict.AMBIGUOUS, Verdict.POOR_FIT)
 
@@ -69,7 +73,7 @@ class MountingSearch:
         self.is_clear = False
         self.is_confirmed = False
         self._fits: deque[bool] = deque(maxlen=RECENT)
-        self._answers: deque[_Answer] = deque(maxlen=ASKED)
+        self._answers: deque[_Answer] = deque(maxlen=MOST_ASKED)
         self._asked_at: int | None = None
 
     def on_verdict(self, verdict: Verdict) -> None:
@@ -85,8 +89,7 @@ class MountingSearch:
     @property
     def is_puzzled(self) -> bool:
         """Do they, and no mistake explains it?"""
-        asked = len(self._answers)
-        return self.poor >= MOST and self.found is None and asked >= ASKED
+        return self.disagrees and self.found is None and len(self._answers) == MOST_ASKED
 
     @property
     def disagrees(self) -> bool:
@@ -100,7 +103,7 @@ class MountingSearch:
             awaits: would the pair be believed if it was confirmed?
         """
         is_late = self._asked_at is None or utime - self._asked_at >= APART_US
-        is_open = self.poor >= MANY or (awaits and not self.is_confirmed)
+        is_open = (self.poor >= MANY or awaits) and not self.is_confirmed
         return is_open and self.found is None and is_late
 
     def begin(self, utime: int) -> None:
@@ -114,13 +117,19 @@ class MountingSearch:
             is_mirror_told: did both robots drive so that mirrored wheels would show?
         """
         self._answers.append(_Answer(costs, measurements - 3))
-        total = np.sum([answer.costs for answer in self._answers], axis=0)
-        self.is_confirmed |= is_as_configured(total, is_mirror_told)
-        if len(self._answers) < ASKED:
+        newest = [answer.costs for answer in self._answers][-FEWEST_ASKED:]
+        self.is_confirmed |= is_as_configured(np.sum(newest, axis=0), is_mirror_told)
+        asked = len(self._answers)
+        if asked < FEWEST_ASKED:
             return
-        case, is_clear = winner(total, sum(answer.freedom for answer in self._answers))
-        # whatever happens to a track or a scale that was right is something else
-        if case is None or (self.is_confirmed and is_learned(case)):
+        worth = FEWEST_ASKED + (asked - FEWEST_ASKED) / SHARED
+        total = worth * np.mean([answer.costs for answer in self._answers], axis=0)
+        freedom = worth * float(np.mean([answer.freedom for answer in self._answers]))
+        if asked == MOST_ASKED:
+            self.is_confirmed |= bool(_backwards(total - total[0], True) >= INDIFFERENT)
+        case, is_clear = winner(total, freedom)
+        # whatever happens to a mounting that was right is something else
+        if case is None or self.is_confirmed:
             return
         self.found, self.is_clear = case, is_clear
         self.is_confirmed = is_learned(case)
@@ -136,19 +145,23 @@ def is_as_configured(chi2: Array, is_mirror_told: bool) -> bool:
         chi2: (cases,) of up to three windows.
     """
     worse = chi2 - chi2[0]
-    backwards = [
-        by
+    return bool(worse.min() >= 0 and _backwards(worse, is_mirror_told) >= EXCLUDED)
+
+
+def _backwards(worse: Array, is_mirror_told: bool) -> float:
+    """The least of what windows have against wheels that run backwards."""
+    return min(
+        float(by)
         for by, case in zip(worse, CASES, strict=True)
         if not is_learned(case) and (is_mirror_told or case != MIRROR)
-    ]
-    return bool(worse.min() >= 0 and min(backwards) >= EXCLUDED)
+    )
 
 
-def winner(chi2: Array, freedom: int) -> tuple[Case | None, bool]:
+def winner(chi2: Array, freedom: float) -> tuple[Case | None, bool]:
     """Which of `CASES` explains windows, if any does, and whether only that one does.
 
     Args:
-        chi2: (cases,) of three windows.
+        chi2: (cases,) of all windows together; freedom: degrees of it.
     """
     best = int(np.argmin(chi2))
     level = float(chi2[best]) / freedom
@@ -157,10 +170,11 @@ def winner(chi2: Array, freedom: int) -> tuple[Case | None, bool]:
     worse = (chi2 - chi2[best]) / max(level, 1.0)
     case = CASES[best]
     others = min(by for by, other in zip(worse, CASES, strict=True) if other.kind != case.kind)
-    is_clear = bool(worse[0] >= WRONG and others >= CLEAR)
+    if not is_learned(case):
+        return (case, True) if worse[0] >= WRONG and others >= CLEAR else (None, False)
     unlike = min(by for by, other in zip(worse, CASES, strict=True) if not _is_like(other, case))
-    is_start = is_learned(case) and worse[0] >= BETTER and unlike >= UNLIKE
-    return (case if is_clear or is_start else None), is_clear
+    is_start = worse[0] >= BETTER and unlike >= UNLIKE
+    return (case, bool(others >= UNLIKE)) if is_start else (None, False)
 
 
 def is_learned(case: Case) -> bool:
