@@ -58,7 +58,6 @@ SLAM_ORDER = [
     "closure_method",
     "tuning",
     "settings",
-    "pose_now",
     "range_watch",
     "doubt",
     "keyframe_selector",
