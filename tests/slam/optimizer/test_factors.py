@@ -23,11 +23,19 @@ from slam_scenes import (
 from drslamd.conventions import Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.graph.chain_data import ChainData
+from drslamd.slam.graph.estimate import Learned, TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.thinning.chain_view import whole
+from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.optimizer import factors
-from drslamd.slam.optimizer.factors import Numbering, chain_links, numbering, sensible
+from drslamd.slam.optimizer.factors import (
+    Numbering,
+    chain_links,
+    corrections,
+    numbering,
+    sensible,
+)
 from drslamd.slam.robot_model import RobotModel
 
 A, B, C = Chain(0, 5), Chain(1, 6), Chain(2, 7)
@@ -246,6 +254,60 @@ def test_withdrawn_closures_and_those_of_other_groups_are_no_edges() -> None:
 
 def test_no_items_are_no_edges() -> None:
     assert factors.between_factors([]).covariance.shape == (0, 3, 3)
+
+
+# mountings that are not as configured
+
+
+FOUND = (0.1, 0.4, -0.06, -0.2), (0.1, 0.5, -0.08, -0.3), (0.12, 0.9, 0.0, 0.0)
+"""With which scale and turn of a and of b three closures were found."""
+
+
+def found_with(*corrected: tuple[float, float, float, float]) -> PoseGraph:
+    graph = two_robots(told=False)
+    items = [
+        replace(closure(k, 10 * k, B, 1005 + 10 * k, (1, 0, 0)), corrected=each)
+        for k, each in enumerate(corrected)
+    ]
+    graph.insert(A, GraphEntry(1, closures=tuple(items)))
+    return graph
+
+
+def solved_for(robots: tuple[int, ...], turn: dict[int, Learned]) -> TeamEstimate:
+    nowhere = np.zeros(0, dtype=int), np.zeros((0, 3))
+    chains = {0: A, 1: B}
+    return TeamEstimate(
+        Segment(*A, 0),
+        {robot: Trajectory(chains[robot], *nowhere) for robot in robots},
+        scale={0: Learned(0.03, 0.01), 1: Learned(0.02, 0.01)},
+        yaw={0: Learned(0.001, 0.01), 1: Learned(0.002, 0.01)},
+        turn=turn,
+    )
+
+
+def test_closures_tell_with_which_mountings_they_were_found() -> None:
+    """The middle of what they say of a robot, of each number by itself."""
+    known = corrections(found_with(*FOUND), [0, 1], None)
+    assert known == {0: Correction(0.1, 0.0, 0.5), 1: Correction(-0.06, 0.0, -0.2)}
+    assert corrections(found_with(*FOUND), [1], None).keys() == {1}
+
+
+def test_where_all_are_mounted_as_configured_there_is_nothing_to_correct() -> None:
+    assert corrections(found_with(*[(0.0,) * 4] * 3), [0, 1], None) == {}
+    assert corrections(two_robots(), [0, 1], None) == {}
+    one_sided = found_with((0.0, 0.0, 0.1, 0.2))
+    assert corrections(one_sided, [0, 1], None) == {1: Correction(0.1, 0.0, 0.2)}
+
+
+def test_of_who_was_in_the_last_solution_that_is_believed_and_not_the_closures() -> None:
+    graph = found_with(*FOUND)
+    both = solved_for((0, 1), {1: Learned(0.35, 0.02)})
+    assert corrections(graph, [0, 1], both) == {1: Correction(0.02, 0.002, 0.35)}
+    one = solved_for((0,), {0: Learned(0.35, 0.02)})
+    assert corrections(graph, [0, 1], one) == {
+        0: Correction(0.03, 0.001, 0.35),
+        1: Correction(-0.06, 0.0, -0.2),
+    }
 
 
 # edges that reach far

@@ -127,6 +127,19 @@ def test_the_next_solution_begins_with_the_mountings_that_were_let_go() -> None:
     assert not first.problem.doubted.any()
 
 
+def test_who_was_not_solved_before_begins_with_the_mountings_of_its_closures() -> None:
+    team = small_team(1, count=12)
+    graph = PoseGraph()
+    for chain, entry in team.entries:
+        found = tuple(replace(c, corrected=(0.0, 0.0, 0.1, 0.4)) for c in entry.closures)
+        graph.insert(chain, replace(entry, closures=found))
+    built = build_problem(graph, group_of(graph), None, BANDED)
+    assert built.problem.doubted.track.tolist() == [False, True, True]
+    # of robot 2 two of two say so, of robot 1 half: those that it made itself
+    assert built.start.turn.tolist() == [0, 0.2, 0.4]
+    assert built.start.scale.tolist() == [0, 0.05, 0.1]
+
+
 def test_mountings_that_are_still_in_doubt_are_named_by_their_robots(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
