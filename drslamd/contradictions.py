@@ -66,7 +66,7 @@ def doubt(found: Doubt | None) -> str | None:
         return None
     if found.reason is Reason.ODOMETRY:
         return (
-            f"the pose is doubtful: odometry is {found.level:.0f} times as wrong as configured; "
+            f"the pose is doubtful: odometry is {_times(found.level)} as wrong as configured; "
             "the wheels slip or spin, or a counter stands; look at them, or drive more slowly"
         )
     if len(found.peers) == 1:
@@ -79,6 +79,11 @@ def doubt(found: Doubt | None) -> str | None:
         f"the pose is doubtful: ranges to robots {peers} do not fit the odometry of this robot; "
         "its wheels slip or stand, or its antenna is covered so that sight is blocked"
     )
+
+
+def _times(level: float) -> str:
+    """In few words, so that a sentence stays the same while it means the same."""
+    return "over ten times" if level > 10 else "some times"
 
 
 def partners(robots: Iterable[int]) -> str | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -27,6 +27,7 @@ from drslamd.slam.relative_pose.estimate import PairNoise, RelativePoseEstimate
 from drslamd.slam.relative_pose.pair_end import PairEnd
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 from drslamd.slam.relative_pose.range_sampler import RangeSampler
+from drslamd.slam.relative_pose.what_if import Case
 from drslamd.slam.relative_pose.window_request import WindowRequest, request
 from drslamd.slam.se2 import Array
 from drslamd.slam.tuning import DEFAULTS, Tuning
@@ -62,8 +63,10 @@ class WhatIfJob(NamedTuple):
     run: Callable[[], tuple[Array, float]]
 
 
-def _asked(question: what_if.Question, noise: PairNoise, delta: float) -> tuple[Array, float]:
-    return question.costs(noise, delta), question.way_m
+def _asked(
+    question: what_if.Question, cases: Sequence[Case], noise: PairNoise, delta: float
+) -> tuple[Array, float]:
+    return question.costs(cases, noise, delta), question.way_m
 
 
 class FrontEnd:
@@ -272,7 +275,8 @@ class FrontEnd:
                 continue
             pair.search.begin(utime)
             question = what_if.ask(found, a, b)
-            run = partial(_asked, question, self._noise(pair, b), self._delta)
+            noise = self._noise(pair, b)
+            run = partial(_asked, question, pair.search.cases, noise, self._delta)
             out.append(WhatIfJob(pair, found, run))
         return out
 

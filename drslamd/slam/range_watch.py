@@ -21,7 +21,7 @@ from drslamd.slam.relative_pose.pair_end import PairEnd, level
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 from drslamd.slam.se2 import Array
 
-FAR_SIGMAS = 4.0
+FAR_SIGMAS = 3.0
 """Beyond them a range does not fit."""
 IN_A_ROW = 2
 """So many seconds of them are doubt; a burst is shorter."""

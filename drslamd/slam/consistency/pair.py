@@ -124,6 +124,7 @@ class PairTracker:
         self.search = MountingSearch()
         self._checked: Checked | None = None
         self._is_busy = False
+        self._is_obsolete = False
         self._corrections = UNCORRECTED
         self._segments: tuple[Segment, Segment] | None = None
         self._pending: deque[tuple[int, WindowRequest, RelativePoseEstimate]]
@@ -166,7 +167,11 @@ class PairTracker:
         Args:
             way_m: how far the robot drove that drove less.
         """
-        self.search.on_costs(costs, len(request.window), way_m > MOVED_M)
+        if self.search.on_costs(costs, len(request.window), way_m > MOVED_M):
+            # what was found with odometry as configured is worth nothing
+            self._pending.clear()
+            self._checked, self.connected, self.kept = None, False, ()
+            self._is_obsolete = self._is_busy
 
     # ---- module 2 ----
 
@@ -264,6 +269,9 @@ class PairTracker:
     def on_check(self, checked: Checked) -> None:
         """Module 2 has answered: is the pair connected now?"""
         self._is_busy = False
+        if self._is_obsolete:
+            self._is_obsolete = False
+            return
         self._checked, self.kept = checked, checked.kept()
         enough = len(self.kept) >= self.agreement.least
         if self.connected and enough:

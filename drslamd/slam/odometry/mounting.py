@@ -36,6 +36,10 @@ LEARNED = (Fault.TRACK, Fault.SCALE)
 """Faults that module 3 learns once it is close."""
 
 
+FINER = 1.06
+"""Odometry that is wrong by half of that is right enough for windows of a minute."""
+
+
 class Repair(NamedTuple):
     """What makes the odometry of one robot right (see above), if it has this fault."""
 
@@ -63,6 +67,17 @@ class Repair(NamedTuple):
         place = np.concatenate([poses[:1, :2], poses[0, :2] + moved])
         return np.column_stack([place, heading])
 
+    def variants(self) -> tuple[Repair, ...]:
+        """The same, way and turn a little more or less; of what has no factor only itself."""
+        if self.fault not in LEARNED:
+            return (self,)
+        factors = (1.0, 1 / FINER, FINER)
+        return tuple(
+            self._replace(way=self.way * way, turn=self.turn * turn)
+            for way in factors
+            for turn in factors
+        )
+
 
 def _chord(turn: Array) -> Array:
     """Of an arc of length 1."""
@@ -75,7 +90,10 @@ SIDES = (
     Repair(Fault.LEFT_REVERSED, way=0.0, turn=0.0, cross=1.0),
     Repair(Fault.RIGHT_REVERSED, way=0.0, turn=0.0, cross=-1.0),
 )
-TRACKS = tuple(Repair(Fault.TRACK, turn=k) for k in (0.67, 0.8, 1.25, 1.5))
+TRACKS = tuple(Repair(Fault.TRACK, turn=k) for k in (0.67, 0.74, 0.82, 1.22, 1.35, 1.5))
 """With a scale and a turn between two of them windows and odometry agree well enough."""
-SCALES = tuple(Repair(Fault.SCALE, k, k) for k in (0.5, 0.58, 0.67, 0.8, 1.25, 1.5, 1.73, 2.0))
+SCALES = tuple(
+    Repair(Fault.SCALE, k, k)
+    for k in (0.5, 0.55, 0.61, 0.67, 0.74, 0.82, 1.22, 1.35, 1.5, 1.65, 1.82, 2.0)
+)
 """See `TRACKS`; all counts are wrong by the same factor, those of turns too."""

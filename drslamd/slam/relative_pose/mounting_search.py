@@ -10,12 +10,14 @@ and it is not clear which, nothing is named, and module 3 begins at the best of 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from drslamd.conventions import SECOND_US
 from drslamd.slam.odometry.mounting import LEARNED, Fault
+from drslamd.slam.relative_pose import what_if
 from drslamd.slam.relative_pose.estimate import Verdict
 from drslamd.slam.relative_pose.range_fit import POOR_FIT
 from drslamd.slam.relative_pose.what_if import CASES, MIRROR, Case
@@ -82,6 +84,11 @@ class MountingSearch:
             self._fits.append(verdict is not Verdict.POOR_FIT)
 
     @property
+    def cases(self) -> Sequence[Case]:
+        """What the next window is asked."""
+        return CASES if self.found is None else what_if.variants(self.found)
+
+    @property
     def poor(self) -> int:
         """How many windows of late disagree."""
         return len(self._fits) - sum(self._fits)
@@ -104,24 +111,27 @@ class MountingSearch:
         """
         is_late = self._asked_at is None or utime - self._asked_at >= APART_US
         is_open = (self.poor >= MANY or awaits) and not self.is_confirmed
-        return is_open and self.found is None and is_late
+        is_vague = self.found is not None and is_learned(self.found) and self.disagrees
+        return is_late and (is_open or is_vague)
 
     def begin(self, utime: int) -> None:
         """A window is asked now."""
         self._asked_at = utime
 
-    def on_costs(self, costs: Array, measurements: int, is_mirror_told: bool) -> None:
-        """`what_if.Question.costs` of a window are known.
+    def on_costs(self, costs: Array, measurements: int, is_mirror_told: bool) -> bool:
+        """`what_if.Question.costs` of a window are known. Is something found that was not before?
 
         Args:
             is_mirror_told: did both robots drive so that mirrored wheels would show?
         """
         self._answers.append(_Answer(costs, measurements - 3))
+        if self.found is not None:
+            return self._refine(self.found)
         newest = [answer.costs for answer in self._answers][-FEWEST_ASKED:]
         self.is_confirmed |= is_as_configured(np.sum(newest, axis=0), is_mirror_told)
         asked = len(self._answers)
         if asked < FEWEST_ASKED:
-            return
+            return False
         worth = FEWEST_ASKED + (asked - FEWEST_ASKED) / SHARED
         total = worth * np.mean([answer.costs for answer in self._answers], axis=0)
         freedom = worth * float(np.mean([answer.freedom for answer in self._answers]))
@@ -130,12 +140,23 @@ class MountingSearch:
         case, is_clear = winner(total, freedom)
         # whatever happens to a mounting that was right is something else
         if case is None or self.is_confirmed:
-            return
+            return False
         self.found, self.is_clear = case, is_clear
         self.is_confirmed = is_learned(case)
         # windows with the repair speak for themselves
         self._fits.clear()
         self._answers.clear()
+        return True
+
+    def _refine(self, found: Case) -> bool:
+        """Windows with the repair disagree: is it a little more, or less?"""
+        total = np.sum([answer.costs for answer in self._answers], axis=0)
+        best = what_if.variants(found)[int(np.argmin(total))]
+        if len(self._answers) < FEWEST_ASKED:
+            return False
+        self._answers.clear()
+        self.found = best
+        return best != found
 
 
 def is_as_configured(chi2: Array, is_mirror_told: bool) -> bool:

@@ -6,6 +6,7 @@ that the robots would have had if the wheels of one of them were mounted otherwi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -51,6 +52,11 @@ CASES = (
     # a team that was configured from one file is wrong in the same way
     *(Case(repair, repair) for repair in SCALES),
 )
+
+
+def variants(found: Case) -> tuple[Case, ...]:
+    """The same mistake a little smaller and larger, itself first."""
+    return tuple(Case(a, b) for a in found.a.variants() for b in found.b.variants())
 
 
 @dataclass(frozen=True)
@@ -103,9 +109,9 @@ class Question:
         ways = (np.diff(stretch.poses[:, :2], axis=0) for stretch in (self.a, self.b))
         return min(float(np.nansum(np.hypot(*way.T))) for way in ways)
 
-    def costs(self, noise: PairNoise, delta: float) -> Array:
-        """(cases,) chi-squared of the best pose under each of `CASES`, infinite where none fits."""
-        return np.array([self._cost(case, noise, delta) for case in CASES])
+    def costs(self, cases: Sequence[Case], noise: PairNoise, delta: float) -> Array:
+        """(cases,) chi-squared of the best pose under each of them, infinite where none fits."""
+        return np.array([self._cost(case, noise, delta) for case in cases])
 
     def _cost(self, case: Case, noise: PairNoise, delta: float) -> float:
         if not (self.a.can_be(case.a) and self.b.can_be(case.b)):

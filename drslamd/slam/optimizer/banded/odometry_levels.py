@@ -13,6 +13,7 @@ grow.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,7 +43,9 @@ BEFORE = 30
 """Steps of the grid by which a fault may be older than the first range that shows it."""
 DOUBT_OF_CELL = 0.1
 """Degrees of freedom that hold a cell at its nominal noise."""
-ROUNDS_OF_ROBOTS = 4
+BESIDE = 0.3
+"""Of the worst s / g: a robot below that is believed until the worst ones are not."""
+ROUNDS_OF_ROBOTS = 5
 ROUNDS_OF_CELLS = 8
 SETTLED = 0.1
 """Of log variance: levels that move less are done."""
@@ -118,7 +121,9 @@ def _robots_raised(equations: Equations, point: Point, ratio: Array) -> tuple[Ar
     if not (ratio > STANDS_OUT).any():
         return level, point
     for _ in range(ROUNDS_OF_ROBOTS):
-        raise_by = np.where(ratio > TARGET, 2 * ratio / TARGET, 1.0)
+        # whoever contradicts all others makes them look bad too
+        worst = (ratio > TARGET) & (ratio >= ratio.max() * BESIDE)
+        raise_by = np.where(worst, 2 * ratio / TARGET, 1.0)
         level = np.minimum(level * raise_by, MOST_LEVEL**2)
         point, now = _solved(equations, level[robot], point)
         ratio = now.ratio(robot, len(ratio))
@@ -131,8 +136,13 @@ def _run_level(problem: Problem, found: list[Run]) -> Array:
     """(m,) what a run of outliers makes of the links that may be the cause."""
     odometry = problem.odometry
     level = np.ones(len(odometry))
+    count = _runs_of(found)
+    most = max(count.values(), default=0)
     for run in found:
+        # where outliers of two pairs meet in one robot, their other ends are witnesses
         for robot, n in ((run.i, run.n_i), (run.j, run.n_j)):
+            if count[robot] < most:
+                continue
             since = problem.n[odometry.j] >= n - BEFORE
             level[since & (odometry.robot == robot)] = FIRST_LEVEL**2
     return level
@@ -140,8 +150,13 @@ def _run_level(problem: Problem, found: list[Run]) -> Array:
 
 def _is_one_robot(found: list[Run]) -> bool:
     """Do outliers of two pairs meet in one robot, or do those of one pair last very long?"""
-    ends = [end for run in found for end in (run.i, run.j)]
-    return any(ends.count(end) > 1 for end in ends) or any(r.count >= LONG_RUN for r in found)
+    meet = any(count > 1 for count in _runs_of(found).values())
+    return meet or any(run.count >= LONG_RUN for run in found)
+
+
+def _runs_of(found: list[Run]) -> Counter[int]:
+    """In how many runs of outliers each robot is."""
+    return Counter(end for run in found for end in (run.i, run.j))
 
 
 def _cells_settled(equations: Equations, point: Point, variance: Array) -> tuple[Array, Point]:
