@@ -15,8 +15,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from drslamd import diagnosis
 from drslamd.broadcast import Broadcast
+from drslamd.conditions import diagnosis
+from drslamd.conditions.health import Health
 from drslamd.config import Config
 from drslamd.conventions import MILLISECOND_US, SECOND_US, Chain
 from drslamd.events import (
@@ -44,7 +45,6 @@ from drslamd.gossip.bounds import is_sayable
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
-from drslamd.health import Health
 from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, WHAT_IF, Job, Jobs
 from drslamd.memory import Memory
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput

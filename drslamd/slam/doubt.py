@@ -53,7 +53,7 @@ def doubt_of(
     """
     if estimate is None:
         return None
-    level = estimate.odometry_level.get(robot, 1.0)
+    level = estimate.late_level.get(robot, 1.0)
     if level >= MUCH_WORSE:
         return Doubt(robot, Reason.ODOMETRY, level=level)
     partners = {b if a == robot else a for a, b in estimate.bias_m if robot in (a, b)}

@@ -22,7 +22,9 @@ def team(
         {},
         bias_m={pair: Learned(0.0, 0.1) for pair in pairs},
         contradicted=frozenset(contradicted),
-        odometry_level=level or {},
+        late_level=level or {},
+        # what it must be feared to be is no doubt of now
+        odometry_level={0: 9.0, 1: 9.0, 2: 9.0},
     )
 
 

@@ -255,13 +255,12 @@ def test_blocked_ranges_are_left_out_while_half_of_them_remain(blocked: int, wro
     assert (scene.look(solved())[PARTNER] == 1) is wrong
 
 
-def test_a_pose_of_later_is_carried_back_along_the_way() -> None:
+@pytest.mark.parametrize(("sigmas", "wrong"), BOTH_SIDES)
+def test_a_pose_of_later_is_carried_back_along_the_way(sigmas: float, wrong: bool) -> None:
     """We were solved half a second after the last word of the partner."""
-    scene = Scene(end=NEWEST + 10)
     later = replace(solved(), trajectories={**solved().trajectories, OWN: solved_own(NEWEST + 5)})
-    metres = measured(between(ways=((-0.25, 0.0), (1.5, 0.0))), 0.0, SIGMA)
-    assert is_off(scene, later, metres) is False
-    assert is_off(Scene(end=NEWEST + 10), later, metres + 5 * SIGMA) is True
+    metres = measured(between(ways=((-0.25, 0.0), (1.5, 0.0))), sigmas, SIGMA)
+    assert is_off(Scene(end=NEWEST + 10), later, metres) is wrong
 
 
 def solved_own(n: int) -> Trajectory:

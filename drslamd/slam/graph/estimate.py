@@ -70,6 +70,7 @@ class TeamEstimate:
         scatter: how many times the configured sigma the ranges of a pair scatter.
         odometry_level: how many times the sigma of a robot's odometry is what is configured, of
             late, as far as it must be feared; 1 where none is named.
+        late_level: likewise, of the last seconds only.
         contradicted: pairs whose ranges of late do not fit the rest.
         is_explained: is the model, with what was learned, one of what was measured?
         lifted: state of the relaxation, with `rbcd`.
@@ -87,6 +88,7 @@ class TeamEstimate:
     antenna_m: dict[int, tuple[Learned, Learned]] = field(default_factory=dict)
     scatter: dict[tuple[int, int], float] = field(default_factory=dict)
     odometry_level: dict[int, float] = field(default_factory=dict)
+    late_level: dict[int, float] = field(default_factory=dict)
     contradicted: frozenset[tuple[int, int]] = frozenset()
     is_explained: bool = True
     cost: float = 0.0

@@ -60,7 +60,7 @@ def variants(found: Case) -> tuple[Case, ...]:
 
 
 @dataclass(frozen=True)
-class Stretch:
+class WindowTrack:
     """The 10 Hz track of one robot under a window.
 
     Attributes:
@@ -75,13 +75,13 @@ class Stretch:
     half_track_m: float
 
     @staticmethod
-    def of(end: PairEnd, request: WindowRequest) -> Stretch:
+    def of(end: PairEnd, request: WindowRequest) -> WindowTrack:
         at = end.grid(request.utime + request.window.t * SECOND_US)
         reference = float(end.grid(request.utime)[0])
         first, last = (int(np.floor(v)) for v in (min(at[0], reference), max(at[-1], reference)))
         last = min(last + 1, end.track.end - 1)
         poses = end.track.at_time(np.arange(first, last + 1))
-        return Stretch(poses, at - first, reference - first, end.data.model.half_track_m)
+        return WindowTrack(poses, at - first, reference - first, end.data.model.half_track_m)
 
     def can_be(self, repair: Repair) -> bool:
         return not repair.cross or self.half_track_m > 0
@@ -100,8 +100,8 @@ class Question:
     """A window that disagrees, and the tracks under it."""
 
     window: Window
-    a: Stretch
-    b: Stretch
+    a: WindowTrack
+    b: WindowTrack
 
     @property
     def way_m(self) -> float:
@@ -124,4 +124,4 @@ class Question:
 
 def ask(request: WindowRequest, a: PairEnd, b: PairEnd) -> Question:
     """What a computation needs, copied: tracks grow meanwhile."""
-    return Question(request.window, Stretch.of(a, request), Stretch.of(b, request))
+    return Question(request.window, WindowTrack.of(a, request), WindowTrack.of(b, request))

@@ -1,4 +1,4 @@
-"""Sentences read as people would: whom they are about, which key they name, and is that right?"""
+"""Sentences are read as people would: whom they are about, which key they name, is that right?"""
 
 from __future__ import annotations
 

@@ -23,7 +23,6 @@ from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.banded import banded_solver
-from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.factors import Numbering
@@ -200,7 +199,8 @@ def _solve(team: TeamProblem, group: Group) -> TeamEstimate:
         turn={robot: turn[robot] for robot in compress(mine, doubted.track)},
         antenna_m={robot: (x[robot], y[robot]) for robot in compress(mine, doubted.antenna)},
         scatter=dict(zip(team.pairs, solution.scatter.tolist(), strict=True)),
-        odometry_level=_latest(team, solution),
+        odometry_level=_latest(team, solution.feared_level),
+        late_level=_latest(team, solution.late_level),
         contradicted=frozenset(
             pair for pair, bad in zip(team.pairs, solution.contradicted, strict=True) if bad
         ),
@@ -211,11 +211,11 @@ def _solve(team: TeamProblem, group: Group) -> TeamEstimate:
     )
 
 
-def _latest(team: TeamProblem, solution: Solution) -> dict[int, float]:
+def _latest(team: TeamProblem, of_links: Array) -> dict[int, float]:
     """Of the last link of each robot, where it is not as configured."""
     robot = team.problem.odometry.robot
     last = {team.chains[index].robot: k for k, index in enumerate(robot.tolist())}
-    levels = {name: float(solution.feared_level[k]) for name, k in last.items()}
+    levels = {name: float(of_links[k]) for name, k in last.items()}
     return {name: level for name, level in levels.items() if level > 1.0}
 
 

@@ -68,6 +68,7 @@ def solve(
         spread=spread,
         odometry_level=explained.level,
         feared_level=np.sqrt(explained.feared),
+        late_level=np.sqrt(explained.lately),
         is_explained=explained.other is None,
         contradicted=contradicted(problem, point),
         doubted=claims.still_doubted(problem.doubted, point.calibration, spread),

@@ -41,7 +41,7 @@ class Explanation:
         point: its solution.
         other: the solution of another explanation, when nobody can tell which is right.
         level: (m,) sigmas of odometry over what is configured, as far as it was seen.
-        feared: (m,) variances likewise, as far as it must be feared.
+        feared: (m,) variances likewise, as far as it must be feared; lately: of the last seconds.
     """
 
     equations: Equations
@@ -49,6 +49,7 @@ class Explanation:
     other: Point | None
     level: Array
     feared: Array
+    lately: Array
 
 
 @dataclass(frozen=True)
@@ -91,15 +92,15 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
         levels = odometry_levels.levelled(base, point, said.ratio, said.runs, most, tolerance)
         seen = np.sqrt(levels.seen)
         if levels.is_odometry:
-            return Explanation(base, levels.point, None, seen, levels.feared)
+            return Explanation(base, levels.point, None, seen, levels.feared, levels.lately)
     # what was tried last is what remains of the nominal solution
-    return Explanation(equations, nominal, levels.point, seen, levels.feared)
+    return Explanation(equations, nominal, levels.point, seen, levels.feared, levels.lately)
 
 
 def _as_is(equations: Equations, point: Point, ratio: Array) -> Explanation:
     robot = equations.problem.odometry.robot
     feared = np.maximum(ratio, 1.0)[robot]
-    return Explanation(equations, point, None, np.ones(len(robot)), feared)
+    return Explanation(equations, point, None, np.ones(len(robot)), feared, feared)
 
 
 def _checked(equations: Equations, point: Point) -> _Check:

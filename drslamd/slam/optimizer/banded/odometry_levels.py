@@ -71,13 +71,15 @@ class Levels:
     Attributes:
         point: the solution with odometry as far as it deserves to be believed.
         seen: (m,) variance of each link over the nominal one, as far as it was seen.
-        feared: (m,) likewise, as far as it must be feared.
+        feared: (m,) likewise, as far as it must be feared: who slipped before may again.
+        lately: (m,) likewise, of the last seconds only.
         is_odometry: does this explain what was measured?
     """
 
     point: Point
     seen: Array
     feared: Array
+    lately: Array
     is_odometry: bool
 
 
@@ -103,10 +105,13 @@ def levelled(
     seen, point = _cells_settled(equations, point, start)
     believed = Equations(raised(problem, seen, point), like=equations)
     point = descend(believed, point.calibration, most, tolerance)
+    lately, so_far = _lingering(problem, seen)
+    lately = np.maximum(lately, level[robot])
     return Levels(
         point,
         seen,
-        feared=TARGET * np.maximum(_lingering(problem, seen), level[robot]),
+        feared=TARGET * np.maximum(lately, so_far),
+        lately=TARGET * lately,
         is_odometry=bool(
             point.converged
             and outlier_share(problem, point).max(initial=0) < FEW_OUTLIERS
@@ -183,19 +188,23 @@ def _wanted(now: Misfit, variance: Array, cell: Index) -> Array:
     return wanted[cell]
 
 
-def _lingering(problem: Problem, variance: Array) -> Array:
-    """(m,) what was seen, and what went on before: it takes time until it is seen."""
+def _lingering(problem: Problem, variance: Array) -> tuple[Array, Array]:
+    """(m,) what was seen, and what went on before: it takes time until it is seen.
+
+    And (m,) the mean of all that went on until then.
+    """
     odometry = problem.odometry
-    feared: Array = variance.copy()
+    lately, so_far = variance.copy(), variance.copy()
     for robot in range(len(problem.priors.scale)):
         mine = np.flatnonzero(odometry.robot == robot)
         mine = mine[np.argsort(problem.n[odometry.j[mine]])]
         n, sums = problem.n[odometry.j[mine]], np.append(0.0, np.cumsum(variance[mine]))
         first = np.searchsorted(n, n - MEMORY)
         after = np.arange(len(mine)) + 1
-        lately: Array = (sums[after] - sums[first]) / (after - first)
-        feared[mine] = np.maximum(variance[mine], lately)
-    return feared
+        mean: Array = (sums[after] - sums[first]) / (after - first)
+        lately[mine] = np.maximum(variance[mine], mean)
+        so_far[mine] = sums[after] / after
+    return lately, so_far
 
 
 def _solved(equations: Equations, variance: Array, near: Point) -> tuple[Point, Misfit]:

@@ -20,7 +20,7 @@ class Solution:
         joint: (3 k, 3 k) covariance of x, y, theta in w of the k poses that were asked for.
         spread: sigmas of the calibration.
         odometry_level: (m,) sigmas of the links of odometry over what was configured, as far as
-            it was seen; feared_level: as far as it must be feared.
+            it was seen; feared_level: as far as it must be feared; late_level: of the last seconds.
         doubted: whose mountings were let go.
         is_explained: is the model, with these levels, one of what was measured?
         contradicted: (pairs,) whose ranges of late do not fit.
@@ -36,6 +36,7 @@ class Solution:
     spread: Calibration | None = None
     odometry_level: Array = field(default_factory=lambda: np.zeros(0))
     feared_level: Array = field(default_factory=lambda: np.zeros(0))
+    late_level: Array = field(default_factory=lambda: np.zeros(0))
     is_explained: bool = True
     contradicted: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     doubted: Doubted = field(default_factory=lambda: Doubted.none(0))

@@ -160,7 +160,12 @@ def test_mountings_that_are_still_in_doubt_are_named_by_their_robots(
         doubted = Doubted(np.array([False, True, True]), np.array([True, False, False]))
         level = 3.0 + team_problem_links(team, group)
         return replace(
-            found, calibration=values, spread=spread, doubted=doubted, feared_level=level
+            found,
+            calibration=values,
+            spread=spread,
+            doubted=doubted,
+            feared_level=level,
+            late_level=level / 12,
         )
 
     monkeypatch.setattr(banded_solver, "solve", solve)
@@ -169,6 +174,8 @@ def test_mountings_that_are_still_in_doubt_are_named_by_their_robots(
     assert estimate.antenna_m == {0: (Learned(0.0, 6.0), Learned(1.0, 7.0))}
     # of the last link of each robot, as far as it must be feared
     assert estimate.odometry_level == {0: 13.0, 1: 14.0, 2: 15.0}
+    # and what is as configured is not named
+    assert estimate.late_level == pytest.approx({0: 13 / 12, 1: 14 / 12, 2: 15 / 12})
 
 
 def team_problem_links(team: SmallTeam, group: Group) -> Array:

@@ -8,8 +8,8 @@ from message_builders import a_status, forged
 from pair_scenes import BESIDE, asked_at, estimate_of
 from robot_scenes import RobotScene
 
+from drslamd.conditions.diagnosis import conditions, why_not_localised
 from drslamd.conventions import SECOND_US
-from drslamd.diagnosis import conditions, why_not_localised
 from drslamd.events import ChannelMessage, JobDone, NetworkState, PortCondition, PortState, Send
 from drslamd.gossip import messages
 from drslamd.gossip.message_types import Heard

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol
 
-from drslamd import contradictions
+from drslamd.conditions import contradictions
 from drslamd.config import Config
 from drslamd.conventions import SECOND_US
 from drslamd.events import NetworkState, PortCondition, PortState

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drslamd import contradictions
+from drslamd.conditions import contradictions
 from drslamd.slam.doubt import Doubt, Reason
 from drslamd.slam.odometry.mounting import SIDES, Fault, Repair
 from drslamd.slam.relative_pose.estimate import Verdict
