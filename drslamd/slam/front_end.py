@@ -92,7 +92,7 @@ class FrontEnd:
         self._nlos_db, self._epsilon = section.nlos_db, config.consistency.epsilon
         self._tells_all = config.optimizer.algorithm != "banded"
         noise = known.narrowed(settings.odometry_noise(config.odometry))
-        self.model = settings.robot_model(config, noise)
+        self.model = known.mounted(settings.robot_model(config, noise))
         self.reckoning = DeadReckoning()
         self.ranges: dict[int, RangeBuffer] = {}
         self.pairs: dict[int, PairTracker] = {}
