@@ -111,7 +111,6 @@ class Robot:
         self.health = Health()
         self.ports: dict[str, PortState] = {}
         self.network: NetworkState | None = None
-        """Why nothing is kept over a restart; empty while it is."""
         self.jobs = Jobs()
         self.timers = Timers(self._periods())
         self.memory = Memory(self.own, self.team.seal, self.calibration)

@@ -252,6 +252,7 @@ def test_a_peer_that_fell_silent_is_not_alive_and_of_its_clock_little_is_known()
 @pytest.mark.parametrize(("count", "is_connected"), [(4, False), (5, True)])
 def test_of_a_pair_windows_and_closures_are_counted(count: int, is_connected: bool) -> None:
     scene, pair = RobotScene(), OwnedPair(AGREEMENT)
+    pair.confirm()
     pair.answer(10)
     pair.see(MIRRORED, 1)
     pair.see(BESIDE, count, first=20)

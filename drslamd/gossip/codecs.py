@@ -241,7 +241,9 @@ def _read_closure(c: Any, peers: list[Chain]) -> ClosureMeasurement:
     covariance = tuple(c.covariance)
     if not bounds.is_closure(pose, covariance):
         raise ValueError("closure with a pose or a covariance that is none")
-    a_scale, a_turn, b_scale, b_turn = (part * CORRECTION_STEP for part in c.corrected)
+    for steps in c.corrected:
+        bounded("correction", steps, -MOST_STEPS, MOST_STEPS)
+    a_scale, a_turn, b_scale, b_turn = (steps * CORRECTION_STEP for steps in c.corrected)
     corrected = a_scale, a_turn, b_scale, b_turn
     return ClosureMeasurement(
         number=c.number,

@@ -66,6 +66,30 @@ def test_a_range_finer_than_a_millimetre_of_sigma_is_still_a_range() -> None:
     assert back.ranges[0].sigma_m == pytest.approx(0.001)
 
 
+def test_turns_of_robots_travel_in_tenths_of_milliradians_and_corrections_in_fiftieths() -> None:
+    peer, nowhere = Chain(4, 5), (0.0, 0.0)
+    turned = RangeMeasurement(1, peer, 2, nowhere, nowhere, 3.0, 0.1, 0.12346, -3.14159)
+    pose = (1.0, 2.0, 0.0)
+    closure = ClosureMeasurement(
+        0, True, 1, peer, 2, pose, COVARIANCE, (0.031, -0.029, 2.549, -1.999)
+    )
+    back = through(GraphEntry(0, ranges=(turned,), closures=(closure,)))
+    assert isinstance(back, GraphEntry)
+    assert back.ranges[0].turn_a == pytest.approx(0.1235, abs=1e-12)
+    assert back.ranges[0].turn_b == pytest.approx(-3.1416, abs=1e-12)
+    assert back.closures[0].corrected == pytest.approx((0.04, -0.02, 2.54, -2.0), abs=1e-12)
+
+
+@pytest.mark.parametrize(("told", "heard"), [(2.54, 2.54), (2.56, 2.54), (-9.0, -2.54)])
+def test_corrections_are_said_up_to_two_and_a_half_times(told: float, heard: float) -> None:
+    closure = ClosureMeasurement(
+        0, True, 1, Chain(4, 5), 2, (1.0, 2.0, 0.0), COVARIANCE, (0.0, told, told, 0.0)
+    )
+    back = through(GraphEntry(0, closures=(closure,)))
+    assert isinstance(back, GraphEntry)
+    assert back.closures[0].corrected == pytest.approx((0.0, heard, heard, 0.0))
+
+
 def test_sample_k_of_a_batch_is_its_first_pose_plus_the_first_k_differences() -> None:
     """As odometry_t.lcm says."""
     steps = np.array([[10, 20, 30], [11, 18, 33], [15, 18, 32]], dtype=float)
@@ -146,7 +170,10 @@ ACCEPTED: list[tuple[Any, ...]] = [
     ("GRAPH", "closures", 0, "x", -99_999_999),
     ("GRAPH", "closures", 0, "theta", 31_416),
     ("GRAPH", "closures", 0, "covariance", (2e-8, 0, 0, 89_000, 0, 2e-8)),
-    ("GRAPH", "traits", (9.5, 2.0**-30, 1e-9, 1e-9, -9.5, 9.5, 0.0)),
+    ("GRAPH", "traits", (9.5, 2.0**-30, 1e-9, 1e-9, -9.5, 9.5, 0.0, 0.0)),
+    ("GRAPH", "traits", (1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 9.5)),
+    ("GRAPH", "ranges", 0, "turn", (31_416, -31_416)),
+    ("GRAPH", "closures", 0, "corrected", (127, -127, 127, -127)),
     ("GRAPH", "keyframes", 0, "n", 0),
     ("GRAPH", "ranges", 0, "sigma", 1),
     ("GRAPH", "ranges", 0, "range", -5000),
@@ -209,15 +236,23 @@ REFUSED: list[tuple[Any, ...]] = [
     ("GRAPH", "closures", 0, "theta", -31_417),
     ("GRAPH", "closures", 0, "covariance", (0.9e-8, 0, 0, 1, 0, 1)),
     ("GRAPH", "closures", 0, "covariance", (1, 0, 0, 91_000, 0, 1)),
-    ("GRAPH", "traits", (0.9 * 2.0**-30, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0)),
-    ("GRAPH", "traits", (0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0)),
-    ("GRAPH", "traits", (1.0, 1.0, 1.0, 10.0, 0.0, 0.0, 0.0)),
-    ("GRAPH", "traits", (1.0, 1.0, 1.0, 1.0, 10.0, 0.0, 0.0)),
-    ("GRAPH", "traits", (NAN, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0)),
-    ("GRAPH", "traits", (1.0, 1.0, 1.0, 1.0, 0.0, NAN, 0.0)),
-    ("GRAPH", "traits", (1.0, INF, 1.0, 1.0, 0.0, 0.0, 0.0)),
+    ("GRAPH", "traits", (0.9 * 2.0**-30, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0)),
+    ("GRAPH", "traits", (0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0)),
+    ("GRAPH", "traits", (1.0, 1.0, 1.0, 10.0, 0.0, 0.0, 0.0, 0.0)),
+    ("GRAPH", "traits", (1.0, 1.0, 1.0, 1.0, 10.0, 0.0, 0.0, 0.0)),
+    ("GRAPH", "traits", (NAN, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0)),
+    ("GRAPH", "traits", (1.0, 1.0, 1.0, 1.0, 0.0, NAN, 0.0, 0.0)),
+    ("GRAPH", "traits", (1.0, INF, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0)),
+    ("GRAPH", "traits", (1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, -1e-9)),
+    ("GRAPH", "traits", (1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 10.0)),
+    ("GRAPH", "traits", (1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, NAN)),
+    ("GRAPH", "ranges", 0, "turn", (31_417, 0)),
+    ("GRAPH", "ranges", 0, "turn", (0, -31_417)),
+    ("GRAPH", "closures", 0, "corrected", (0, -128, 0, 0)),
+    ("GRAPH", "closures", 0, "corrected", (0, 0, 0, -128)),
     ("GRAPH", "n_traits", 5),
     ("GRAPH", "n_traits", 4),
+    ("GRAPH", "n_traits", 7),
     ("GRAPH", "keyframes", 0, "n", -1),
     ("GRAPH", "keyframes", 0, "segment", -1),
     ("GRAPH", "peers", 0, "id", 255),
@@ -283,10 +318,10 @@ COUNTS = {
     "logs": ("STATUS", 39 + 28 + 2 + 22 + 2 + 4, ">h"),
     "samples": ("ODOMETRY", 39 + 20, ">h"),
     "traits": ("GRAPH", 39 + 4, ">b"),
-    "keyframes": ("GRAPH", 39 + 5 + 28, ">h"),
-    "peers": ("GRAPH", 39 + 5 + 28 + 2 + 18, ">h"),
-    "ranges": ("GRAPH", 39 + 5 + 28 + 2 + 18 + 2 + 10, ">h"),
-    "closures": ("GRAPH", 39 + 5 + 28 + 2 + 18 + 2 + 10 + 2 + 23, ">h"),
+    "keyframes": ("GRAPH", 39 + 5 + 32, ">h"),
+    "peers": ("GRAPH", 39 + 5 + 32 + 2 + 18, ">h"),
+    "ranges": ("GRAPH", 39 + 5 + 32 + 2 + 18 + 2 + 10, ">h"),
+    "closures": ("GRAPH", 39 + 5 + 32 + 2 + 18 + 2 + 10 + 2 + 27, ">h"),
     "public poses": ("PUBLIC", 39 + 12, ">h"),
     "values": ("PUBLIC", 39 + 14 + 8, ">i"),
 }
@@ -299,7 +334,7 @@ def test_a_count_that_lies_is_refused(what: str, change: int) -> None:
     kind, at, form = COUNTS[what]
     payload = bytearray(messages.encode(HEADER, kinds()[kind]))
     (count,) = struct.unpack_from(form, payload, at)
-    assert count in (1, 2, 3, 7, 24)
+    assert count in (1, 2, 3, 8, 24)
     struct.pack_into(form, payload, at, max(-128, count + change))
     assert isinstance(messages.decode(kind, bytes(payload)), str)
 

@@ -79,10 +79,10 @@ def test_items_of_every_kind_are_said_completely_in_entries_that_fit(
     assert sum(len(e.closures) for e, _ in entries) == len(closures)
 
 
-def test_twenty_closures_with_twenty_peers_and_the_traits_have_1280_bytes() -> None:
+def test_twenty_closures_with_twenty_peers_and_the_traits_have_1364_bytes() -> None:
     team = Team(a_seal(3))
     (entry,) = team.entries(UNTOLD, (), (), CLOSURES[:MEASUREMENTS_PER_ENTRY])
-    assert len(messages.encode(HEADER, entry)) == 52 + 28 + 20 * (10 + 50) == 1280
+    assert len(messages.encode(HEADER, entry)) == 52 + 32 + 20 * (10 + 54) == 1364
 
 
 def test_the_largest_rank_that_can_be_configured_is_20() -> None:

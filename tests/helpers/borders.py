@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from message_builders import COVARIANCE, SECOND, a_status, resealed
+from message_builders import CORRECTED, COVARIANCE, SECOND, a_status, resealed
 
 from drslamd.conventions import LAST_N, LAST_UTIME, Chain
 from drslamd.gossip import messages
@@ -138,8 +138,9 @@ def spoken(counter: int = 20) -> tuple[Header, dict[str, Message]]:
     """What robot 2 could say in the middle of the conversation, of each kind."""
     own, peer = Chain(LIAR, 1), Chain(0, 1)
     n = 1_040
-    place = RangeMeasurement(n, peer, n, (0.25, 0.0), (-0.125, 0.5), 3.5, 0.125)
-    closure = ClosureMeasurement(8, True, n, peer, n, (1.5, -2.5, 0.25), COVARIANCE)
+    place = RangeMeasurement(n, peer, n, (0.25, 0.0), (-0.125, 0.5), 3.5, 0.125, 0.25, -0.5)
+    pose = (1.5, -2.5, 0.25)
+    closure = ClosureMeasurement(8, True, n, peer, n, pose, COVARIANCE, CORRECTED)
     header = Header(2, LIAR, 1, counter, 104 * SECOND)
     return header, {
         "STATUS": a_status(

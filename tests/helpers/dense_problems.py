@@ -46,16 +46,14 @@ def point_at(problem: Problem, poses: Array, c: Calibration, threshold: Array) -
     return replace(Point.of(problem, poses, c), threshold=threshold)
 
 
-# ---- residuals ----
-
-
 def link_residuals(problem: Problem, x: Array) -> list[float]:
     """Three of each link of odometry, then three of each closure, over their sigmas."""
     poses, c = unpacked(problem, x)
     links, closures = problem.odometry, problem.closures
-    mx, my, mt = links.measured.T
-    s, b = c.scale[links.robot], c.yaw[links.robot] * links.path - c.turn[links.robot] * mt
-    right = np.stack([(1 - s) * mx + b / 2 * my, (1 - s) * my - b / 2 * mx, mt - b], axis=1)
+    right = links.measured.copy()
+    for m, robot in enumerate(links.robot):
+        right[m, :2] *= 1 - c.scale[robot]
+        right[m] += c.turn[robot] * links.by_turn[m] - c.yaw[robot] * links.by_yaw[m]
     return [
         *whitened(poses[links.i], poses[links.j], right, links.covariance),
         *whitened(poses[closures.i], poses[closures.j], closures.measured, closures.covariance),
@@ -77,8 +75,12 @@ def range_residuals(problem: Problem, x: Array) -> list[float]:
     """One of each range, over its sigma."""
     poses, c = unpacked(problem, x)
     r = problem.ranges
+    points = np.stack([r.q_i, r.q_j])
+    for row, moves in zip(r.carried.rows, r.carried.moves, strict=True):
+        for end, robot in enumerate(r.robots[row]):
+            points[end, row] -= c.yaw[robot] * moves[end, 0] + c.scale[robot] * moves[end, 1]
     ends = []
-    for end, (k, q) in enumerate(((r.i, r.q_i), (r.j, r.q_j))):
+    for end, (k, q) in enumerate(zip((r.i, r.j), points, strict=True)):
         beside = rotated(c.antenna[r.robots[:, end]], r.turned[:, end])
         ends.append(poses[k, :2] + rotated(q + beside, poses[k, 2]))
     near = c.near_bias[0] * np.exp(-r.measured / LINKTRACK.near_reach_m)
@@ -143,9 +145,6 @@ def residual_vector(problem: Problem, x: Array, threshold: Array) -> Array:
     parts = link_residuals(problem, x) + ranges
     parts += heavy_residuals(problem, x) + mounting_residuals(problem, x)
     return np.array(parts + gaussian_residuals(problem, x))
-
-
-# ---- derivatives ----
 
 
 def jacobian(f: Callable[[Array], Array | list[float]], x: Array, h: float = 1e-6) -> Array:
@@ -267,9 +266,6 @@ def link_misfit(problem: Problem, x: Array, threshold: Array) -> tuple[Array, Ar
     ways = jacobian(lambda v: link_residuals(problem, v)[: 3 * m], x).reshape(m, 3, -1)
     seen = np.array([np.trace(way @ covariance @ way.T) for way in ways])
     return np.sum(errors**2, axis=1), 3 - seen
-
-
-# ---- the solution ----
 
 
 def thresholds(problem: Problem, x: Array) -> Array:

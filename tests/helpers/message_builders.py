@@ -38,6 +38,8 @@ HEADER = Header(2, 3, 11, 12, 13)
 
 COVARIANCE = (0.25, 0.0, 0.0, 0.25, 0.0, 0.0625)
 """Powers of two, so that a float on the wire changes nothing."""
+CORRECTED = (0.5, 0.0, -0.5, 1.0)
+"""Whole steps of a fiftieth."""
 
 
 def a_seal(robot: int, epoch: int = 1, secret: bytes | None = SECRET) -> Seal:
@@ -81,10 +83,10 @@ def one_of_each_kind() -> list[Message]:
         OdometryBatch(40, 40, steps),
         GraphEntry(
             2,
-            RobotModel(OdometryNoise(0.5, 0.25, 0.125, 0.0625), 0.5, -0.5, 0.25),
+            RobotModel(OdometryNoise(0.5, 0.25, 0.125, 0.0625), 0.5, -0.5, 0.25, 0.75),
             (Keyframe(40, 1, -100, 200, -30),),
-            (RangeMeasurement(40, peer, 41, (0.25, 0.0), (-0.125, 0.5), 3.5, 0.125),),
-            (ClosureMeasurement(8, True, 40, peer, 41, (1.5, -2.5, 0.25), COVARIANCE),),
+            (RangeMeasurement(40, peer, 41, (0.25, 0.0), (-0.125, 0.5), 3.5, 0.125, 0.25, -0.5),),
+            (ClosureMeasurement(8, True, 40, peer, 41, (1.5, -2.5, 0.25), COVARIANCE, CORRECTED),),
         ),
         Pose(PoseState.LOCALISED, 3, 11, 4_000_000, (1.25, -2.5, 3.0), COVARIANCE),
         PublicPoses(3, 11, 2, (40, 50), lifted),

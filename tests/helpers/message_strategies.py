@@ -48,6 +48,10 @@ def tenths(steps: int) -> float:
     return steps * 1e-4
 
 
+def fiftieths(steps: int) -> float:
+    return steps * (1 / 50)
+
+
 covariances = st.tuples(variances, metres, metres, variances, metres, variances)
 diagonals = st.floats(2**-20, 2**16, width=32).map(lambda v: (v, 0.0, 0.0, v, 0.0, v))
 log_states = st.builds(
@@ -80,6 +84,7 @@ batches = st.builds(
     steps=st.lists(st.tuples(*[st.integers(-32_767, 32_767)] * 3), max_size=149),
 )
 places = st.integers(-99_999_999, 99_999_999)
+angles = st.integers(-31_416, 31_416).map(tenths)
 antennas = st.tuples(i16.map(millimetres), i16.map(millimetres))
 keyframes = st.builds(Keyframe, samples, st.integers(0, 2**15 - 1), i32, i32, i32)
 ranges = st.builds(
@@ -91,6 +96,8 @@ ranges = st.builds(
     q_b=antennas,
     range_m=places.map(tenths),
     sigma_m=st.integers(1, 2**15 - 1).map(millimetres),
+    turn_a=angles,
+    turn_b=angles,
 )
 closures = st.builds(
     ClosureMeasurement,
@@ -99,14 +106,16 @@ closures = st.builds(
     a_n=samples,
     peer=chains,
     b_n=samples,
-    a_T_b=st.tuples(*[s.map(tenths) for s in (places, places, st.integers(-31_416, 31_416))]),
+    a_T_b=st.tuples(places.map(tenths), places.map(tenths), angles),
     covariance=diagonals,
+    corrected=st.tuples(*[st.integers(-127, 127).map(fiftieths)] * 4),
 )
 sigmas = st.floats(2**-20, 8, width=32)
 models = st.builds(
     RobotModel,
     st.builds(OdometryNoise, sigmas, sigmas, sigmas, sigmas),
     *[st.floats(-8, 8, width=32)] * 3,
+    st.floats(0, 8, width=32),
 )
 entries = st.builds(
     GraphEntry,

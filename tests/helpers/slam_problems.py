@@ -11,6 +11,7 @@ from slam_scenes import Array, inverted, product, wander
 from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.problem import (
     BetweenFactors,
+    CarriedEnds,
     Doubted,
     OdometryFactors,
     Priors,
@@ -75,12 +76,14 @@ def team_problem(
     link_error: float = 1.0,
     closures: int = 3,
     link_sigma: tuple[float, float, float] = (0.01, 0.01, 0.008),
+    is_thinned: bool = False,
 ) -> tuple[Problem, Array]:
     """Robots whose poses alternate in time, with every kind of edge; and the truth.
 
     Pose robots * k + r is keyframe k of robot r, one a second on a clock of its own. Each pair has
     its ranges, between antennas off the middle, wrong by `near_bias` where they are near;
-    neighbouring poses of a robot have their odometry, wrong by `scale` and `yaw`.
+    neighbouring poses of a robot have their odometry, wrong by `scale` and `yaw`. Of a thinned
+    problem each third link was driven in bows, and each third range was carried by such odometry.
     """
     rng = np.random.default_rng(seed)
     paths = [wander(rng, count, 0.4) for _ in range(robots)]
@@ -90,13 +93,21 @@ def team_problem(
     ]
     odometry = pose_edges(rng, truth, chain, link_sigma, link_error)
     robot = odometry.i % robots
-    path = np.hypot(odometry.measured[:, 0], odometry.measured[:, 1])
+    bows = np.random.default_rng(seed).normal(0, 0.1, (2, len(chain), 3))
+    bows[:, (np.arange(len(chain)) % 3 > 0) | (not is_thinned)] = 0.0
     measured = odometry.measured.copy()
-    for k, r in enumerate(robot):
-        bend = yaw[r] * path[k]
-        x, y = (1 + scale[r]) * measured[k, :2]
-        measured[k] = [x - bend / 2 * y, y + bend / 2 * x, measured[k, 2] + bend]
-    odometry = OdometryFactors(odometry.i, odometry.j, measured, odometry.covariance, robot, path)
+    measured[:, :2] *= 1 + np.array(scale)[robot, None]
+    by_yaw = straight_by_yaw(measured) + bows[0]
+    measured += np.array(yaw)[robot, None] * by_yaw
+    odometry = OdometryFactors(
+        odometry.i,
+        odometry.j,
+        measured,
+        odometry.covariance,
+        robot,
+        by_yaw=by_yaw,
+        by_turn=straight_by_turn(measured) + bows[1],
+    )
     names = [(a, b) for a in range(robots) for b in range(a + 1, robots)]
     rows = []
     q = rng.normal(0, 0.2, (robots, 2))
@@ -125,6 +136,7 @@ def team_problem(
         table[:, 7].astype(int),
         table[:, :2].astype(int) % robots,
         np.zeros((len(table), 2)),
+        carried_ends(seed, table, robots, scale, yaw) if is_thinned else CarriedEnds.none(),
     )
     joined = [(robots * k, robots * k + 1) for k in np.linspace(1, count - 2, closures).astype(int)]
     priors = Priors(
@@ -152,6 +164,37 @@ def team_problem(
     return problem, truth
 
 
+def straight_by_yaw(measured: Array) -> Array:
+    """(m, 3) how straight links move with a yaw rate: each swings about its middle."""
+    x, y, _ = measured.T
+    way = np.hypot(x, y)
+    return np.stack([-way / 2 * y, way / 2 * x, way], axis=-1)
+
+
+def straight_by_turn(measured: Array) -> Array:
+    """(m, 3) how straight links move when turns are longer by a fraction."""
+    x, y, turn = measured.T
+    return np.stack([-turn / 2 * y, turn / 2 * x, turn], axis=-1)
+
+
+def carried_ends(
+    seed: int,
+    table: Array,
+    robots: int,
+    scale: tuple[float, ...],
+    yaw: tuple[float, ...],
+) -> CarriedEnds:
+    """Each third range of a table (m, 6 or more) of i, j, q_i and q_j: how its points move; in the
+    table they are made wrong by the constants of their robots."""
+    rows = np.arange(1, len(table), 3)
+    moves = np.random.default_rng(seed).normal(0, [[1.0], [0.3]], (len(rows), 2, 2, 2))
+    for row, move in zip(rows, moves, strict=True):
+        for end, at in enumerate((slice(2, 4), slice(4, 6))):
+            robot = int(table[row, end]) % robots
+            table[row, at] += yaw[robot] * move[end, 0] + scale[robot] * move[end, 1]
+    return CarriedEnds(rows, moves)
+
+
 def links_of(problem: Problem, robot: int, first: int, last: int) -> Array:
     """The links of a robot that begin at its keyframes from `first` to before `last`."""
     robots = len(problem.priors.scale)
@@ -168,8 +211,9 @@ def mismeasured(
     poses[links] = measured
     if sigma is not None:
         covariance[links] = sigma**2 * np.eye(3)
-    path = np.hypot(poses[:, 0], poses[:, 1])
-    wrong = replace(odometry, measured=poses, covariance=covariance, path=path)
+    by_yaw, by_turn = odometry.by_yaw.copy(), odometry.by_turn.copy()
+    by_yaw[links], by_turn[links] = straight_by_yaw(poses[links]), straight_by_turn(poses[links])
+    wrong = replace(odometry, measured=poses, covariance=covariance, by_yaw=by_yaw, by_turn=by_turn)
     return replace(problem, odometry=wrong)
 
 
@@ -200,10 +244,9 @@ def mismounted(
     """
     robots = len(problem.priors.scale)
     fraction = np.array(turn or (0.0,) * robots)[problem.odometry.robot]
-    x, y, theta = problem.odometry.measured.T
-    bend = theta / (1 + fraction) - theta
-    measured = np.stack([x - bend / 2 * y, y + bend / 2 * x, theta + bend], axis=-1)
-    odometry = replace(problem.odometry, measured=measured)
+    by_turn = problem.odometry.by_turn / (1 + fraction[:, None])
+    measured = problem.odometry.measured - fraction[:, None] * by_turn
+    odometry = replace(problem.odometry, measured=measured, by_turn=by_turn)
     r, beside = problem.ranges, np.array(antenna or ((0.0, 0.0),) * robots)
     turned = np.random.default_rng(5).normal(0, turned_sigma, r.turned.shape)
     said, seen, real = [], [], []

@@ -57,7 +57,7 @@ def drive(robot: Robot, x: float, y: float, theta: float) -> None:
     track.append(track.end, np.array([x, y, theta]))
 
 
-# ---- numbers that run out ----------------------------------------------------------------------
+# numbers that run out
 
 
 @pytest.mark.parametrize(("counter", "again"), [(2**31 - 1 - 100_001, False), (2**31 - 2, True)])
@@ -73,7 +73,7 @@ def test_a_robot_that_runs_out_of_counters_begins_again(
 def test_a_robot_whose_odometry_broke_too_often_for_16_bits_begins_again(
     robot: Robot, utime: int, segment: int, again: bool
 ) -> None:
-    robot.front._segment = segment
+    robot.front._keyframes._segment = segment
     track = robot.front.reckoning.track
     track.append(track.end + 1, np.array([9_000.0, 0.0, 0.0]))
     assert restarts(later(robot, utime)) == ([1] if again else [])
@@ -110,7 +110,7 @@ def test_a_team_goes_on_when_one_of_them_has_begun_again() -> None:
     assert set(pair.member(0).robot.team.living(utime)) == {1}
 
 
-# ---- values that no message can say ------------------------------------------------------------
+# values that no message can say
 
 
 def the_spoken() -> tuple[RangeMeasurement, ClosureMeasurement, Pose, PublicPoses, OdometryBatch]:
@@ -152,7 +152,7 @@ def test_a_value_just_within_its_bound_is_still_there_when_it_is_rounded(robot: 
     assert team.unsayable == 0
 
 
-# ---- what a peer cannot mean -------------------------------------------------------------------
+# what a peer cannot mean
 
 
 def test_a_peer_that_wants_odometry_from_the_future_gets_what_there_is(

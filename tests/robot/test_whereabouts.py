@@ -14,12 +14,14 @@ from drslamd import report
 from drslamd.conventions import SECOND_US
 from drslamd.gossip import messages
 from drslamd.gossip.message_types import Pose, PoseState
+from drslamd.slam.doubt import Doubt, Reason
 from drslamd.slam.graph.estimate import PoseNow
 from drslamd.slam.odometry.track import Track
 from drslamd.whereabouts import NOWHERE, Whereabouts, likely_speeds, whereabouts
 
 COVARIANCE = np.diag([0.09, 0.16, 0.01])
 T0 = 1_000 * SECOND_US
+DOUBT = Doubt(0, Reason.RANGES, (4,))
 
 
 def a_track(*speeds_mps: float, turning: float = 0.0) -> Track:
@@ -32,17 +34,21 @@ def a_track(*speeds_mps: float, turning: float = 0.0) -> Track:
     return track
 
 
-def after(age_us: int, track: Track | None = None, most_mps: float = 3.0) -> Whereabouts:
+def after(
+    age_us: int, track: Track | None = None, most_mps: float = 3.0, doubt: Doubt | None = None
+) -> Whereabouts:
     """What is said of a robot so long after its last pose."""
     found = PoseNow(T0, np.array([1.0, 2.0, 0.5]), COVARIANCE)
-    return whereabouts(found, track or a_track(0.5), most_mps, T0 + age_us)
+    return whereabouts(found, track or a_track(0.5), most_mps, doubt, T0 + age_us)
 
 
-# ---- what a pose is worth ----------------------------------------------------------------------
+# what a pose is worth
 
 
 def test_who_has_no_pose_is_not_localised() -> None:
-    assert whereabouts(None, a_track(0.5), 3.0, T0) == NOWHERE
+    assert whereabouts(None, a_track(0.5), 3.0, None, T0) == NOWHERE
+    # nothing speaks against a pose that is none
+    assert whereabouts(None, a_track(0.5), 3.0, DOUBT, T0) == NOWHERE
     assert NOWHERE.state is PoseState.NOT_LOCALISED
 
 
@@ -53,6 +59,22 @@ def test_up_to_a_second_a_pose_is_what_it_was(age_us: int) -> None:
     assert where.pose is not None
     assert (where.pose.utime, where.age_us) == (T0, age_us)
     assert np.array_equal(where.pose.covariance, COVARIANCE)
+
+
+@pytest.mark.parametrize("age_us", [0, SECOND_US])
+def test_what_is_doubted_is_said_with_its_reason_and_is_as_wide_as_it_was(age_us: int) -> None:
+    where = after(age_us, doubt=DOUBT)
+    assert where.state is PoseState.DOUBTFUL
+    assert where.doubt is DOUBT
+    assert not where.is_old
+    assert where.pose is not None
+    assert np.array_equal(where.pose.covariance, COVARIANCE)
+
+
+def test_an_old_pose_is_old_whatever_was_doubted_of_it() -> None:
+    where = after(SECOND_US + 1, doubt=DOUBT)
+    assert where.state is PoseState.STALE
+    assert where.doubt is None
 
 
 @pytest.mark.parametrize("age_s", [1.000_001, 5.0, 19.0, 600.0])
@@ -83,7 +105,7 @@ def test_its_heading_is_lost_as_fast_as_it_turned_and_never_more_than_wholly() -
     assert sigmas == pytest.approx([0.4, 0.8, math.pi / math.sqrt(3)])
 
 
-# ---- how far a robot can have come -------------------------------------------------------------
+# how far a robot can have come
 
 
 def test_a_robot_drives_as_fast_as_in_its_fastest_second() -> None:
@@ -122,7 +144,7 @@ def test_a_robot_that_only_turned_on_the_spot_has_moved() -> None:
     assert (speed, turning) == pytest.approx((0.0, 0.3))
 
 
-# ---- a wheel cable is pulled -------------------------------------------------------------------
+# a wheel cable is pulled
 
 
 OUT_S, BACK_S = 30.0, 50.0

@@ -294,6 +294,7 @@ def test_what_was_learned_before_this_start_is_taken_out_of_motions_and_ranges()
 def believed(scene: FrontScene, windows: int) -> None:
     """So many closures that agree, through module 2."""
     pair = scene.front.pairs[1]
+    pair.search.is_confirmed = True
     for n in range(10, 10 + 10 * windows, 10):
         pair.on_estimate(asked_at(n), estimate_of(scene.seen(n)))
         ((same, run),) = scene.front.module2(scene.graph, None)

@@ -11,10 +11,10 @@ from drslamd.slam.graph.tables import CLOSURE_COLUMNS, RANGE_COLUMNS, ClosureTab
 from drslamd.slam.graph.timed_rows import TimedRows
 
 MAX_RANGES = 40_000
-"""Of one pair, 2.9 MB: more than one a second for all the time that is held
+"""Of one pair, 3.5 MB: more than one a second for all the time that is held
 (`timed_rows.HELD_BLOCKS`)."""
 MAX_CLOSURES = 40_000
-"""Of one pair, 4.8 MB, likewise; those that were withdrawn are among them, because a withdrawal may
+"""Of one pair, 5.8 MB, likewise; those that were withdrawn are among them, because a withdrawal may
 come before what it withdraws."""
 PER_ENTRY = 4_096
 """Above the number of measurements that any one entry of a log can hold."""

@@ -110,7 +110,7 @@ class MountingSearch:
             awaits: would the pair be believed if it was confirmed?
         """
         is_late = self._asked_at is None or utime - self._asked_at >= APART_US
-        is_open = (self.poor >= MANY or awaits) and not self.is_confirmed
+        is_open = self.found is None and not self.is_confirmed and (self.poor >= MANY or awaits)
         is_vague = self.found is not None and is_learned(self.found) and self.disagrees
         return is_late and (is_open or is_vague)
 

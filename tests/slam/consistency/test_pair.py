@@ -11,14 +11,19 @@ from slam_scenes import NOISE, config, inverted, product, same_pose
 
 from drslamd.conventions import Chain
 from drslamd.slam import se2
+from drslamd.slam.closure_method import AGREEMENT
 from drslamd.slam.consistency import pair as pair_module
 from drslamd.slam.consistency.pair import PENDING, Agreement, sendable
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import Keyframe
 from drslamd.slam.odometry.correction import Correction
+from drslamd.slam.odometry.mounting import TRACKS
+from drslamd.slam.relative_pose.estimate import RelativePoseEstimate, Verdict
+from drslamd.slam.relative_pose.mounting_search import MOST
+from drslamd.slam.relative_pose.what_if import MIRROR, Case
 from drslamd.slam.settings import closure_method
 
-TWO = Agreement(least=2, outnumber=2)
+TWO = Agreement(least=2, outnumber=2, confirms=False)
 
 
 def chosen(algorithm: str) -> Agreement:
@@ -30,6 +35,7 @@ def chosen(algorithm: str) -> Agreement:
 def rivalled(agreement: Agreement, agreeing: int, contradicting: int) -> OwnedPair:
     """Windows that agree with each other, after others that agree on something else."""
     pair = OwnedPair(agreement)
+    pair.confirm()
     poses = [MIRRORED] * contradicting + [BESIDE] * agreeing
     for k, pose in enumerate(poses, start=1):
         pair.answer(10 * k, pose)
@@ -61,10 +67,78 @@ def test_a_pair_is_connected_by_enough_closures_that_outnumber_all_others(
     assert pair.tracker.connected is is_connected
 
 
+@pytest.mark.parametrize("algorithm", ["drslamd", "paper"])
+def test_in_ours_windows_must_also_have_excluded_that_wheels_run_backwards(algorithm: str) -> None:
+    pair = OwnedPair(chosen(algorithm))
+    pair.see(BESIDE, 6)
+    assert pair.tracker.connected is (algorithm == "paper")
+    assert pair.tracker.awaits_confirmation is (algorithm == "drslamd")
+    pair.confirm()
+    # what is known of the mountings counts from the next closure on
+    pair.see(BESIDE, 1, first=80)
+    assert pair.tracker.connected
+    assert not pair.tracker.awaits_confirmation
+    assert len(pair.told()) == 7
+
+
+@pytest.mark.parametrize(("agreeing", "awaits"), [(1, False), (2, True)])
+def test_it_is_asked_whether_a_pair_is_mounted_as_configured_once_two_closures_agree(
+    agreeing: int, awaits: bool
+) -> None:
+    pair = OwnedPair(AGREEMENT)
+    assert not pair.tracker.awaits_confirmation
+    pair.see(BESIDE, agreeing)
+    assert pair.tracker.awaits_confirmation is awaits
+
+
+@pytest.mark.parametrize(("disagree", "is_connected"), [(MOST - 1, True), (MOST, False)])
+def test_while_windows_disagree_again_and_again_no_pair_is_connected(
+    disagree: int, is_connected: bool
+) -> None:
+    """One that was is so still: what was believed of its past stays true."""
+    pair, other = OwnedPair(TWO), OwnedPair(TWO)
+    other.see(BESIDE, 3)
+    for tracker in (pair.tracker, other.tracker):
+        for _ in range(disagree):
+            tracker.on_estimate(asked_at(10), RelativePoseEstimate(Verdict.POOR_FIT, ()))
+    pair.see(BESIDE, 2)
+    other.see(BESIDE, 2, first=60)
+    assert pair.tracker.connected is is_connected
+    assert other.tracker.connected
+
+
+def test_of_a_pair_whose_wheels_run_backwards_nothing_more_is_told_and_what_was_is_taken_back() -> (
+    None
+):
+    pair = OwnedPair(TWO)
+    pair.see(BESIDE, 2)
+    assert pair.told() == [(0, True), (1, True)]
+    assert not pair.tracker.is_refused
+    pair.tracker.search.found = Case(b=TRACKS[0])
+    assert not pair.tracker.is_refused
+    assert pair.told() == []
+    pair.tracker.search.found = MIRROR
+    assert pair.tracker.is_refused
+    assert pair.told() == [(0, False), (1, False)]
+
+
+def test_a_closure_says_with_which_scales_and_turns_it_was_found() -> None:
+    known = Correction(0.1, 0.02, 0.4), Correction(-0.06, 0.01, -0.2)
+    pair = OwnedPair(Agreement(1, 0, confirms=False))
+    pair.answer(10, BESIDE)
+    pair.check()
+    pair.answer(20, BESIDE)
+    run = pair.tracker.begin_check(pair.own, pair.peer, pair.own.model.noise, known)
+    assert run is not None
+    pair.tracker.on_check(run())
+    told = {m.number: m.corrected for m in pair.measurements()}
+    assert told == {1: (0.1, 0.4, -0.06, -0.2)}
+
+
 @pytest.mark.parametrize(("agreeing", "is_connected"), [(2, False), (3, True)])
 def test_any_agreement_counts_as_it_is_stated(agreeing: int, is_connected: bool) -> None:
-    assert rivalled(Agreement(3, 3), agreeing, 1).tracker.connected is is_connected
-    assert not rivalled(Agreement(3, 3), 5, 2).tracker.connected
+    assert rivalled(Agreement(3, 3, confirms=False), agreeing, 1).tracker.connected is is_connected
+    assert not rivalled(Agreement(3, 3, confirms=False), 5, 2).tracker.connected
 
 
 def test_a_pair_that_was_connected_stays_so_while_enough_agree() -> None:
@@ -199,7 +273,7 @@ def test_a_closure_is_left_out_when_either_keyframe_is_not_held() -> None:
 
 
 def test_a_closure_is_of_the_keyframes_and_not_of_the_bodies() -> None:
-    pair = OwnedPair(Agreement(1, 0))
+    pair = OwnedPair(Agreement(1, 0, confirms=False))
     bodies = ((0.3, 0.1, 0.2), (-0.2, 0.4, -0.1))
     pair.tracker.on_estimate(asked_at(20, bodies=bodies), estimate_of((1.0, 3.0, 3.0)))
     pair.check()
@@ -260,7 +334,7 @@ def test_a_new_set_is_believed_for_its_own_merits() -> None:
 
 
 def test_of_a_piece_that_was_never_believed_nothing_is_accepted_later() -> None:
-    pair = OwnedPair(Agreement(3, 2))
+    pair = OwnedPair(Agreement(3, 2, confirms=False))
     pair.see(BESIDE, 2)
     pair.answer(40, BESIDE, segments=(1, 0))
     pair.check()
@@ -371,7 +445,7 @@ def test_a_covariance_stays_one_when_it_is_rounded_to_be_sent() -> None:
     turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
     bad = turn @ np.diag([100.0, 1e-8, 1e-8]) @ turn.T
     assert least_when_rounded(se2.packed(bad)) <= 0
-    pair = OwnedPair(Agreement(1, 0))
+    pair = OwnedPair(Agreement(1, 0, confirms=False))
     pair.tracker.on_estimate(asked_at(20), estimate_of(BESIDE, covariance=bad))
     pair.check()
     (said,) = pair.measurements()

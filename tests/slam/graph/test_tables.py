@@ -9,7 +9,14 @@ from slam_scenes import closure, range_item
 
 from drslamd.conventions import Chain
 from drslamd.slam import se2
-from drslamd.slam.graph.tables import ClosureTable, KeyframeTable, RangeTable, positions
+from drslamd.slam.graph.tables import (
+    CLOSURE_COLUMNS,
+    RANGE_COLUMNS,
+    ClosureTable,
+    KeyframeTable,
+    RangeTable,
+    positions,
+)
 
 PEER = Chain(1, 6)
 
@@ -48,14 +55,13 @@ def test_the_samples_between_two_are_a_block_of_rows() -> None:
 
 
 def test_a_range_is_read_as_it_was_written() -> None:
-    table = RangeTable(
-        np.array(
-            [
-                RangeTable.row(5, range_item(10, PEER, 11, 6.0, (0.1, 0.2), (0.3, 0.4), 0.07)),
-                RangeTable.row(6, range_item(20, PEER, 21, 7.0, (0.5, 0.6), (0.7, 0.8), 0.08)),
-            ]
-        )
-    )
+    one = range_item(10, PEER, 11, 6.0, (0.1, 0.2), (0.3, 0.4), 0.07)
+    other = range_item(20, PEER, 21, 7.0, (0.5, 0.6), (0.7, 0.8), 0.08)
+    other = replace(other, turn_a=0.9, turn_b=-1.1)
+    table = RangeTable(np.array([RangeTable.row(5, one), RangeTable.row(6, other)]))
+    assert table.rows.shape == (2, RANGE_COLUMNS)
+    assert table.turn_a.tolist() == [0, 0.9]
+    assert table.turn_b.tolist() == [0, -1.1]
     assert len(table) == 2
     assert table.place.tolist() == [5, 6]
     assert table.a_n.tolist() == [10, 20]
@@ -79,7 +85,7 @@ def test_closures_come_out_one_by_one_as_they_were_written() -> None:
         replace(closure(number, 10 * number, PEER, 9, (1.0, -2.0, 3.0)), covariance=upper)
         for number in (4, 7)
     ]
-    said.append(replace(said[1], number=8, kept=False))
+    said.append(replace(said[1], number=8, kept=False, corrected=(0.1, 0.2, -0.3, 0.4)))
     table = ClosureTable(np.array([ClosureTable.row(k, c) for k, c in enumerate(said)]))
     assert table.measurements(PEER) == said
     assert table.kept().measurements(PEER) == said[:2]
@@ -88,6 +94,8 @@ def test_closures_come_out_one_by_one_as_they_were_written() -> None:
     assert table.b_n.tolist() == [9, 9, 9] == table.rows[:, ClosureTable.B_N].tolist()
     assert table.a_T_b.tolist() == [[1.0, -2.0, 3.0]] * 3
     assert np.array_equal(table.covariance[0], se2.unpacked(upper))
+    assert table.rows.shape == (3, CLOSURE_COLUMNS)
+    assert table.corrected.tolist() == [[0, 0, 0, 0], [0, 0, 0, 0], [0.1, 0.2, -0.3, 0.4]]
 
 
 def test_of_two_words_on_one_closure_the_row_of_the_later_is_the_smaller() -> None:

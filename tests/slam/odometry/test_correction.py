@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from slam_problems import straight_by_turn, straight_by_yaw
 from slam_scenes import Array, inverted, product, same_pose, wander
 
 from drslamd.slam.odometry.correction import Correction
@@ -91,8 +92,15 @@ def test_it_is_what_module_3_makes_of_links_to_first_order() -> None:
     """A link of its own is corrected there by the same three constants."""
     rng, one = np.random.default_rng(2), np.zeros(30, dtype=int)
     links = rng.normal(0, [0.4, 0.1, 0.2], (30, 3))
-    path = np.hypot(links[:, 0], links[:, 1])
-    factors = OdometryFactors(one, one, links, np.zeros((30, 3, 3)), one, path)
+    factors = OdometryFactors(
+        one,
+        one,
+        links,
+        np.zeros((30, 3, 3)),
+        robot=one,
+        by_yaw=straight_by_yaw(links),
+        by_turn=straight_by_turn(links),
+    )
     small = 1e-4
     for name in ("scale", "yaw", "turn"):
         known = Calibration.zero(0, 1)

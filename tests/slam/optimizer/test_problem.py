@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from slam_problems import no_ranges, pose_edges, team_problem
+from slam_problems import no_ranges, pose_edges, straight_by_turn, team_problem
 from slam_scenes import inverted, matrix, product, wander
 
 from drslamd.slam.optimizer.bias_prior import BiasPrior
@@ -75,6 +75,7 @@ def test_scale_shortens_a_link_and_yaw_rate_bends_it_over_half_of_the_way() -> N
         np.tile(np.eye(3), (2, 1, 1)),
         robot=np.array([0, 1]),
         by_yaw=np.tile([-way / 2 * chord[1], way / 2 * chord[0], way], (2, 1)),
+        by_turn=np.zeros((2, 3)),
     )
     known = replace(Calibration.zero(0, 2), scale=np.array([0.0, scale]), yaw=np.array([0.0, yaw]))
     right = corrected(odometry, known)
@@ -91,7 +92,13 @@ def test_turns_that_are_longer_turn_a_link_on_by_half_of_what_they_lack() -> Non
     chords = np.array([[2.0, 0.3, 0.3], [2.0, -0.3, -0.3], [2.0, 0.3, 0.3]])
     one = np.zeros(3, dtype=int)
     odometry = OdometryFactors(
-        one, one, chords, np.tile(np.eye(3), (3, 1, 1)), np.array([1, 1, 0]), np.full(3, 2.0)
+        one,
+        one,
+        chords,
+        np.tile(np.eye(3), (3, 1, 1)),
+        robot=np.array([1, 1, 0]),
+        by_yaw=np.zeros((3, 3)),
+        by_turn=straight_by_turn(chords),
     )
     right = corrected(odometry, replace(Calibration.zero(0, 2), turn=np.array([0.0, 0.2])))
     for link, sign in zip(right[:2], (1, -1), strict=True):
@@ -103,16 +110,24 @@ def test_turns_that_are_longer_turn_a_link_on_by_half_of_what_they_lack() -> Non
 
 
 def test_an_antenna_beside_its_place_moves_with_the_robot_as_it_stood() -> None:
-    """Against poses multiplied as matrices; robots stood turned against their keyframes."""
-    problem, _ = team_problem(2, robots=3, count=4)
+    """Against poses multiplied as matrices; robots stood turned against their keyframes, and what
+    odometry carried is where its constants let it be."""
+    problem, _ = team_problem(2, robots=3, count=4, is_thinned=True)
     poses, rng = problem.initial, np.random.default_rng(3)
     ranges = replace(problem.ranges, turned=rng.normal(0, 0.5, problem.ranges.turned.shape))
     antenna = np.array([[0.2, -0.1], [0.0, 0.3], [-0.2, -0.2]])
-    found = range_errors(poses, ranges, replace(Calibration.zero(3, 3), antenna=antenna), LINKTRACK)
+    yaw, scale = np.array([0.01, -0.03, 0.02]), np.array([0.1, 0.05, -0.2])
+    known = replace(Calibration.zero(3, 3), antenna=antenna, yaw=yaw, scale=scale)
+    found = range_errors(poses, ranges, known, LINKTRACK)
+    moves = np.zeros((len(ranges), 2, 2, 2))
+    moves[ranges.carried.rows] = ranges.carried.moves
+    assert len(ranges.carried.rows) == 4
     for m, robots in enumerate(ranges.robots):
         ends = []
         for end, (k, q) in enumerate(((ranges.i, ranges.q_i), (ranges.j, ranges.q_j))):
-            turn = (*q[m], ranges.turned[m, end])
+            by_yaw, by_scale = moves[m, end]
+            there = q[m] - yaw[robots[end]] * by_yaw - scale[robots[end]] * by_scale
+            turn = (*there, ranges.turned[m, end])
             ends.append(product(poses[k[m]], turn, (*antenna[robots[end]], 0.0))[:2])
         apart = float(np.hypot(*(ends[1] - ends[0])))
         assert found.error[m] == pytest.approx(apart - ranges.measured[m])
@@ -152,10 +167,17 @@ def test_an_error_of_a_range_is_predicted_minus_measured_with_its_biases(
 
 
 def test_some_of_the_factors_are_chosen_with_all_their_columns() -> None:
-    problem, _ = team_problem(3, robots=2, count=5)
-    which = np.arange(len(problem.ranges)) % 2 == 0
+    problem, _ = team_problem(3, robots=2, count=5, is_thinned=True)
+    which = np.array([True, True, False, False, True])
     few = problem.ranges.chosen(which)
     assert len(few) == 3
+    # of five the second and the last were carried
+    assert problem.ranges.is_carried.tolist() == [False, True, False, False, True]
+    assert few.carried.rows.tolist() == [1, 2]
+    assert np.array_equal(few.carried.moves, problem.ranges.carried.moves)
+    one = problem.ranges.chosen(~which | (np.arange(5) == 4)).carried
+    assert one.rows.tolist() == [2]
+    assert np.array_equal(one.moves, problem.ranges.carried.moves[1:])
     for name in ("i", "j", "q_i", "q_j", "measured", "sigma", "pair", "robots", "turned"):
         assert np.array_equal(getattr(few, name), getattr(problem.ranges, name)[which])
     closures = problem.closures.chosen(np.array([False, True, False]))

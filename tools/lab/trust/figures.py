@@ -84,7 +84,7 @@ def figures(
     others = _called(stated for stated in poses if not stated.of_frame)
     closures = [claim for run in runs.values() for claim in run.closures]
     wrong = [c for c in closures if c.is_lie or c.squared > WILD]
-    ates = {seed: run.ate_m[None] for seed, run in runs.items()}
+    ates = {seed: _ate(run) for seed, run in runs.items()}
     finite = [ate for ate in ates.values() if np.isfinite(ate)]
     known = [run for run in runs.values() if np.isfinite(known_s(run))]
     said = [said_after(run, cause.is_about) for run in known]
@@ -103,7 +103,7 @@ def figures(
         wrong_unique=len(wrong),
         connected=_mean(run.connected for run in runs.values()),
         ate_m=_mean(finite),
-        ate_x_clean=ratio(ates, {seed: twin.ate_m[None] for seed, twin in twins.items()}),
+        ate_x_clean=ratio(ates, {seed: _ate(twin) for seed, twin in twins.items()}),
         healthy_x_clean=_healthy(runs, twins),
         ate_x_today=ratio(ates, today),
         bias_m=max((run.bias_m for run in runs.values()), default=NAN),
@@ -127,9 +127,14 @@ def ratio(ates: Mapping[int, float], others: Mapping[int, float]) -> float:
 def _healthy(runs: Mapping[int, Run], twins: Mapping[int, Run]) -> float:
     """`ratio` of robots that are not at fault, where one robot is."""
     ill = {seed: min(run.at_fault) for seed, run in runs.items() if len(run.at_fault) == 1}
-    ates = {seed: runs[seed].ate_m[robot] for seed, robot in ill.items()}
-    others = {s: twins[s].ate_m[robot] for s, robot in ill.items() if s in twins}
+    ates = {seed: _ate(runs[seed], robot) for seed, robot in ill.items()}
+    others = {s: _ate(twins[s], robot) for s, robot in ill.items() if s in twins}
     return ratio(ates, others)
+
+
+def _ate(run: Run, without: int | None = None) -> float:
+    """Of all robots or of all but one; infinite where nobody had a pose."""
+    return run.ate_m.get(without, np.inf)
 
 
 def known_s(run: Run) -> float:

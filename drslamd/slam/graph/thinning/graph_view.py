@@ -48,7 +48,8 @@ class GraphView:
         for robot, view in sorted(self.chains.items()):
             if robot in robots:
                 h.update(repr((view.chain, view.model.numbers())).encode())
-                for values in (view.keyframes.rows, view.links.measured, view.links.sums):
+                links = view.links
+                for values in (view.keyframes.rows, links.measured, links.sums, links.by_turn):
                     h.update(_rounded(values))
         for pair in self.pairs:
             if {pair.a.robot, pair.b.robot} <= robots:

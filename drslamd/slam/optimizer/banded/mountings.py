@@ -57,10 +57,14 @@ def scores(equations: Equations, point: Point, factor: BandFactor) -> Scores:
     ranges = linearised.weighed_ranges(problem, point, ones)
     odometry = linearised.odometry_at(problem, point)
     # by robot: turns are columns 0 .. R - 1, antennas the 2 R behind them
-    antennas = robots + 2 * problem.ranges.robots[:, :, None] + np.arange(2)
+    antennas = (robots + 2 * problem.ranges.robots[:, :, None] + np.arange(2)).reshape(-1, 4)
+    is_carried = problem.ranges.is_carried
+    plain = layout.range_unknowns(problem.ranges.chosen(~is_carried))
+    carried = linearised.carried_part(problem, point, ranges)
     parts = (
         (odometry, layout.odometry_unknowns(problem.odometry), problem.odometry.robot[:, None], 8),
-        (ranges, layout.range_unknowns(problem.ranges), antennas.reshape(-1, 4), 8),
+        (ranges.chosen(~is_carried), plain, antennas[~is_carried], 8),
+        (carried, layout.carried_unknowns(problem.ranges), antennas[is_carried], 8),
     )
     size, columns = layout.band + layout.border, 3 * robots
     coupling, own, pull = np.zeros((size, columns)), np.zeros((columns, columns)), np.zeros(columns)

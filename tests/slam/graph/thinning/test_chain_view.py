@@ -28,7 +28,7 @@ def wandering(seconds: int) -> ChainData:
     return chain_of(range(seconds), lambda t: WANDER[int(t)])
 
 
-# ---- what stays ----
+# what stays
 
 
 @pytest.mark.parametrize("seconds", [1_200, 3_600, 14_400])
@@ -83,7 +83,7 @@ def test_a_chain_of_which_nothing_is_old_is_whole() -> None:
         assert view.links.i.tolist() == list(range(249))
 
 
-# ---- links ----
+# links
 
 
 def test_links_lead_from_each_that_stays_to_the_next() -> None:
@@ -150,18 +150,58 @@ def test_the_yaw_rate_acts_over_the_path_that_was_driven() -> None:
     assert by_yaw[0, 2] > 15
 
 
-def _bent(rate: float) -> ChainView:
-    """WANDER for 2,000 s by wheels with a yaw rate."""
+@pytest.mark.parametrize(
+    ("thins", "fraction", "tolerance"), [(True, 1e-3, 0.8), (False, 0.02, 0.01)]
+)
+def test_turns_that_are_longer_act_where_they_were_made(
+    thins: bool, fraction: float, tolerance: float
+) -> None:
+    """Numerically: the same drive with turns that are so much longer or shorter."""
+    plain, more, less = (_bent(0.0, turn, thins) for turn in (0.0, fraction, -fraction))
+    change = more.links.measured - less.links.measured
+    change[:, 2] = se2.wrap(change[:, 2])
+    expected, by_turn = change / (2 * fraction), plain.links.by_turn
+    assert np.abs(by_turn - expected).max() < tolerance
+    size = np.linalg.norm(by_turn, axis=1)
+    if thins:
+        assert (size > 20).sum() > 5
+        # by the chords of links alone it would be something else
+        turn = se2.wrap(plain.links.measured[:, 2])
+        chord = np.stack([-plain.links.measured[:, 1], plain.links.measured[:, 0]], axis=-1)
+        assert np.abs(by_turn[:, :2] - turn[:, None] / 2 * chord).max() > 10
+    else:
+        assert len(size) == 1_999
+        assert size.max() > 0.3
+
+
+def test_turns_of_all_parts_are_those_of_their_links() -> None:
+    """Rows of links and of what moves them stay together over parts of any age, and breaks."""
+    data = ChainData(A)
+    for k in range(1_500):
+        x, y, theta = (round(1e4 * v) for v in WANDER[k])
+        data.add(Keyframe(10 * k, k // 700, x, y, theta))
+    view = aged(data)
+    n, poses = view.keyframes.n, data.keyframes.poses
+    assert len(view.links.by_turn) == len(view.links.i) < len(n) - 1
+    for link, i in enumerate(view.links.i.tolist()):
+        rows = poses[n[i] // 10 : n[i + 1] // 10 + 1]
+        turns = np.diff(rows[:, 2])
+        assert view.links.by_turn[link, 2] == pytest.approx(se2.wrap(turns).sum(), abs=1e-9)
+
+
+def _bent(rate: float, turn: float = 0.0, thins: bool = True) -> ChainView:
+    """WANDER for 2,000 s by wheels with a yaw rate, and turns longer by a fraction."""
     step = se2.between(WANDER[:1_999], WANDER[1:2_000])
     length = np.hypot(step[:, 0], step[:, 1])
     pose, poses = np.zeros(3), [np.zeros(3)]
     for (x, y, theta), way in zip(step, length, strict=True):
-        half = [0.0, 0.0, rate * way / 2]
+        half = [0.0, 0.0, (rate * way + turn * float(se2.wrap(theta))) / 2]
         pose = product(product(product(pose, half), [x, y, theta]), half)
         poses.append(pose)
     path = np.array(poses)
     path[:, 2] = np.unwrap(path[:, 2])
-    return aged(chain_of(range(2_000), lambda t: path[int(t)]))
+    data = chain_of(range(2_000), lambda t: path[int(t)])
+    return aged(data) if thins else whole(data)
 
 
 def test_a_link_far_from_the_origin_keeps_its_digits() -> None:
@@ -177,7 +217,7 @@ def test_a_link_far_from_the_origin_keeps_its_digits() -> None:
     assert (size >= 1).sum() == 1
 
 
-# ---- what was measured at keyframes that went ----
+# what was measured at keyframes that went
 
 
 def test_bodies_are_seen_from_the_nearest_keyframe_that_stays() -> None:
@@ -228,7 +268,7 @@ def test_nothing_is_carried_across_a_break() -> None:
     assert view.carried(np.array([1, 2, 3])).n.tolist() == [0, 0, 30]
 
 
-# ---- again and again ----
+# again and again
 
 
 def test_what_is_old_is_made_anew_only_when_time_steps_or_something_comes_late() -> None:

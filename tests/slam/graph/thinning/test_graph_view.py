@@ -83,7 +83,7 @@ def assert_equal(one: PoseGraph, other: PoseGraph) -> None:
     assert differences(problems[0].problem, problems[1].problem) == []
 
 
-# ---- orders of arrival ----
+# orders of arrival
 
 
 def in_log_order(entries: list[Said]) -> list[Said]:
@@ -218,7 +218,7 @@ def _consistent_logs(rng: np.random.Generator, seconds: int) -> list[Said]:
     return out
 
 
-# ---- what the digest covers ----
+# what the digest covers
 
 
 @pytest.fixture(scope="module")
@@ -243,9 +243,12 @@ def test_a_digest_covers_models_ways_ranges_and_closures(small: list[Said]) -> N
         if e.closures and e.closures[0].number in kept
     )
     inner = next(e for o, e in small if o == origin and e.seq == old.seq + 3)
+    # the same place, and a heading that makes a row of its own
+    turned = replace(inner.keyframes[0], theta=inner.keyframes[0].theta - 5_000)
     changed = {
         "model": replace(old, seq=900, model=model_of(replace(NOISE, scale=0.02))),
         "way": GraphEntry(900, None, (Keyframe(inner.keyframes[0].n + 3, 0, 9_000, 0, 0),)),
+        "turn on the way": GraphEntry(900, None, (turned,)),
         "range": replace(old, ranges=(replace(old.ranges[0], range_m=0.5),)),
         "sigma": replace(old, ranges=(replace(old.ranges[0], sigma_m=0.05),)),
         "arm": replace(old, ranges=(replace(old.ranges[0], q_a=(-9.0, 0.0)),)),
@@ -289,7 +292,7 @@ def test_sines_of_another_processor_do_not_matter(small: list[Said]) -> None:
     assert graph.digest(EVERYBODY) != before
 
 
-# ---- a team in the course of hours ----
+# a team in the course of hours
 
 
 def test_all_chains_of_a_team_are_thinned_in_the_same_moments() -> None:

@@ -50,6 +50,7 @@ def measured(
         metres = math.hypot(*(tips[0] - tips[1])[:2])
         a_n, b_n = 10 * k, 10 * k + AHEAD
         ranged = range_item(a_n, B, b_n, metres, ARM_A, ARM_B, sigma[k % len(sigma)])
+        ranged = replace(ranged, turn_a=0.3 * math.sin(k), turn_b=3.1 * math.cos(k))
         seen = closure(k, a_n, B, b_n, product(inverted(ONE[k]), OTHER[k]), closure_sigma)
         own, peer = (keyframes([n], [p[k]]) for n, p in ((a_n, odometry[0]), (b_n, odometry[1])))
         closures = (seen,) if k % 4 == 0 else ()
@@ -69,7 +70,7 @@ def number(n: float, ahead: int = 0) -> int:
     return (int(n) - ahead) // 10
 
 
-# ---- what stays ----
+# what stays
 
 
 def test_recent_ranges_and_closures_stay_as_they_were_said() -> None:
@@ -145,7 +146,7 @@ def test_a_range_whose_keyframe_never_came_takes_nobody_s_place() -> None:
     assert np.array_equal(views(graph)[0].ranges.rows, views(whole)[0].ranges.rows)
 
 
-# ---- what is carried ----
+# what is carried
 
 
 def test_what_was_measured_at_a_keyframe_that_goes_is_true_at_the_one_that_stays() -> None:
@@ -164,6 +165,24 @@ def test_what_was_measured_at_a_keyframe_that_goes_is_true_at_the_one_that_stays
         # keyframes are whole steps of 0.1 mrad
         assert same_pose(np.array(item.a_T_b), pose, 2e-3 + 1e-4 * float(np.hypot(*pose[:2])))
     assert (np.hypot(*table.q_a.T) > 2).any()
+
+
+def test_robots_are_turned_against_the_keyframes_that_stay_by_the_way_between_as_well() -> None:
+    graph = measured(2_500)
+    table, said = views(graph)[0].ranges, graph.pairs[0, 1].ranges
+    second = np.searchsorted(said.place, table.place)
+    for k, was in enumerate(second.tolist()):
+        for turn, said_turn, path, at in (
+            (table.turn_a[k], 0.3 * math.sin(was), ONE, number(table.a_n[k])),
+            (table.turn_b[k], 3.1 * math.cos(was), OTHER, number(table.b_n[k], AHEAD)),
+        ):
+            between = float(relative(path, at, was)[2])
+            # keyframes are whole steps of 0.1 mrad
+            assert math.remainder(turn - between - said_turn, 2 * math.pi) == pytest.approx(
+                0.0, abs=2e-4
+            )
+            assert abs(turn) <= math.pi
+    assert (10 * second != table.a_n).sum() > 500
 
 
 @pytest.mark.parametrize("owner_turns", [True, False])
@@ -289,7 +308,7 @@ def test_a_closure_is_as_much_less_certain_as_odometry_on_both_sides() -> None:
     assert checked > 10
 
 
-# ---- again and again ----
+# again and again
 
 
 def test_what_a_robot_says_of_its_wheels_counts_for_what_was_carried_before() -> None:

@@ -94,6 +94,7 @@ def test_odometry_that_is_somewhat_worse_is_feared_to_be_as_much_worse_as_it_loo
     assert found.point is point
     assert (found.level == 1).all()
     assert found.feared == pytest.approx(np.maximum(ratio, 1)[problem.odometry.robot])
+    assert np.array_equal(found.lately, found.feared)
 
 
 def test_a_scale_that_is_far_off_is_learned_and_no_fault() -> None:
@@ -276,7 +277,7 @@ class Asked:
         assert limits == (60, TOLERANCE)
         self.levelled.append(equations)
         many = np.ones(len(self.problem.odometry))
-        return Levels(point, 4 * many, 9 * many, equations in self.explaining)
+        return Levels(point, 4 * many, 9 * many, 6 * many, equations in self.explaining)
 
     def explained(self) -> Explanation:
         return explain(self.equations, self.nominal, 60, TOLERANCE)
@@ -322,6 +323,7 @@ def test_mountings_that_take_a_lot_off_the_cost_are_kept_under_odometry_that_was
     assert found.other is None
     assert (found.level == 2).all()
     assert (found.feared == 9).all()
+    assert (found.lately == 6).all()
     assert len(scene.levelled) == 1
 
 
@@ -344,6 +346,7 @@ def test_where_nothing_explains_it_the_nominal_solution_stays_beside_another(
     assert (found.equations, found.point) == (scene.equations, scene.nominal)
     assert found.other is not None
     assert (found.feared == 9).all()
+    assert (found.lately == 6).all()
 
 
 def test_a_gain_is_what_the_cost_fell_by_where_ranges_lose_weight_as_before() -> None:

@@ -67,6 +67,17 @@ def test_mountings_in_doubt_stand_last_and_the_others_nowhere() -> None:
     assert sensors.antenna.tolist() == [[first + 2, first + 3], [0, 0], [first + 4, first + 5]]
 
 
+def test_a_range_that_was_carried_depends_on_the_wheels_of_both_robots() -> None:
+    problem, _ = team_problem(6, robots=3, count=4, is_thinned=True)
+    layout, ranges = BandLayout.of(problem), problem.ranges
+    plain, carried = layout.range_unknowns(ranges), layout.carried_unknowns(ranges)
+    assert carried.shape == (4, 16)
+    for row, m in zip(carried, ranges.carried.rows, strict=True):
+        a, b = ranges.robots[m]
+        wheels = [layout.yaw[a], layout.scale[a], layout.yaw[b], layout.scale[b]]
+        assert row.tolist() == [*plain[m], *wheels]
+
+
 def test_a_group_of_one_pose_has_a_layout() -> None:
     problem, _ = team_problem(7, robots=1, count=1, closures=0)
     layout = BandLayout.of(replace(problem, ranges=no_ranges()))

@@ -21,7 +21,7 @@ from drslamd.slam.optimizer.problem import (
 )
 from drslamd.slam.range_model import LINKTRACK
 
-PROBLEM = mismounted(*team_problem(1, robots=3, count=5), turned_sigma=0.2)
+PROBLEM = mismounted(*team_problem(1, robots=3, count=5, is_thinned=True), turned_sigma=0.2)
 POSES = PROBLEM.initial + np.random.default_rng(2).normal(0, 0.1, PROBLEM.initial.shape)
 KNOWN = Calibration(
     bias=np.array([0.1, -0.2, 0.05]),
@@ -126,6 +126,24 @@ def test_ranges_are_differentiated_by_both_poses_biases_and_antennas() -> None:
             at = (ranges.robots[m, (column - 8) // 2], column % 2)
             each = by_sensor(lambda c: of_ranges(PROBLEM, POSES, c), m, "antenna", at)
             assert found.jacobian[m, 0, column] == pytest.approx(each, abs=1e-7)
+
+
+def test_ranges_that_were_carried_are_differentiated_by_the_wheels_of_both_robots_as_well() -> None:
+    ranges = PROBLEM.ranges
+    plain = linearised.ranges_at(PROBLEM, HERE)
+    found = linearised.carried_part(PROBLEM, HERE, plain)
+    rows = ranges.carried.rows
+    assert rows.tolist() == [1, 4, 7, 10, 13]
+    assert found.jacobian.shape == (5, 1, 16)
+    assert np.array_equal(found.jacobian[:, :, :12], plain.jacobian[rows])
+    assert np.array_equal(found.information, plain.information[rows])
+    assert np.array_equal(found.pull, plain.pull[rows])
+    for at, m in enumerate(rows):
+        for column, (name, end) in enumerate((("yaw", 0), ("scale", 0), ("yaw", 1), ("scale", 1))):
+            robot = ranges.robots[m, end]
+            each = by_sensor(lambda c: of_ranges(PROBLEM, POSES, c), m, name, robot)
+            assert found.jacobian[at, 0, 12 + column] == pytest.approx(each, abs=1e-7)
+            assert abs(each) > 1e-3
 
 
 def test_the_near_range_bias_is_that_of_the_model_of_the_problem() -> None:

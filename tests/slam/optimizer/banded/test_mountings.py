@@ -16,7 +16,7 @@ from dense_problems import (
     range_residuals,
     range_weights,
 )
-from slam_problems import held_at, mismounted, team_problem
+from slam_problems import held_at, mismeasured, mismounted, team_problem
 
 from drslamd.slam.optimizer.banded import mountings
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
@@ -92,7 +92,7 @@ def dense_scores(problem: Problem, point: Point) -> Scores:
 )
 def test_scores_are_those_of_the_dense_matrices(doubted: Doubted) -> None:
     """With a track and an antenna that are off; it is 0 of those that are unknowns already."""
-    problem, truth = team_problem(3, robots=3, count=12)
+    problem, truth = team_problem(3, robots=3, count=12, is_thinned=True)
     beside = ((0.0, 0.0), (0.1, 0.15), (0.0, 0.0))
     problem = mismounted(problem, truth, (0.0, 0.3, 0.0), beside, turned_sigma=0.2)
     # the gauge is none of the first unknowns, which everybody can name by mistake
@@ -149,7 +149,8 @@ def test_what_moves_no_error_scores_nothing() -> None:
     problem, _ = team_problem(6, robots=2, count=20)
     measured = problem.odometry.measured.copy()
     measured[:, 2] = 0
-    straight = replace(problem, odometry=replace(problem.odometry, measured=measured))
+    links = np.arange(len(measured))
+    straight = mismeasured(problem, links, measured)
     assert scored(straight).track.tolist() == [0, 0]
 
 

@@ -62,7 +62,9 @@ def far_edges() -> Problem:
 
 def small(robots: int) -> Problem:
     """The track of the first and the antennas of all but the second are in doubt."""
-    problem = mismounted(*team_problem(1, robots=robots, count=6), turned_sigma=0.2)
+    problem = mismounted(
+        *team_problem(1, robots=robots, count=6, is_thinned=True), turned_sigma=0.2
+    )
     number = np.arange(robots)
     return replace(problem, doubted=Doubted(track=number == 0, antenna=number != 1))
 

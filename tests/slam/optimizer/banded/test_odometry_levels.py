@@ -107,7 +107,8 @@ def test_who_was_stuck_or_slipped_for_six_seconds_is_blamed_alone_and_for_that_t
 def test_what_was_seen_is_feared_to_have_gone_on_before_and_not_less() -> None:
     problem = stuck(a_team(2)[0], 1, *FAULT)
     found = explained(problem)
-    assert (found.feared >= TARGET * found.seen * (1 - 1e-9)).all()
+    assert (found.lately >= TARGET * found.seen * (1 - 1e-9)).all()
+    assert (found.feared >= found.lately).all()
     feared = levels(problem, found.feared)
     # it is feared to linger, but not before it was seen
     assert feared[1, FAULT[1] + 5 :].min() > 3 * math.sqrt(TARGET)
@@ -258,16 +259,28 @@ def test_a_cell_wants_the_variance_at_which_its_squares_are_what_could_be_checke
     assert one_link(variance, squares, checked) == pytest.approx(wanted)
 
 
-def test_what_lasted_for_twenty_seconds_is_feared_on_average() -> None:
+def test_where_runs_of_two_pairs_meet_in_one_robot_the_others_are_witnesses() -> None:
+    problem, _ = a_team(1)
+    ends = [Run(1, 3, CLOCKS[1] + 300, CLOCKS[3] + 300, 12)]
+    ends.append(Run(0, 1, CLOCKS[0] + 250, CLOCKS[1] + 250, 12))
+    level = levels(problem, odometry_levels._run_level(problem, ends))
+    expected = np.ones((ROBOTS, COUNT - 1))
+    expected[1, 21:] = FIRST_LEVEL
+    assert np.array_equal(level, expected)
+
+
+def test_what_lasted_for_twenty_seconds_is_feared_on_average_and_so_is_all_that_ever_was() -> None:
     problem, _ = a_team(1)
     rng = np.random.default_rng(6)
     variance = rng.uniform(1, 100, len(problem.odometry))
-    feared = levels(problem, odometry_levels._lingering(problem, variance)) ** 2
+    lately_of, so_far_of = odometry_levels._lingering(problem, variance)
+    feared, so_far = levels(problem, lately_of) ** 2, levels(problem, so_far_of) ** 2
     seen = levels(problem, variance) ** 2
     for robot in range(ROBOTS):
         for k in range(COUNT - 1):
             lately = seen[robot, max(0, k - 20) : k + 1].mean()
             assert feared[robot, k] == pytest.approx(max(seen[robot, k], lately))
+            assert so_far[robot, k] == pytest.approx(seen[robot, : k + 1].mean())
 
 
 def test_raised_links_have_more_noise_and_at_least_some() -> None:
@@ -292,6 +305,8 @@ def test_raised_links_have_more_noise_and_at_least_some() -> None:
         ([STANDS_OUT, 3.9, 1.0, 1.0], [1, 1, 1, 1]),
         ([STANDS_OUT + 0.1, TARGET + 0.1, TARGET, 1.0], [3.28, 2.08, 1, 1]),
         ([1e6, 1.0, 1.0, 1.0], [MOST_LEVEL**2, 1, 1, 1]),
+        # who is less than 0.3 times as bad as the worst may only look so
+        ([10.0, 3.01, 2.99, 1.0], [8.0, 2.408, 1, 1]),
     ],
 )
 def test_robots_are_raised_by_twice_what_they_are_beyond_the_target(
@@ -319,8 +334,9 @@ def test_robots_are_raised_again_until_they_fit_but_not_for_ever(
     monkeypatch.setattr(odometry_levels, "_solved", unfit)
     found, _ = odometry_levels._robots_raised(Equations(problem), point, np.array([5.0, 1, 1, 1]))
     assert len(solutions) == odometry_levels.ROUNDS_OF_ROBOTS
-    # of 44 links: (5 * 44 + 1) / (44 + 1), twice that over the target, three times
-    assert found == pytest.approx([4.0, 1.0, (2 * 221 / 45 / TARGET) ** 3, 1.0])
+    # of 44 links: (5 * 44 + 1) / (44 + 1), twice that over the target, in each of the other rounds
+    rounds = odometry_levels.ROUNDS_OF_ROBOTS - 1
+    assert found == pytest.approx([4.0, 1.0, (2 * 221 / 45 / TARGET) ** rounds, 1.0])
 
 
 def test_robots_that_never_moved_are_not_blamed() -> None:

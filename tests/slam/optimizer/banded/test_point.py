@@ -17,7 +17,7 @@ from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem
 
 def somewhere() -> tuple[Problem, Array, Calibration]:
     """Three robots whose mountings are all in doubt, away from the solution."""
-    problem = mismounted(*team_problem(1, robots=3, count=9), turned_sigma=0.2)
+    problem = mismounted(*team_problem(1, robots=3, count=9, is_thinned=True), turned_sigma=0.2)
     problem = replace(problem, doubted=Doubted(np.ones(3, dtype=bool), np.ones(3, dtype=bool)))
     rng = np.random.default_rng(2)
     known = Calibration(

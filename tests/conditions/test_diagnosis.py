@@ -29,7 +29,8 @@ def test_everything_is_looked_after_from_the_sensors_to_the_budget() -> None:
     scene = RobotScene()
     keys = [key for key, _ in conditions(scene.robot, scene.utime)]
     team = [key for key in keys if key.startswith("team.")]
-    assert keys == ["uwb", "wheels", "network", *team, "pose", "load", "budget", "state"]
+    of_poses = ["pose", "doubt", "partners", "mounting"]
+    assert keys == ["uwb", "wheels", "network", *team, *of_poses, "load", "budget", "state"]
     assert len(team) >= 4
 
 
