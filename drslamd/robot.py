@@ -56,6 +56,7 @@ from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibra
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.graph.estimate import PoseNow
 from drslamd.slam.graph.measurements import GraphEntry
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.settings import closure_method
 from drslamd.slam.tuning import DEFAULTS, Tuning
@@ -185,13 +186,19 @@ class Robot:
 
     def _on_message(self, event: Datagram | ChannelMessage) -> list[Effect]:
         received = self.team.receive(event)
-        if received is not None and isinstance(received.message, GraphEntry):
+        if received is None:
+            return []
+        if isinstance(received.message, GraphEntry):
             self.back.insert(received.origin, received.message)
+        elif isinstance(received.message, PublicPoses):
+            self.back.hear(received.origin, received.message)
+            return self._take_turn(event.utime)
         return []
 
     def _repeat(self, utime: int) -> list[Effect]:
         is_in_a_graph = self.back.estimate is not None or bool(self.neighbours(utime))
-        return list(self.team.repeats(utime)) if is_in_a_graph else []
+        repeats = list(self.team.repeats(utime)) if is_in_a_graph else []
+        return [*repeats, *self._take_turn(utime)]
 
     def _send_status(self, utime: int) -> list[Effect]:
         clock = self.uwb.system_offset_us(utime)
@@ -251,9 +258,21 @@ class Robot:
         """Module 3: the team's pose graph."""
         if self.jobs.is_busy(OPTIMIZER) or self.jobs.is_resting(OPTIMIZER, utime):
             return []
-        public = {k: peer.public for k, peer in self.team.peers.items() if peer.public}
-        run = self.back.begin(self.team.present(utime), self.team.shifts(utime), public)
+        talking = set(self.team.living(utime))
+        run = self.back.begin(self.team.present(utime), self.team.shifts(utime), talking, utime)
         return [self.jobs.begin(Job(OPTIMIZER), run)] if run else []
+
+    def _take_turn(self, utime: int) -> list[Effect]:
+        """With `rbcd`: move if it is our turn now, and say what others wait for."""
+        exchange = self.back.exchange
+        is_due = exchange.is_waiting or self.back.is_urgent
+        effects = self._optimize(utime) if is_due else []
+        would_move = exchange.is_waiting and not self.jobs.is_resting(OPTIMIZER, utime)
+        at_rest = not would_move and not self.jobs.is_busy(OPTIMIZER)
+        return [*effects, *self._say(exchange.answers(utime, at_rest), utime)]
+
+    def _say(self, public: list[PublicPoses], utime: int) -> list[Effect]:
+        return [send for poses in public for send in self.team.send_public(poses, utime)]
 
     def _on_job(self, event: JobDone) -> list[Effect]:
         job = self.jobs.finish(event)
@@ -263,11 +282,9 @@ class Robot:
         if job.pair is not None:
             job.pair.on_check(event.result)
             return []
-        self.back.on_solution(event.result)
+        public = self._say(self.back.on_solution(event.result), event.utime)
         self.calibration.update(self.back.estimate, self.own.robot, self.front.pairs)
-        public = self.back.public_poses()
-        sends = self.team.send_public(public, event.utime) if public else []
-        return [*self.broadcast.pose(self.pose(), event.utime), *sends]
+        return [*self.broadcast.pose(self.pose(), event.utime), *public]
 
     # ---- what we know of ourselves ----
 
@@ -286,6 +303,7 @@ class Robot:
 
     def _check_health(self, utime: int) -> list[Effect]:
         self.team.forget_silent(utime)
+        self.back.exchange.keep({peer.chain for peer in self.team.peers.values()})
         notes: list[Effect] = []
         for key, sentence in diagnosis.conditions(self, utime):
             notes += self.health.set(key, sentence, utime)

@@ -32,7 +32,7 @@ from drslamd.slam.graph.measurements import (
     Keyframe,
     RangeMeasurement,
 )
-from drslamd.slam.graph.public_poses import PublicPoses
+from drslamd.slam.graph.public_poses import MAX_HELD, PublicPoses
 from drslamd.slam.robot_model import RobotModel
 
 MILLIMETRE_M = 1e-3
@@ -233,21 +233,47 @@ def _read_pose(raw: Any) -> Pose:
 
 def _fill_public(out: Any, m: PublicPoses) -> None:
     out.frame, out.frame_epoch, out.rank = m.frame, m.frame_epoch, m.rank
+    out.round, out.since, out.part, out.parts = m.round, m.since, m.part, m.parts
+    out.asks, out.n_held = int(m.asks), len(m.held)
+    out.held = [_filled_held(robot, held) for robot, held in m.held]
     out.n, out.keyframes = len(m.keyframes), list(m.keyframes)
     out.values = np.ascontiguousarray(m.values).view(float).ravel().tolist()
     out.n_values = len(out.values)
 
 
+def _filled_held(robot: int, held: int) -> Any:
+    out = lcmtypes.held_t()
+    out.id, out.round = robot, held
+    return out
+
+
 def _read_public(raw: Any) -> PublicPoses:
     if raw.n < 0 or raw.rank < 1 or raw.n_values != 4 * raw.rank * (raw.n + 1):
         raise ValueError("sizes that do not fit each other")
-    if any(n < 0 for n in raw.keyframes):
-        raise ValueError("negative keyframe")
+    if any(n < 0 for n in raw.keyframes) or (np.diff(raw.keyframes) <= 0).any():
+        raise ValueError("keyframes out of order")
+    if not 0 <= raw.since <= raw.round or not 0 <= raw.part < raw.parts:
+        raise ValueError("part of nothing")
+    _bounded("neighbours", raw.n_held, 0, MAX_HELD)
+    held = tuple((_robot(h.id), h.round) for h in raw.held)
+    if any(count < 0 for _, count in held):
+        raise ValueError("move before the first")
     values = np.array(raw.values, dtype=float)
     if not np.isfinite(values).all():
         raise ValueError("lifted pose that is not finite")
-    values = values.view(complex).reshape(raw.n + 1, 2 * raw.rank)
-    return PublicPoses(_robot(raw.frame), raw.frame_epoch, raw.rank, tuple(raw.keyframes), values)
+    return PublicPoses(
+        frame=_robot(raw.frame),
+        frame_epoch=raw.frame_epoch,
+        rank=raw.rank,
+        keyframes=tuple(raw.keyframes),
+        values=values.view(complex).reshape(raw.n + 1, 2 * raw.rank),
+        round=raw.round,
+        since=raw.since,
+        part=raw.part,
+        parts=raw.parts,
+        asks=bool(_flag(raw.asks)),
+        held=held,
+    )
 
 
 # ---- parts -------------------------------------------------------------------------------------

@@ -1,0 +1,245 @@
+"""Who may move, and what must be said: block descent over a network that loses messages.
+
+Robots that move at once, each on poses that the other is about to leave, may both be right and the
+team worse off. So neighbours, robots that share a closure, take turns: who has moved waits until
+the other has moved from there. Then every move is made on the very poses that the neighbours have,
+and what it gains is gained by the whole team, whatever was lost or late on the way.
+
+Nobody hands out turns. A robot numbers its moves, and each message says from which moves of its
+neighbours it moved; whose turn it is follows from these numbers. (Reversal of edges: Barzilai,
+Gafni 1989. It never blocks: where all wait in a circle nobody could have moved last.) Who would
+move and lacks a neighbour's move asks; the neighbour says it again, or, if it has no reason to
+move, that it stays where it is. Where a neighbour does not answer for long it is left alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Set
+from dataclasses import replace
+
+import numpy as np
+
+from drslamd.conventions import MILLISECOND_US, SECOND_US, Chain
+from drslamd.slam.graph.estimate import Lifted
+from drslamd.slam.graph.public_poses import MAX_HELD, HeardPoses, PublicPoses
+from drslamd.slam.se2 import Array
+
+PATIENCE_US = 5 * SECOND_US
+"""A neighbour that lives and does not answer for so long has another trouble; at 50 % loss it was
+asked ten times or more."""
+ASK_US = 100 * MILLISECOND_US
+"""How long a turn is waited for until it is asked for, and asked again ..."""
+ASK_LATER_US = SECOND_US
+"""... which is rarer when nobody answers: no neighbour is in the frame yet."""
+REPEAT_US = 50 * MILLISECOND_US
+"""Between two repetitions of what somebody lost: all that ask meanwhile hear the same one."""
+MATTERS = 1e-8
+"""Change of a pose, squared and in units of what closures tell of it, that is worth being said: a
+ten-thousandth of their sigma. Poses that a thousand closures hold then change the cost by 1e-5."""
+
+
+class PoseExchange:
+    """One robot's part in it.
+
+    Attributes:
+        round: how many moves were said, those among them that changed nothing included.
+        is_waiting: would we move, and is it not our turn?
+    """
+
+    def __init__(self, own: Chain) -> None:
+        self._own = own
+        self.round = 0
+        self.is_waiting = False
+        self._heard: dict[Chain, HeardPoses] = {}
+        self._moved_from: dict[Chain, int] = {}
+        """The moves of the neighbours that our last one was made from."""
+        self._neighbours: list[Chain] = []
+        self._naming: set[Chain] = set()
+        """Who counts us among its neighbours."""
+        self._said: PublicPoses | None = None
+        self._said_in: dict[int, int] = {}
+        """By keyframe: our move that its pose was last said after."""
+        self._first = 0
+        """The move before the first one in this frame."""
+        self._blocked_since: dict[Chain, int] = {}
+        self._asks_at = self._waits_since = 0
+        self._lost: dict[Chain, int] = {}
+        """Who asked to hear again what came after some move of ours."""
+        self._repeated_at = 0
+        self._is_awaited = False
+
+    # ---- incoming ----
+
+    def hear(self, origin: Chain, message: PublicPoses) -> None:
+        """A robot said where it is, or asks others to."""
+        if origin not in self._heard:
+            self.keep({chain for chain in self._heard if chain.robot != origin.robot})
+            self._heard[origin] = HeardPoses()
+        peer = self._heard[origin]
+        peer.take(message)
+        held = dict(message.held).get(self._own.robot)
+        if held is None:
+            return
+        self._naming.add(origin)
+        if message.asks and held < self.round:
+            self._lost[origin] = held
+        elif message.asks and peer.poses and self._is_my_turn(origin):
+            self._is_awaited = True
+
+    def keep(self, chains: Set[Chain]) -> None:
+        """Forget all robots but these."""
+        for chain in self._heard.keys() - chains:
+            del self._heard[chain]
+            self._moved_from.pop(chain, None)
+            self._lost.pop(chain, None)
+            self._naming.discard(chain)
+
+    def held(self, frame: Chain | None = None) -> dict[int, PublicPoses]:
+        """By robot: the poses that are held completely, those in one frame or in any."""
+        return {
+            chain.robot: peer.poses
+            for chain, peer in self._heard.items()
+            if peer.poses and frame in (None, (peer.poses.frame, peer.poses.frame_epoch))
+        }
+
+    # ---- whose turn it is ----
+
+    def begin(self, neighbours: Iterable[Chain], utime: int) -> bool:
+        """We would move: is it our turn?
+
+        Args:
+            neighbours: living robots that share closures with us.
+        """
+        self._neighbours = sorted(neighbours)[:MAX_HELD]
+        blocked = [chain for chain in self._neighbours if not self._is_my_turn(chain)]
+        self._blocked_since = {c: self._blocked_since.get(c, utime) for c in blocked}
+        if any(utime - since < PATIENCE_US for since in self._blocked_since.values()):
+            self.wait(utime)
+            return False
+        self.is_waiting = False
+        return True
+
+    def wait(self, utime: int) -> None:
+        """We cannot move before we have heard more; if that takes long it is asked for."""
+        if not self.is_waiting:
+            self._asks_at, self._waits_since = utime + ASK_US, utime
+        self.is_waiting = True
+
+    def rest(self) -> None:
+        """We have no reason to move."""
+        self.is_waiting = False
+
+    def _is_my_turn(self, chain: Chain) -> bool:
+        """Has this neighbour moved from where we are, and do we know where to?"""
+        peer = self._heard.get(chain)
+        if peer is None or peer.newest == 0:
+            # it is in no frame yet
+            return True
+        if peer.round < peer.newest:
+            return False
+        it_knew = peer.knew(self._own.robot) == self.round
+        we_knew = self._moved_from.get(chain) == peer.round
+        # both moved at once when they first heard of each other
+        return self._own < chain if it_knew == we_knew else it_knew
+
+    # ---- outgoing ----
+
+    def moved(self, frame: Chain, lifted: Lifted) -> list[PublicPoses]:
+        """What of our new poses must be said; nothing when they hardly moved."""
+        if not len(lifted.carriers):
+            return []
+        now = public_poses(frame, lifted)
+        if self._said is None or (now.frame, now.frame_epoch) != (
+            self._said.frame,
+            self._said.frame_epoch,
+        ):
+            self._said, self._said_in, self._first = None, {}, self.round
+        news = self._news(now, lifted.weights)
+        if not news and not self._is_awaited:
+            return []
+        table = self._said.table() if self._said else {}
+        table.update(now.chosen(news).table())
+        kept = [n for n in now.keyframes if n in table]
+        self._said = replace(
+            now, keyframes=tuple(kept), values=np.array([now.values[0], *(table[n] for n in kept)])
+        )
+        self._advance()
+        self._said_in = {n: self._said_in.get(n, self.round) for n in kept} | dict.fromkeys(
+            news, self.round
+        )
+        return [self._since(self.round - 1)]
+
+    def _news(self, now: PublicPoses, weights: Array) -> list[int]:
+        """Keyframes that moved since they were said by more than matters."""
+        before = self._said.table() if self._said else {}
+        rank = now.rank
+        out = []
+        for n, row, (turn, place) in zip(now.keyframes, now.values[1:], weights, strict=True):
+            if n in before:
+                change = np.abs(row - before[n]) ** 2
+                if turn * change[:rank].sum() + place * change[rank:].sum() <= MATTERS:
+                    continue
+            out.append(n)
+        return out
+
+    def _advance(self) -> None:
+        """Another move of ours is said, from where the neighbours are now."""
+        self.round += 1
+        self._moved_from = {c: p.round for c, p in self._heard.items() if p.poses}
+        self._is_awaited = False
+
+    def _since(self, move: int) -> PublicPoses:
+        """All that was said anew after some move of ours."""
+        assert self._said is not None
+        since = move if move > self._first else 0
+        chosen = self._said.chosen(n for n, said in self._said_in.items() if said > since)
+        return replace(
+            chosen.occupied(), round=self.round, since=since, held=self._named(self._moved_from)
+        )
+
+    def _named(self, moves: Mapping[Chain, int]) -> tuple[tuple[int, int], ...]:
+        others = sorted(self._naming.difference(self._neighbours))
+        named = [*self._neighbours, *others][:MAX_HELD]
+        return tuple((chain.robot, moves.get(chain, 0)) for chain in sorted(named))
+
+    def answers(self, utime: int, at_rest: bool) -> list[PublicPoses]:
+        """What others wait for, and what we must ask for ourselves.
+
+        Args:
+            at_rest: we do not move now, nor would we.
+        """
+        out = []
+        if self._said is not None and self._lost and utime - self._repeated_at >= REPEAT_US:
+            out.append(self._since(min(self._lost.values())))
+            self._lost, self._repeated_at = {}, utime
+        if self._said is not None and self._is_awaited and at_rest:
+            self._advance()
+            out.append(self._since(self.round - 1))
+        if self.is_waiting and utime >= self._asks_at:
+            is_long = utime - self._waits_since > PATIENCE_US
+            self._asks_at = utime + (ASK_LATER_US if is_long else ASK_US)
+            out.append(self._question())
+        return out
+
+    def _question(self) -> PublicPoses:
+        """Which moves of our neighbours we hold."""
+        held = {chain: peer.round for chain, peer in self._heard.items()}
+        return PublicPoses(
+            frame=self._own.robot,
+            frame_epoch=self._own.epoch,
+            rank=1,
+            keyframes=(),
+            values=np.zeros((1, 2), dtype=complex),
+            round=self.round,
+            since=self.round,
+            asks=True,
+            held=self._named(held),
+        )
+
+
+def public_poses(frame: Chain, lifted: Lifted) -> PublicPoses:
+    """All of our poses that carry closures."""
+    rows = lifted.rows[np.searchsorted(lifted.n, lifted.carriers)]
+    values = np.concatenate([lifted.anchor[None], rows])
+    keyframes = tuple(int(n) for n in lifted.carriers)
+    return PublicPoses(frame.robot, frame.epoch, len(lifted.anchor) // 2, keyframes, values)
