@@ -39,6 +39,8 @@ MILLIMETRE_M = 1e-3
 LONGEST_STEP = 2**15 - 1
 """Between two samples: 3.2 m or 3.2 rad in a tenth of a second."""
 TRAITS = 7
+MAX_ROUND = 2**62
+"""Far from where one more would not be a number of 64 bits; see `pose_exchange.LEAP`."""
 MAX_TRAIT = 10.0
 MAX_UWB_ID = 2**32 - 1
 
@@ -252,11 +254,11 @@ def _read_public(raw: Any) -> PublicPoses:
         raise ValueError("sizes that do not fit each other")
     if any(n < 0 for n in raw.keyframes) or (np.diff(raw.keyframes) <= 0).any():
         raise ValueError("keyframes out of order")
-    if not 0 <= raw.since <= raw.round or not 0 <= raw.part < raw.parts:
+    if not 0 <= raw.since <= raw.round < MAX_ROUND or not 0 <= raw.part < raw.parts:
         raise ValueError("part of nothing")
     _bounded("neighbours", raw.n_held, 0, MAX_HELD)
     held = tuple((_robot(h.id), h.round) for h in raw.held)
-    if any(count < 0 for _, count in held):
+    if any(not 0 <= count < MAX_ROUND for _, count in held):
         raise ValueError("move before the first")
     values = np.array(raw.values, dtype=float)
     if not np.isfinite(values).all():

@@ -29,7 +29,7 @@ MODEL_EVERY = 64
 """Log entries between two that say what our sensors are like."""
 MEASUREMENTS_PER_ENTRY = 20
 """Keyframes, ranges and closures in one log entry; 20 closures with 20 peers are 1,280 bytes."""
-PUBLIC_ENVELOPE_BYTES = 72
+PUBLIC_ENVELOPE_BYTES = 80
 """What a public_poses_t needs besides its poses and what it holds of others."""
 UNVERIFIED_US = 10 * SECOND_US
 """How long after a message that does not fit the team key it is still spoken of."""
@@ -91,10 +91,10 @@ class Team:
 
     def send_public(self, public: PublicPoses, utime: int) -> list[Send]:
         """Lifted poses, as many in one message as one datagram takes."""
-        # 6 bytes for each that is held, 4 bytes of number and 4 * rank floats for each pose, and
+        # 10 bytes for each that is held, 4 bytes of number and 4 * rank floats for each pose, and
         # the anchor's floats once
         lifted = 16 * public.rank
-        envelope = PUBLIC_ENVELOPE_BYTES + 6 * len(public.held) + lifted
+        envelope = PUBLIC_ENVELOPE_BYTES + 10 * len(public.held) + lifted
         return [
             self.send(part, utime)
             for part in public.split((MAX_PAYLOAD - envelope) // (4 + lifted))

@@ -12,7 +12,7 @@ class held_t(object):
 
     __slots__ = ["id", "round"]
 
-    __typenames__ = ["int16_t", "int32_t"]
+    __typenames__ = ["int16_t", "int64_t"]
 
     __dimensions__ = [None, None]
 
@@ -21,8 +21,8 @@ class held_t(object):
         """ LCM Type: int16_t """
         self.round = 0
         """
-        the last of its moves that is held completely, 0 for none
-        LCM Type: int32_t
+        number of the last of its moves that is held completely, 0 for none
+        LCM Type: int64_t
         """
 
 
@@ -33,7 +33,7 @@ class held_t(object):
         return buf.getvalue()
 
     def _encode_one(self, buf):
-        buf.write(struct.pack(">hi", self.id, self.round))
+        buf.write(struct.pack(">hq", self.id, self.round))
 
     @staticmethod
     def decode(data: bytes):
@@ -48,13 +48,13 @@ class held_t(object):
     @staticmethod
     def _decode_one(buf):
         self = held_t()
-        self.id, self.round = struct.unpack(">hi", buf.read(6))
+        self.id, self.round = struct.unpack(">hq", buf.read(10))
         return self
 
     @staticmethod
     def _get_hash_recursive(parents):
         if held_t in parents: return 0
-        tmphash = (0x87d3f98c5e6a1c00) & 0xffffffffffffffff
+        tmphash = (0x87d3f98f5c6a1c00) & 0xffffffffffffffff
         tmphash  = (((tmphash<<1)&0xffffffffffffffff) + (tmphash>>63)) & 0xffffffffffffffff
         return tmphash
     _packed_fingerprint = None

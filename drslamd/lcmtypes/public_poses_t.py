@@ -19,7 +19,7 @@ class public_poses_t(object):
 
     __slots__ = ["header", "frame", "frame_epoch", "rank", "round", "since", "part", "parts", "asks", "n_held", "held", "n", "keyframes", "n_values", "values"]
 
-    __typenames__ = ["drslamd.lcmtypes.header_t", "int16_t", "int64_t", "int16_t", "int32_t", "int32_t", "int16_t", "int16_t", "int8_t", "int16_t", "drslamd.lcmtypes.held_t", "int16_t", "int32_t", "int32_t", "float"]
+    __typenames__ = ["drslamd.lcmtypes.header_t", "int16_t", "int64_t", "int16_t", "int64_t", "int64_t", "int16_t", "int16_t", "int8_t", "int16_t", "drslamd.lcmtypes.held_t", "int16_t", "int32_t", "int32_t", "float"]
 
     __dimensions__ = [None, None, None, None, None, None, None, None, None, None, ["n_held"], None, ["n"], None, ["n_values"]]
 
@@ -38,14 +38,14 @@ class public_poses_t(object):
         """ LCM Type: int16_t """
         self.round = 0
         """
-        of the origin's moves: these are poses after that one ...
-        LCM Type: int32_t
+        number of the origin's move, above those of its neighbours: these are poses after it ...
+        LCM Type: int64_t
         """
 
         self.since = 0
         """
         ... namely those that were said anew after this one ...
-        LCM Type: int32_t
+        LCM Type: int64_t
         """
 
         self.part = 0
@@ -66,7 +66,7 @@ class public_poses_t(object):
         """ LCM Type: int16_t """
         self.held = []
         """
-        of the neighbours: from what the origin moved; when it asks, what it holds now
+        when it asks: how far it holds its neighbours
         LCM Type: drslamd.lcmtypes.held_t[n_held]
         """
 
@@ -92,7 +92,7 @@ class public_poses_t(object):
     def _encode_one(self, buf):
         assert self.header._get_packed_fingerprint() == drslamd.lcmtypes.header_t._get_packed_fingerprint()
         self.header._encode_one(buf)
-        buf.write(struct.pack(">hqhiihhbh", self.frame, self.frame_epoch, self.rank, self.round, self.since, self.part, self.parts, self.asks, self.n_held))
+        buf.write(struct.pack(">hqhqqhhbh", self.frame, self.frame_epoch, self.rank, self.round, self.since, self.part, self.parts, self.asks, self.n_held))
         for i0 in range(self.n_held):
             assert self.held[i0]._get_packed_fingerprint() == drslamd.lcmtypes.held_t._get_packed_fingerprint()
             self.held[i0]._encode_one(buf)
@@ -115,7 +115,7 @@ class public_poses_t(object):
     def _decode_one(buf):
         self = public_poses_t()
         self.header = drslamd.lcmtypes.header_t._decode_one(buf)
-        self.frame, self.frame_epoch, self.rank, self.round, self.since, self.part, self.parts, self.asks, self.n_held = struct.unpack(">hqhiihhbh", buf.read(27))
+        self.frame, self.frame_epoch, self.rank, self.round, self.since, self.part, self.parts, self.asks, self.n_held = struct.unpack(">hqhqqhhbh", buf.read(35))
         self.held = []
         for i0 in range(self.n_held):
             self.held.append(drslamd.lcmtypes.held_t._decode_one(buf))
@@ -129,7 +129,7 @@ class public_poses_t(object):
     def _get_hash_recursive(parents):
         if public_poses_t in parents: return 0
         newparents = parents + [public_poses_t]
-        tmphash = (0x404a89d30fb011bc+ drslamd.lcmtypes.header_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.held_t._get_hash_recursive(newparents)) & 0xffffffffffffffff
+        tmphash = (0xf1c97ecacaf7818d+ drslamd.lcmtypes.header_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.held_t._get_hash_recursive(newparents)) & 0xffffffffffffffff
         tmphash  = (((tmphash<<1)&0xffffffffffffffff) + (tmphash>>63)) & 0xffffffffffffffff
         return tmphash
     _packed_fingerprint = None

@@ -24,12 +24,11 @@ class PublicPoses:
         keyframes: n of them, ascending.
         values: (n + 1, 2 * rank) complex, rotation then translation; the first row is the pose that
             anchors the frame.
-        round: of the robot's moves; these are poses after that one.
+        round: number of the robot's move; these are poses after that one, 0 before the first.
         since: they are those that were said anew after this move.
         part, parts: which part of these, and of how many.
         asks: nothing is said of poses, the robot waits for neighbours.
-        held: (robot, round) of its neighbours: from which of their moves it moved; when it asks,
-            which it holds now.
+        held: (robot, round) of these neighbours: the last move that it holds.
     """
 
     frame: int
@@ -113,10 +112,6 @@ class HeardPoses:
     def round(self) -> int:
         """The last of its moves that is held completely, 0 of none."""
         return self.poses.round if self.poses else 0
-
-    def knew(self, robot: int) -> int:
-        """From which move of a robot it moved last; 0 of none."""
-        return dict(self.poses.held).get(robot, 0) if self.poses else 0
 
     def take(self, message: PublicPoses) -> None:
         """Keep a part until all of them are here; older ones come too late."""

@@ -5,16 +5,18 @@ team worse off. So neighbours, robots that share a closure, take turns: who has 
 the other has moved from there. Then every move is made on the very poses that the neighbours have,
 and what it gains is gained by the whole team, whatever was lost or late on the way.
 
-Nobody hands out turns. A robot numbers its moves, and each message says from which moves of its
-neighbours it moved; whose turn it is follows from these numbers. (Reversal of edges: Barzilai,
-Gafni 1989. It never blocks: where all wait in a circle nobody could have moved last.) Who would
-move and lacks a neighbour's move asks; the neighbour says it again, or, if it has no reason to
-move, that it stays where it is. Where a neighbour does not answer for long it is left alone.
+Nobody hands out turns. A move gets a number above those of all neighbours' last moves (Lamport
+1978); it is the turn of the robot that knows of each neighbour a move with a number above its own
+last. For such a neighbour cannot have moved again: it would first have to hear a higher number of
+ours. The lowest number of all may always move, so nobody ever waits in a circle.
+
+Who would move and lacks a neighbour's move asks; the neighbour says it again, or, if it has no
+reason to move, moves to where it is. One that lives and does not answer for long is left alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Iterable, Set
 from dataclasses import replace
 
 import numpy as np
@@ -26,13 +28,15 @@ from drslamd.slam.se2 import Array
 
 PATIENCE_US = 5 * SECOND_US
 """A neighbour that lives and does not answer for so long has another trouble; at 50 % loss it was
-asked ten times or more."""
+asked fifty times."""
 ASK_US = 100 * MILLISECOND_US
 """How long a turn is waited for until it is asked for, and asked again ..."""
 ASK_LATER_US = SECOND_US
 """... which is rarer when nobody answers: no neighbour is in the frame yet."""
 REPEAT_US = 50 * MILLISECOND_US
 """Between two repetitions of what somebody lost: all that ask meanwhile hear the same one."""
+LEAP = 2**24
+"""A number goes up by no more at once, so that none from outside brings it to its limit of 2^62."""
 MATTERS = 1e-8
 """Change of a pose, squared and in units of what closures tell of it, that is worth being said: a
 ten-thousandth of their sigma. Poses that a thousand closures hold then change the cost by 1e-5."""
@@ -42,7 +46,7 @@ class PoseExchange:
     """One robot's part in it.
 
     Attributes:
-        round: how many moves were said, those among them that changed nothing included.
+        round: number of our last move; 0 of none.
         is_waiting: would we move, and is it not our turn?
     """
 
@@ -51,16 +55,12 @@ class PoseExchange:
         self.round = 0
         self.is_waiting = False
         self._heard: dict[Chain, HeardPoses] = {}
-        self._moved_from: dict[Chain, int] = {}
-        """The moves of the neighbours that our last one was made from."""
         self._neighbours: list[Chain] = []
-        self._naming: set[Chain] = set()
-        """Who counts us among its neighbours."""
         self._said: PublicPoses | None = None
         self._said_in: dict[int, int] = {}
-        """By keyframe: our move that its pose was last said after."""
-        self._first = 0
-        """The move before the first one in this frame."""
+        """By keyframe: the move that its pose was last said with."""
+        self._first = self._before = 0
+        """The move before the first one in this frame, and that before the last one."""
         self._blocked_since: dict[Chain, int] = {}
         self._asks_at = self._waits_since = 0
         self._lost: dict[Chain, int] = {}
@@ -78,21 +78,18 @@ class PoseExchange:
         peer = self._heard[origin]
         peer.take(message)
         held = dict(message.held).get(self._own.robot)
-        if held is None:
+        if not message.asks or held is None:
             return
-        self._naming.add(origin)
-        if message.asks and held < self.round:
+        if held < self.round:
             self._lost[origin] = held
-        elif message.asks and peer.poses and self._is_my_turn(origin):
+        elif (self.round, self._own) < (message.round, origin):
             self._is_awaited = True
 
     def keep(self, chains: Set[Chain]) -> None:
         """Forget all robots but these."""
         for chain in self._heard.keys() - chains:
             del self._heard[chain]
-            self._moved_from.pop(chain, None)
             self._lost.pop(chain, None)
-            self._naming.discard(chain)
 
     def held(self, frame: Chain | None = None) -> dict[int, PublicPoses]:
         """By robot: the poses that are held completely, those in one frame or in any."""
@@ -130,17 +127,12 @@ class PoseExchange:
         self.is_waiting = False
 
     def _is_my_turn(self, chain: Chain) -> bool:
-        """Has this neighbour moved from where we are, and do we know where to?"""
+        """Does this neighbour have to wait for us, and do we know where it is?"""
         peer = self._heard.get(chain)
         if peer is None or peer.newest == 0:
             # it is in no frame yet
             return True
-        if peer.round < peer.newest:
-            return False
-        it_knew = peer.knew(self._own.robot) == self.round
-        we_knew = self._moved_from.get(chain) == peer.round
-        # both moved at once when they first heard of each other
-        return self._own < chain if it_knew == we_knew else it_knew
+        return peer.round == peer.newest and (self.round, self._own) < (peer.round, chain)
 
     # ---- outgoing ----
 
@@ -154,53 +146,31 @@ class PoseExchange:
             self._said.frame_epoch,
         ):
             self._said, self._said_in, self._first = None, {}, self.round
-        news = self._news(now, lifted.weights)
+        before = self._said.table() if self._said else {}
+        news = _news(now, before, lifted.weights)
         if not news and not self._is_awaited:
             return []
-        table = self._said.table() if self._said else {}
-        table.update(now.chosen(news).table())
-        kept = [n for n in now.keyframes if n in table]
-        self._said = replace(
-            now, keyframes=tuple(kept), values=np.array([now.values[0], *(table[n] for n in kept)])
-        )
+        table = {**before, **now.chosen(news).table()}
+        values = np.array([now.values[0], *(table[n] for n in now.keyframes)])
+        self._said = replace(now, values=values)
         self._advance()
-        self._said_in = {n: self._said_in.get(n, self.round) for n in kept} | dict.fromkeys(
-            news, self.round
-        )
-        return [self._since(self.round - 1)]
-
-    def _news(self, now: PublicPoses, weights: Array) -> list[int]:
-        """Keyframes that moved since they were said by more than matters."""
-        before = self._said.table() if self._said else {}
-        rank = now.rank
-        out = []
-        for n, row, (turn, place) in zip(now.keyframes, now.values[1:], weights, strict=True):
-            if n in before:
-                change = np.abs(row - before[n]) ** 2
-                if turn * change[:rank].sum() + place * change[rank:].sum() <= MATTERS:
-                    continue
-            out.append(n)
-        return out
+        said = {**self._said_in, **dict.fromkeys(news, self.round)}
+        self._said_in = {n: said[n] for n in now.keyframes}
+        return [self._after(self._before)]
 
     def _advance(self) -> None:
-        """Another move of ours is said, from where the neighbours are now."""
-        self.round += 1
-        self._moved_from = {c: p.round for c, p in self._heard.items() if p.poses}
+        """We moved, after all that the neighbours did."""
+        highest = max((self._heard[c].newest for c in self._neighbours if c in self._heard), default=0)
+        self._before = self.round
+        self.round = max(self.round, min(highest, self.round + LEAP)) + 1
         self._is_awaited = False
 
-    def _since(self, move: int) -> PublicPoses:
+    def _after(self, move: int) -> PublicPoses:
         """All that was said anew after some move of ours."""
         assert self._said is not None
         since = move if move > self._first else 0
         chosen = self._said.chosen(n for n, said in self._said_in.items() if said > since)
-        return replace(
-            chosen.occupied(), round=self.round, since=since, held=self._named(self._moved_from)
-        )
-
-    def _named(self, moves: Mapping[Chain, int]) -> tuple[tuple[int, int], ...]:
-        others = sorted(self._naming.difference(self._neighbours))
-        named = [*self._neighbours, *others][:MAX_HELD]
-        return tuple((chain.robot, moves.get(chain, 0)) for chain in sorted(named))
+        return replace(chosen.occupied(), round=self.round, since=since)
 
     def answers(self, utime: int, at_rest: bool) -> list[PublicPoses]:
         """What others wait for, and what we must ask for ourselves.
@@ -210,11 +180,11 @@ class PoseExchange:
         """
         out = []
         if self._said is not None and self._lost and utime - self._repeated_at >= REPEAT_US:
-            out.append(self._since(min(self._lost.values())))
+            out.append(self._after(min(self._lost.values())))
             self._lost, self._repeated_at = {}, utime
         if self._said is not None and self._is_awaited and at_rest:
             self._advance()
-            out.append(self._since(self.round - 1))
+            out.append(self._after(self._before))
         if self.is_waiting and utime >= self._asks_at:
             is_long = utime - self._waits_since > PATIENCE_US
             self._asks_at = utime + (ASK_LATER_US if is_long else ASK_US)
@@ -223,7 +193,7 @@ class PoseExchange:
 
     def _question(self) -> PublicPoses:
         """Which moves of our neighbours we hold."""
-        held = {chain: peer.round for chain, peer in self._heard.items()}
+        moves = {chain: peer.round for chain, peer in self._heard.items()}
         return PublicPoses(
             frame=self._own.robot,
             frame_epoch=self._own.epoch,
@@ -233,7 +203,7 @@ class PoseExchange:
             round=self.round,
             since=self.round,
             asks=True,
-            held=self._named(held),
+            held=tuple((chain.robot, moves.get(chain, 0)) for chain in self._neighbours),
         )
 
 
@@ -243,3 +213,15 @@ def public_poses(frame: Chain, lifted: Lifted) -> PublicPoses:
     values = np.concatenate([lifted.anchor[None], rows])
     keyframes = tuple(int(n) for n in lifted.carriers)
     return PublicPoses(frame.robot, frame.epoch, len(lifted.anchor) // 2, keyframes, values)
+
+
+def _news(now: PublicPoses, before: dict[int, Array], weights: Array) -> list[int]:
+    """Keyframes that moved since they were said by more than matters, or were not said."""
+    out = []
+    for n, row, (turn, place) in zip(now.keyframes, now.values[1:], weights, strict=True):
+        if n in before:
+            change = np.abs(row - before[n]) ** 2
+            if turn * change[: now.rank].sum() + place * change[now.rank :].sum() <= MATTERS:
+                continue
+        out.append(n)
+    return out

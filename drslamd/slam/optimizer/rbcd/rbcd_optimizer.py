@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from drslamd.conventions import Chain
+from drslamd.conventions import Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.estimate import Lifted, TeamEstimate, Trajectory
@@ -88,10 +88,11 @@ class RbcdOptimizer:
         around = lifted_neighbours(graph, data, used, fitting, self._rank)
         anchor = _anchor(fitting, group)
         before = previous.lifted if previous and previous.frame == group.frame else None
-        lifted = self._placed(data, used, group, before, around)
-        if lifted is None or (anchor is None and group.frame.chain != self._own):
+        owns = group.frame.chain == self._own
+        n, odometry = data.keyframes.n[used], data.keyframes.poses[used]
+        lifted = placed(n, odometry, before, around, self._rank if owns else None)
+        if lifted is None or (anchor is None and not owns):
             return None
-        n = data.keyframes.n[used]
         same = before is not None and np.array_equal(before.n, n) and before.ends == len(around.n)
         start = Start(
             n=n,
@@ -100,40 +101,42 @@ class RbcdOptimizer:
             quiet=before.quiet + 1 if before and same else 0,
             origin=graph.segment(group.frame).poses[0],
         )
-        return partial(_move, start, around, anchor, group, self._own)
+        return partial(move, start, around, None if owns else anchor, group.frame, self._own)
 
-    def _placed(
-        self,
-        data: ChainData,
-        used: Array,
-        group: Group,
-        before: Lifted | None,
-        around: LiftedNeighbours,
-    ) -> Array | None:
-        """(k, 2 r) our keyframes: as they were, else by odometry from the nearest that is known.
-        None: no neighbour tells where we are."""
-        n, poses = data.keyframes.n[used], data.keyframes.poses[used]
-        known = np.isin(n, before.n) if before else np.zeros(len(n), dtype=bool)
-        if before is not None and known.any():
-            at = np.flatnonzero(known)
-            rows = before.rows[np.searchsorted(before.n, n[at])]
-        elif group.frame.chain == self._own:
-            at, rows = np.zeros(1, dtype=np.int64), riemannian_descent.lift(poses[:1], self._rank)
-        else:
-            out, back = around.leaving, around.arriving
-            at = np.concatenate([out.i, back.j])
-            rows = np.concatenate(
-                [
-                    riemannian_descent.moved(around.rows[out.j], se2.inverse(out.measured)),
-                    riemannian_descent.moved(around.rows[back.i], back.measured),
-                ]
-            )
-            if not len(at):
-                return None
-            order = np.argsort(at, kind="stable")
-            at, rows = at[order], rows[order]
-        nearest = np.searchsorted((n[at][1:] + n[at][:-1]) / 2, n)
-        return riemannian_descent.moved(rows[nearest], se2.between(poses[at][nearest], poses))
+
+def placed(
+    n: Array, odometry: Array, before: Lifted | None, around: LiftedNeighbours, rank: int | None
+) -> Array | None:
+    """(k, 2 r) our keyframes: as they were, else by odometry from the nearest that is known, else
+    as closures to neighbours tell. None: no neighbour is known.
+
+    Args:
+        n, odometry: (k,) and (k, 3) our keyframes.
+        before: after our last move in this frame.
+        rank: of the relaxation, where the frame is ours; then the first keyframe is where odometry
+            has it.
+    """
+    known = np.isin(n, before.n) if before else np.zeros(len(n), dtype=bool)
+    if before is not None and known.any():
+        at = np.flatnonzero(known)
+        rows = before.rows[np.searchsorted(before.n, n[at])]
+    elif rank is not None:
+        at, rows = np.zeros(1, dtype=np.int64), riemannian_descent.lift(odometry[:1], rank)
+    else:
+        out, back = around.leaving, around.arriving
+        at = np.concatenate([out.i, back.j])
+        rows = np.concatenate(
+            [
+                riemannian_descent.moved(around.rows[out.j], se2.inverse(out.measured)),
+                riemannian_descent.moved(around.rows[back.i], back.measured),
+            ]
+        )
+        if not len(at):
+            return None
+        order = np.argsort(at, kind="stable")
+        at, rows = at[order], rows[order]
+    nearest = np.searchsorted((n[at][1:] + n[at][:-1]) / 2, n)
+    return riemannian_descent.moved(rows[nearest], se2.between(odometry[at][nearest], odometry))
 
 
 def _in_group(data: ChainData, group: Group) -> Array:
@@ -159,10 +162,14 @@ def _anchor(public: Mapping[int, PublicPoses], group: Group) -> Array | None:
     return next((a for a in anchors if on_sphere(a[None]).all()), None)
 
 
-def _move(
-    start: Start, around: LiftedNeighbours, anchor: Array | None, group: Group, chain: Chain
+def move(
+    start: Start, around: LiftedNeighbours, anchor: Array | None, frame: Segment, chain: Chain
 ) -> TeamEstimate:
-    """Our block moves, if that is worth it; what that means in the frame of the team."""
+    """Our block moves, if that is worth it; what that means in the frame of the team.
+
+    Args:
+        anchor: (2 r,) of the frame; None where the frame is ours.
+    """
     edges = [ComplexFactors.of(e) for e in (start.own, around.leaving, around.arriving)]
     block = riemannian_descent.block(edges[0], edges[1], edges[2], around.rows, len(start.n))
     before = riemannian_descent.stacked(start.lifted)
@@ -174,13 +181,12 @@ def _move(
         lean = MOST_LEAN * start.quiet / (start.quiet + HALF_LEAN)
         after = riemannian_descent.leaned(block, before, lowest, lean)
     lifted = riemannian_descent.rows(after)
-    ours = group.frame.chain == chain
-    anchor = lifted[0] if anchor is None or ours else anchor
-    last = len(start.n) - 1
+    last, held = len(start.n) - 1, 0 if anchor is None else None
+    anchor = lifted[0] if anchor is None else anchor
     return TeamEstimate(
-        group.frame,
+        frame,
         _trajectories(start, around, lifted, anchor, chain),
-        {chain.robot: riemannian_descent.conditional_covariance(block, last, 0 if ours else None)},
+        {chain.robot: riemannian_descent.conditional_covariance(block, last, held)},
         cost=block.cost(after),
         iterations=steps,
         converged=gain <= SETTLED,
