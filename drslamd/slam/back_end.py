@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Set
+from collections.abc import Set
 from typing import NamedTuple
 
 from drslamd.config import Config
@@ -22,18 +22,17 @@ from drslamd.slam.optimizer.rbcd.pose_exchange import PoseExchange
 from drslamd.slam.optimizer.rbcd.rbcd_optimizer import at_anchor
 from drslamd.slam.tuning import DEFAULTS, Tuning
 
-
 URGENT = 1e-2
 """Share of its cost that a move must bring for the next one to follow as soon as it is our turn:
 when a team has just met, and then for a second or two."""
 
 
 class _Known(NamedTuple):
-    """What a job knows: log entries that are held, robots that live, public poses of the peers."""
+    """What a job knows: log entries that are held, robots that live, moves of the neighbours."""
 
     inserted: int = -1
     living: frozenset[int] = frozenset()
-    public: Mapping[int, PublicPoses] = {}
+    moves: int = 0
 
 
 class BackEnd:
@@ -97,8 +96,8 @@ class BackEnd:
             shift_us: clock of each robot minus ours, us.
             talking: those of them that hear us as we hear them.
         """
-        now = _Known(self._inserted, frozenset(present), self.exchange.held())
-        if not _is_news(self._known, now) and (not self.estimate or self.estimate.converged):
+        now = _Known(self._inserted, frozenset(present), self.exchange.news)
+        if now == self._known and (self.estimate is None or self.estimate.converged):
             self.exchange.rest()
             return None
         if self._takes_turns and not self.exchange.begin(self._neighbours(talking), utime):
@@ -149,14 +148,3 @@ class BackEnd:
         if result.lifted is None:
             return []
         return self.exchange.moved(result.frame.chain, result.lifted)
-
-
-def _is_news(before: _Known, now: _Known) -> bool:
-    """Does a job know anything that the one before it did not?"""
-    same = (before.inserted, before.living, before.public.keys()) == (
-        now.inserted,
-        now.living,
-        now.public.keys(),
-    )
-    # poses of the same keyframes compare equal, whatever they are
-    return not same or any(before.public[k] is not poses for k, poses in now.public.items())

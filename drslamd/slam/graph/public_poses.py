@@ -43,12 +43,16 @@ class PublicPoses:
     asks: bool = False
     held: tuple[tuple[int, int], ...] = ()
 
+    def is_in_frame_of(self, other: PublicPoses) -> bool:
+        """Are both in one frame?"""
+        return (self.frame, self.frame_epoch) == (other.frame, other.frame_epoch)
+
     def table(self) -> dict[int, Array]:
         """(2 * rank,) lifted pose of each keyframe."""
         return dict(zip(self.keyframes, self.values[1:], strict=True))
 
     def of_rank(self, rank: int) -> PublicPoses:
-        """The same with other directions: new ones are zero, and what lay in those that go is lost."""
+        """The same with other directions: new ones are zero, what lay in those that go is lost."""
         kept = min(rank, self.rank)
         values = np.zeros((len(self.values), 2 * rank), dtype=complex)
         values[:, :kept] = self.values[:, :kept]
@@ -74,25 +78,17 @@ class PublicPoses:
         for part, first in enumerate(starts):
             keyframes = self.keyframes[first : first + at_once]
             values = np.concatenate([self.values[:1], self.values[1 + first :][: len(keyframes)]])
-            yield replace(
-                self, keyframes=keyframes, values=values, part=part, parts=len(starts)
-            )
+            yield replace(self, keyframes=keyframes, values=values, part=part, parts=len(starts))
 
     def after(self, before: PublicPoses | None) -> PublicPoses:
         """These poses, and those that were said before and that they do not replace."""
-        same = before is not None and (before.frame, before.frame_epoch) == (
-            self.frame,
-            self.frame_epoch,
-        )
-        if before is None or not same:
+        if before is None or not before.is_in_frame_of(self):
             return replace(self, part=0, parts=1)
         rank = max(self.rank, before.rank)
         table = {**before.of_rank(rank).table(), **self.of_rank(rank).table()}
         keyframes = tuple(sorted(table)[-MAX_PUBLIC:])
         values = np.array([self.of_rank(rank).values[0], *(table[n] for n in keyframes)])
-        return replace(
-            self, rank=rank, keyframes=keyframes, values=values, part=0, parts=1
-        )
+        return replace(self, rank=rank, keyframes=keyframes, values=values, part=0, parts=1)
 
 
 class HeardPoses:
@@ -113,21 +109,29 @@ class HeardPoses:
         """The last of its moves that is held completely, 0 of none."""
         return self.poses.round if self.poses else 0
 
-    def take(self, message: PublicPoses) -> None:
-        """Keep a part until all of them are here; older ones come too late."""
+    def take(self, message: PublicPoses) -> bool:
+        """Keep a part until all of them are here; older ones come too late.
+
+        Returns:
+            is it held by this part that the peer is elsewhere now?
+        """
         self.newest = max(self.newest, message.round)
         if message.asks or message.round <= self.round or message.since > self.round:
-            return
+            return False
         first = next(iter(self._parts.values()), message)
         if message.round < first.round:
-            return
+            return False
         if (message.round, message.since, message.parts) != (first.round, first.since, first.parts):
             self._parts = {}
         self._parts[message.part] = message
         if sum(len(part.keyframes) for part in self._parts.values()) > MAX_PUBLIC:
             self._parts = {}
-        if len(self._parts) == message.parts:
-            whole = self.poses
-            for _, part in sorted(self._parts.items()):
-                whole = part.after(whole)
-            self.poses, self._parts = whole, {}
+        if len(self._parts) < message.parts:
+            return False
+        before = whole = self.poses
+        for _, part in sorted(self._parts.items()):
+            whole = part.after(whole)
+        is_said = any(part.keyframes for part in self._parts.values())
+        self.poses, self._parts = whole, {}
+        # a turn may be passed on without a move
+        return is_said or before is None or not before.is_in_frame_of(message)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -183,18 +182,7 @@ def closures(graph: PoseGraph, numbers: Numbering) -> BetweenFactors:
         upper.append(np.array([(*c.a_T_b, *c.covariance) for c in kept]).reshape(-1, 9)[used])
     i, j = np.concatenate(ends, axis=1)
     values = np.concatenate(upper)
-    full = values[:, 3 + np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])]
-    return BetweenFactors(i, j, values[:, :3], full)
-
-
-def between_factors(rows: Sequence[tuple[int, int, Sequence[float], Array]]) -> BetweenFactors:
-    """Factors out of (i, j, measured (3,), covariance (3, 3)), also of none."""
-    return BetweenFactors(
-        np.array([r[0] for r in rows], dtype=np.int64),
-        np.array([r[1] for r in rows], dtype=np.int64),
-        np.array([r[2] for r in rows], dtype=float).reshape(-1, 3),
-        np.array([r[3] for r in rows], dtype=float).reshape(-1, 3, 3),
-    )
+    return BetweenFactors(i, j, values[:, :3], se2.unpacked(values[:, 3:]))
 
 
 def ranges(graph: PoseGraph, numbers: Numbering) -> tuple[RangeFactors, list[tuple[int, int]]]:

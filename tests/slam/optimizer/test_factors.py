@@ -26,6 +26,7 @@ from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.factors import Numbering, chain_links, clock_shifts, numbering, sensible
+from drslamd.slam.optimizer.problem import BetweenFactors
 from drslamd.slam.robot_model import RobotModel
 
 A, B, C = Chain(0, 5), Chain(1, 6), Chain(2, 7)
@@ -235,7 +236,8 @@ def test_withdrawn_closures_and_those_of_other_groups_are_no_edges() -> None:
 
 
 def test_no_items_are_no_edges() -> None:
-    assert factors.between_factors([]).covariance.shape == (0, 3, 3)
+    nothing = BetweenFactors.joined([BetweenFactors.none(), BetweenFactors.none()])
+    assert nothing.covariance.shape == (0, 3, 3)
 
 
 # ---- edges that reach far ----

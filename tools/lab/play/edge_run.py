@@ -18,8 +18,8 @@ from drslamd.conventions import GRID_HZ, ROTATION_STEP_RAD, TRANSLATION_STEP_M, 
 from drslamd.slam import se2, settings
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.consistency.pcm import Candidate, PairConsistency
-from drslamd.slam.graph.measurements import ClosureMeasurement, GraphEntry, Keyframe
 from drslamd.slam.graph.estimate import TeamEstimate
+from drslamd.slam.graph.measurements import ClosureMeasurement, GraphEntry, Keyframe
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.odometry.noise import OdometryNoise, growth
 from drslamd.slam.optimizer.contract import Job
@@ -177,10 +177,10 @@ def _optimise(backs: dict[int, BackEnd], progress: Callable[[float], None] | Non
     members = {robot: _Member(back, set(backs)) for robot, back in backs.items()}
     turns = Turns(members)
     for number in range(MOST_ROUNDS):
-        moves = turns.round()
+        goes_on = turns.round()
         if progress:
             progress(number)
-        if not moves:
+        if not goes_on:
             break
 
 

@@ -2,24 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.conventions import Chain
 from drslamd.slam import se2
-from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
-from drslamd.slam.optimizer.factors import between_factors
 from drslamd.slam.optimizer.problem import BetweenFactors
-from drslamd.slam.se2 import Array
+from drslamd.slam.se2 import Array, Index
 
 OFF_SPHERE = 1e-2
 """A rotation whose length is wrong by more than rounding to 32 bits is not one."""
+
+
+class SharedClosures(NamedTuple):
+    """m closures between us and one other robot, all in one direction.
+
+    Attributes:
+        leaves: do they lead from our keyframes to those of the other, or back?
+        mine, far: (m,) keyframes at both ends.
+        measured: (m, 3) pose of the end in the start; covariance: (m, 3, 3).
+    """
+
+    other: Chain
+    leaves: bool
+    mine: Index
+    far: Index
+    measured: Array
+    covariance: Array
+
+    def chosen(self, which: Array) -> SharedClosures:
+        columns = (self.mine, self.far, self.measured, self.covariance)
+        return SharedClosures(self.other, self.leaves, *(column[which] for column in columns))
 
 
 @dataclass(frozen=True)
@@ -34,11 +54,11 @@ class LiftedNeighbours:
     """
 
     chains: tuple[Chain, ...]
-    n: Array
+    n: Index
     rows: Array
     leaving: BetweenFactors
     arriving: BetweenFactors
-    carriers: Array
+    carriers: Index
     weights: Array
 
 
@@ -51,6 +71,29 @@ def robots(graph: PoseGraph, own: Chain) -> set[int]:
     }
 
 
+def shared_closures(graph: PoseGraph, own: Chain) -> list[SharedClosures]:
+    """All of ours that are kept."""
+    out = []
+    for pair in graph.usable():
+        kept = pair.kept_closures() if own in (pair.a, pair.b) else []
+        if not kept:
+            continue
+        leaves = pair.a == own
+        ends = np.array([(c.a_n, c.b_n) for c in kept]).T
+        covariance = se2.unpacked(np.array([c.covariance for c in kept]))
+        out.append(
+            SharedClosures(
+                other=pair.b if leaves else pair.a,
+                leaves=leaves,
+                mine=ends[0 if leaves else 1],
+                far=ends[1 if leaves else 0],
+                measured=np.array([c.a_T_b for c in kept]),
+                covariance=covariance,
+            )
+        )
+    return out
+
+
 def on_sphere(rows: Array) -> NDArray[np.bool_]:
     """Which of the rows (k, 2 r) have a rotation."""
     length = np.linalg.norm(rows[:, : rows.shape[1] // 2], axis=1)
@@ -58,58 +101,56 @@ def on_sphere(rows: Array) -> NDArray[np.bool_]:
 
 
 def lifted_neighbours(
-    graph: PoseGraph,
-    data: ChainData,
-    used: Array,
-    public: Mapping[int, PublicPoses],
-    rank: int,
+    shared: Iterable[SharedClosures], n: Index, public: Mapping[int, PublicPoses], rank: int
 ) -> LiftedNeighbours:
-    """Sort the kept closures of our own pairs by whether the other end is known.
+    """Sort our closures by whether the other end is known.
 
     Args:
-        used: (k,) rows of our chain that the block consists of.
+        n: (k,) our keyframes that the block consists of, ascending.
         public: poses of that rank.
     """
-    own = data.chain
-    number = {int(n): k for k, n in enumerate(data.keyframes.n[used])}
-    leaving: list[tuple[int, int, tuple[float, ...], Array]] = []
-    arriving: list[tuple[int, int, tuple[float, ...], Array]] = []
     chains: list[Chain] = []
-    keyframes: list[int] = []
-    rows: list[Array] = []
-    for pair in graph.usable():
-        if own not in (pair.a, pair.b):
-            continue
-        leaves = pair.a == own
-        other = pair.b if leaves else pair.a
-        table = public[other.robot].table() if other.robot in public else {}
-        for closure in pair.kept_closures():
-            mine, far = (closure.a_n, closure.b_n) if leaves else (closure.b_n, closure.a_n)
-            if mine not in number:
-                continue
-            row = -1
-            if far in table and on_sphere(table[far][None])[0]:
-                row = len(rows)
-                chains.append(other)
-                keyframes.append(far)
-                rows.append(table[far])
-            edge = (closure.a_T_b, se2.unpacked(closure.covariance))
-            if leaves:
-                leaving.append((number[mine], row, *edge))
-            else:
-                arriving.append((row, number[mine], *edge))
-    away, back = between_factors(leaving), between_factors(arriving)
-    stiff = _stiffness(away, back, len(used))
-    carriers = np.unique(np.concatenate([away.i, back.j]))
+    keyframes, rows = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 2 * rank), dtype=complex)]
+    away, back = [BetweenFactors.none()], [BetweenFactors.none()]
+    for every in shared:
+        closures = every.chosen(np.isin(every.mine, n))
+        known, found = _known(closures, public, rank)
+        row = np.full(len(known), -1)
+        row[known] = len(chains) + np.arange(len(found))
+        mine, pose = np.searchsorted(n, closures.mine), (closures.measured, closures.covariance)
+        if closures.leaves:
+            away.append(BetweenFactors(mine, row, *pose))
+        else:
+            back.append(BetweenFactors(row, mine, *pose))
+        chains += [closures.other] * len(found)
+        keyframes.append(closures.far[known])
+        rows.append(found)
+    leaving, arriving = BetweenFactors.joined(away), BetweenFactors.joined(back)
+    stiff = _stiffness(leaving, arriving, len(n))
+    carriers = np.unique(np.concatenate([leaving.i, arriving.j]))
     return LiftedNeighbours(
         tuple(chains),
-        np.array(keyframes),
-        np.array(rows, dtype=complex).reshape(-1, 2 * rank),
-        away.chosen(away.j >= 0),
-        back.chosen(back.i >= 0),
-        data.keyframes.n[used][carriers],
+        np.concatenate(keyframes),
+        np.concatenate(rows),
+        leaving.chosen(leaving.j >= 0),
+        arriving.chosen(arriving.i >= 0),
+        n[carriers],
         stiff[carriers],
     )
+
+
+def _known(
+    closures: SharedClosures, public: Mapping[int, PublicPoses], rank: int
+) -> tuple[NDArray[np.bool_], Array]:
+    """Which of the far ends (m,) are known, and the lifted poses of these."""
+    poses = public.get(closures.other.robot)
+    if poses is None or not poses.keyframes:
+        nothing = np.zeros((0, 2 * rank), dtype=complex)
+        return np.zeros(len(closures.far), dtype=bool), nothing
+    held, values = np.array(poses.keyframes), poses.values[1:]
+    at = np.minimum(np.searchsorted(held, closures.far), len(held) - 1)
+    known = (held[at] == closures.far) & on_sphere(values)[at]
+    return known, values[at[known]]
 
 
 def _stiffness(leaving: BetweenFactors, arriving: BetweenFactors, count: int) -> Array:

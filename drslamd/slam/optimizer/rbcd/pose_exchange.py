@@ -48,12 +48,14 @@ class PoseExchange:
     Attributes:
         round: number of our last move; 0 of none.
         is_waiting: would we move, and is it not our turn?
+        news: how often a neighbour was found to be elsewhere than before.
     """
 
     def __init__(self, own: Chain) -> None:
         self._own = own
         self.round = 0
         self.is_waiting = False
+        self.news = 0
         self._heard: dict[Chain, HeardPoses] = {}
         self._neighbours: list[Chain] = []
         self._said: PublicPoses | None = None
@@ -68,15 +70,13 @@ class PoseExchange:
         self._repeated_at = 0
         self._is_awaited = False
 
-    # ---- incoming ----
-
     def hear(self, origin: Chain, message: PublicPoses) -> None:
         """A robot said where it is, or asks others to."""
         if origin not in self._heard:
             self.keep({chain for chain in self._heard if chain.robot != origin.robot})
             self._heard[origin] = HeardPoses()
         peer = self._heard[origin]
-        peer.take(message)
+        self.news += peer.take(message)
         held = dict(message.held).get(self._own.robot)
         if not message.asks or held is None:
             return
@@ -89,6 +89,7 @@ class PoseExchange:
         """Forget all robots but these."""
         for chain in self._heard.keys() - chains:
             del self._heard[chain]
+            self.news += 1
             self._lost.pop(chain, None)
 
     def held(self, frame: Chain | None = None) -> dict[int, PublicPoses]:
@@ -98,8 +99,6 @@ class PoseExchange:
             for chain, peer in self._heard.items()
             if peer.poses and frame in (None, (peer.poses.frame, peer.poses.frame_epoch))
         }
-
-    # ---- whose turn it is ----
 
     def begin(self, neighbours: Iterable[Chain], utime: int) -> bool:
         """We would move: is it our turn?
@@ -130,11 +129,9 @@ class PoseExchange:
         """Does this neighbour have to wait for us, and do we know where it is?"""
         peer = self._heard.get(chain)
         if peer is None or peer.newest == 0:
-            # it is in no frame yet
-            return True
+            # it was in no frame yet; once we have moved it has something to be placed by
+            return self.round == 0
         return peer.round == peer.newest and (self.round, self._own) < (peer.round, chain)
-
-    # ---- outgoing ----
 
     def moved(self, frame: Chain, lifted: Lifted) -> list[PublicPoses]:
         """What of our new poses must be said; nothing when they hardly moved."""
@@ -160,7 +157,9 @@ class PoseExchange:
 
     def _advance(self) -> None:
         """We moved, after all that the neighbours did."""
-        highest = max((self._heard[c].newest for c in self._neighbours if c in self._heard), default=0)
+        highest = max(
+            (self._heard[c].newest for c in self._neighbours if c in self._heard), default=0
+        )
         self._before = self.round
         self.round = max(self.round, min(highest, self.round + LEAP)) + 1
         self._is_awaited = False

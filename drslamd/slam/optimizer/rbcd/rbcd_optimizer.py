@@ -27,10 +27,12 @@ from drslamd.slam.optimizer.problem import BetweenFactors
 from drslamd.slam.optimizer.rbcd import riemannian_descent
 from drslamd.slam.optimizer.rbcd.lifted_neighbours import (
     LiftedNeighbours,
+    SharedClosures,
     lifted_neighbours,
     on_sphere,
+    shared_closures,
 )
-from drslamd.slam.se2 import Array
+from drslamd.slam.se2 import Array, Index
 
 SETTLED = 1e-9
 """Relative gain of a move below which a block waits for news: what the whole team could still gain
@@ -44,20 +46,45 @@ what goes past what is only just measured swings about it, and news come every s
 
 
 @dataclass(frozen=True)
+class OwnBlock:
+    """What is measured of our own poses.
+
+    Attributes:
+        n: (k,) keyframes; odometry: (k, 3) where it has them; links: between them, by their places.
+        shared: closures to other robots.
+    """
+
+    chain: Chain
+    n: Index
+    odometry: Array
+    links: BetweenFactors
+    shared: list[SharedClosures]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The frame of the team: its segment, and where (3,) in it the pose is that anchors it."""
+
+    segment: Segment
+    origin: Array
+
+
+@dataclass(frozen=True)
 class Start:
     """Our block before a move.
 
     Attributes:
-        n: (k,) keyframes; own: the odometry between them; lifted: (k, 2 r).
+        lifted: (k, 2 r).
+        anchor: (2 r,) of the frame; None where the frame is ours.
         quiet: how many moves were made on the very same measurements.
-        origin: (3,) pose of the anchor in the frame of the team.
     """
 
-    n: Array
-    own: BetweenFactors
+    own: OwnBlock
+    around: LiftedNeighbours
+    frame: Frame
     lifted: Array
+    anchor: Array | None
     quiet: int
-    origin: Array
 
 
 class RbcdOptimizer:
@@ -80,28 +107,41 @@ class RbcdOptimizer:
         """See `Optimizer.job`."""
         data = graph.chains[self._own.robot]
         used = _in_group(data, group)
-        fitting = {
-            robot: poses.of_rank(self._rank)
-            for robot, poses in sorted(public.items())
-            if poses.rank <= self._rank
-        }
-        around = lifted_neighbours(graph, data, used, fitting, self._rank)
-        anchor = _anchor(fitting, group)
+        keyframes = data.keyframes.chosen(used)
+        shared = shared_closures(graph, self._own)
+        own = OwnBlock(self._own, keyframes.n, keyframes.poses, _links(data, used), shared)
+        frame = Frame(group.frame, graph.segment(group.frame).poses[0])
         before = previous.lifted if previous and previous.frame == group.frame else None
-        owns = group.frame.chain == self._own
-        n, odometry = data.keyframes.n[used], data.keyframes.poses[used]
-        lifted = placed(n, odometry, before, around, self._rank if owns else None)
-        if lifted is None or (anchor is None and not owns):
-            return None
-        same = before is not None and np.array_equal(before.n, n) and before.ends == len(around.n)
-        start = Start(
-            n=n,
-            own=_links(data, used),
-            lifted=lifted,
-            quiet=before.quiet + 1 if before and same else 0,
-            origin=graph.segment(group.frame).poses[0],
-        )
-        return partial(move, start, around, None if owns else anchor, group.frame, self._own)
+        begun = start(own, frame, before, public, self._rank)
+        return partial(move, begun) if begun else None
+
+
+def start(
+    own: OwnBlock,
+    frame: Frame,
+    before: Lifted | None,
+    public: Mapping[int, PublicPoses],
+    rank: int,
+) -> Start | None:
+    """Our block where it is before a move; None while neither it nor the frame is known.
+
+    Args:
+        before: after our last move in this frame.
+        public: poses of others in this frame, by robot.
+        rank: of the relaxation.
+    """
+    fitting = {
+        robot: poses.of_rank(rank) for robot, poses in sorted(public.items()) if poses.rank <= rank
+    }
+    around = lifted_neighbours(own.shared, own.n, fitting, rank)
+    owns = frame.segment.chain == own.chain
+    anchor = None if owns else _anchor(fitting, frame.segment.robot)
+    lifted = placed(own.n, own.odometry, before, around, rank if owns else None)
+    if lifted is None or (anchor is None and not owns):
+        return None
+    same = before is not None and np.array_equal(before.n, own.n) and before.ends == len(around.n)
+    quiet = before.quiet + 1 if before and same else 0
+    return Start(own, around, frame, lifted, anchor, quiet)
 
 
 def placed(
@@ -155,64 +195,59 @@ def _links(data: ChainData, used: Array) -> BetweenFactors:
     return BetweenFactors(i[inside], j[inside], links.measured[inside], links.covariance[inside])
 
 
-def _anchor(public: Mapping[int, PublicPoses], group: Group) -> Array | None:
-    """The origin of the frame as the nearest to its owner has it."""
-    nearest = sorted(public, key=lambda robot: (robot != group.frame.robot, robot))
+def _anchor(public: Mapping[int, PublicPoses], owner: int) -> Array | None:
+    """The pose that anchors the frame as the nearest to its owner has it."""
+    nearest = sorted(public, key=lambda robot: (robot != owner, robot))
     anchors = (public[robot].values[0] for robot in nearest)
     return next((a for a in anchors if on_sphere(a[None]).all()), None)
 
 
-def move(
-    start: Start, around: LiftedNeighbours, anchor: Array | None, frame: Segment, chain: Chain
-) -> TeamEstimate:
-    """Our block moves, if that is worth it; what that means in the frame of the team.
-
-    Args:
-        anchor: (2 r,) of the frame; None where the frame is ours.
-    """
-    edges = [ComplexFactors.of(e) for e in (start.own, around.leaving, around.arriving)]
-    block = riemannian_descent.block(edges[0], edges[1], edges[2], around.rows, len(start.n))
-    before = riemannian_descent.stacked(start.lifted)
+def move(begun: Start) -> TeamEstimate:
+    """Our block moves, if that is worth it; what that means in the frame of the team."""
+    own, around, frame = begun.own, begun.around, begun.frame
+    edges = [ComplexFactors.of(e) for e in (own.links, around.leaving, around.arriving)]
+    block = riemannian_descent.block(edges[0], edges[1], edges[2], around.rows, len(own.n))
+    before = riemannian_descent.stacked(begun.lifted)
     lowest, steps = riemannian_descent.descend(block, before)
     cost = block.cost(before)
     gain = (cost - block.cost(lowest)) / (1 + cost)
     after = before
     if gain > SETTLED:
-        lean = MOST_LEAN * start.quiet / (start.quiet + HALF_LEAN)
+        lean = MOST_LEAN * begun.quiet / (begun.quiet + HALF_LEAN)
         after = riemannian_descent.leaned(block, before, lowest, lean)
     lifted = riemannian_descent.rows(after)
-    last, held = len(start.n) - 1, 0 if anchor is None else None
-    anchor = lifted[0] if anchor is None else anchor
+    last, held = len(own.n) - 1, 0 if begun.anchor is None else None
+    anchor = lifted[0] if begun.anchor is None else begun.anchor
+    covariance = riemannian_descent.conditional_covariance(block, last, held)
     return TeamEstimate(
-        frame,
-        _trajectories(start, around, lifted, anchor, chain),
-        {chain.robot: riemannian_descent.conditional_covariance(block, last, held)},
+        frame.segment,
+        _trajectories(begun, lifted, anchor),
+        {own.chain.robot: covariance},
         cost=block.cost(after),
         iterations=steps,
         converged=gain <= SETTLED,
         lifted=Lifted(
-            n=start.n,
+            n=own.n,
             rows=lifted,
             anchor=anchor,
-            origin=start.origin,
+            origin=frame.origin,
             carriers=around.carriers,
             weights=around.weights,
             ends=len(around.n),
-            quiet=start.quiet,
+            quiet=begun.quiet,
             gain=gain,
         ),
     )
 
 
-def _trajectories(
-    start: Start, around: LiftedNeighbours, lifted: Array, anchor: Array, chain: Chain
-) -> dict[int, Trajectory]:
+def _trajectories(begun: Start, lifted: Array, anchor: Array) -> dict[int, Trajectory]:
     """Ours, and what is known of our neighbours'."""
-    out = {chain.robot: Trajectory(chain, start.n, _in_frame(lifted, anchor, start.origin))}
+    own, around, origin = begun.own, begun.around, begun.frame.origin
+    out = {own.chain.robot: Trajectory(own.chain, own.n, _in_frame(lifted, anchor, origin))}
     for other in dict.fromkeys(around.chains):
         mine = [k for k, c in enumerate(around.chains) if c == other]
         keyframes, first = np.unique(around.n[mine], return_index=True)
-        poses = _in_frame(around.rows[mine][first], anchor, start.origin)
+        poses = _in_frame(around.rows[mine][first], anchor, origin)
         out[other.robot] = Trajectory(other, keyframes, poses)
     return out
 

@@ -87,7 +87,7 @@ class BlockProblem:
         return np.asarray(out)
 
     def cost(self, x: Array) -> float:
-        """Of the squares: the polynomial would lose half of its digits to the stiffness of links."""
+        """Of the squares: the polynomial would lose half of its digits to stiff links."""
         return sum(term.cost(x) for term in self.terms)
 
     def change(self, gradient: Array, step: Array) -> float:
