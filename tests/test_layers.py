@@ -11,6 +11,7 @@ import pytest
 from places import REPOSITORY
 
 PACKAGE = REPOSITORY / "drslamd"
+TESTS = REPOSITORY / "tests"
 GENERATED = PACKAGE / "lcmtypes"
 LAB = REPOSITORY / "tools" / "lab"
 
@@ -82,6 +83,21 @@ PORTS_AND_FILES = {"os", "signal", "socket", "serial", "can", "lcm", "logging", 
 IMPURE = CLOCKS_AND_CHANCE | THREADS_AND_PROCESSES | PORTS_AND_FILES
 
 MAX_FILE, MAX_FUNCTION = 350, 60
+
+NOUNS = {
+    "conventions",
+    "events",
+    "gossip.message_types",
+    "io.transport",
+    "sensors.samples",
+    "slam.graph.estimate",
+    "slam.graph.measurements",
+    "slam.optimizer.contract",
+    "slam.peer_in_range",
+    "slam.relative_pose.estimate",
+    "slam.tuning",
+}
+"""Modules that hold only nouns, types or protocols: what uses them is tested."""
 
 SAID_OF_MANY = {"solve"}
 """Verbs that their module qualifies."""
@@ -229,6 +245,17 @@ def test_there_is_no_import_cycle() -> None:
         free = {n for n in graph if n not in done and graph[n] <= done | {"drslamd"}}
         assert free, f"a cycle among {sorted(set(graph) - done)}"
         done |= free
+
+
+def test_every_module_has_a_test_that_one_finds_by_its_name() -> None:
+    """In the folder that mirrors the package; what is about whole robots is in `robot`."""
+    names = {name_of(p).removeprefix("drslamd."): p for p in modules() if "__" not in p.name}
+    assert set(names) >= NOUNS
+    for name, path in names.items():
+        folder = TESTS / path.parent.relative_to(PACKAGE)
+        places = [folder, TESTS / "robot"] if folder == TESTS else [folder]
+        is_found = any((place / f"test_{path.name}").exists() for place in places)
+        assert is_found is (name not in NOUNS), name
 
 
 @pytest.mark.slow

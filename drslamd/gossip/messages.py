@@ -28,10 +28,24 @@ from drslamd.gossip.message_types import (
 from drslamd.gossip.seal import TAG_BYTES, Header
 
 __all__ = [
-    "CHANNEL_PREFIX", "FINGERPRINTS", "MAX_BATCH", "MAX_HEARD", "MAX_LOGS", "UNKNOWN_CLOCK",
-    "Heard", "LogState", "Message", "OdometryBatch", "Pose", "Status",
-    "channel", "decode", "encode", "kind_of", "kind_of_channel",
-]  # fmt: skip
+    "CHANNEL_PREFIX",
+    "FINGERPRINTS",
+    "MAX_BATCH",
+    "MAX_HEARD",
+    "MAX_LOGS",
+    "UNKNOWN_CLOCK",
+    "Heard",
+    "LogState",
+    "Message",
+    "OdometryBatch",
+    "Pose",
+    "Status",
+    "channel",
+    "decode",
+    "encode",
+    "kind_of",
+    "kind_of_channel",
+]
 
 CHANNEL_PREFIX = "DRSLAM_"
 FINGERPRINTS = {kind: codec.struct._get_packed_fingerprint() for kind, codec in CODECS.items()}

@@ -68,7 +68,8 @@ class Peer:
     @property
     def loss(self) -> float:
         """Share of its messages that never came of late, 0 to 1."""
-        if not self._tallies:
+        # the first of them only says from where to count
+        if len(self._tallies) < 2:
             return 0.0
         (sent_before, came_before), (sent, came) = self._tallies[0], self._tallies[-1]
         return max(0.0, 1 - (came - came_before) / max(1, sent - sent_before))

@@ -45,6 +45,12 @@ def test_a_peer_of_which_everything_comes_has_lost_nothing() -> None:
     assert loss_after(["status", "other", "other"] * 10, set()) == 0.0
 
 
+def test_a_peer_that_has_spoken_once_has_lost_nothing_yet() -> None:
+    assert loss_after(["status"], set()) == 0.0
+    assert loss_after(["other", "status", "other"], set()) == 0.0
+    assert loss_after(["status", "other", "status"], {1}) == pytest.approx(1 / 2)
+
+
 def test_a_peer_of_which_every_fourth_message_is_lost_has_a_loss_of_a_quarter() -> None:
     messages = ["status", "other", "other", "other"] * 20
     assert loss_after(messages, set(range(2, 80, 4))) == pytest.approx(0.25)

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import random
-
 import pytest
 from message_builders import OTHER_SECRET, SECRET, a_seal, a_status, forged, kinds, resealed, sealed
 
 from drslamd.gossip import messages
-from drslamd.gossip.replay_window import ReplayWindow
 from drslamd.gossip.seal import Header, Seal, SealFault, team_key
 
 STATUS = frozenset([messages.FINGERPRINTS["STATUS"]])
@@ -202,25 +199,6 @@ def test_the_largest_counter_is_the_last_one() -> None:
         True,
         False,
     ]
-
-
-def test_the_window_agrees_with_a_set_of_all_that_was_seen() -> None:
-    draw, window = random.Random(6), ReplayWindow()
-    seen: set[int] = set()
-    at = 1
-    for _ in range(20_000):
-        at = max(1, at + draw.choice([1, 1, 2, -1, -3, -500, 501, -1023, 1025, 3000, -2900]))
-        newest = max(seen, default=0)
-        expected = at not in seen and at > newest - 1024
-        assert window.is_new(at) == expected
-        if expected:
-            window.commit(at)
-            seen.add(at)
-
-
-def test_asking_the_window_changes_nothing() -> None:
-    window = ReplayWindow()
-    assert [window.is_new(5) for _ in range(3)] == [True] * 3
 
 
 # ---- nothing is remembered of what is not proven -----------------------------------------------

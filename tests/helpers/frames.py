@@ -226,3 +226,24 @@ def cut(data: bytes, seed: int, longest: int = 40) -> Iterator[bytes]:
         step = draw.randint(1, longest)
         yield data[at : at + step]
         at += step
+
+
+PEERS = (Peer(0, 2850, 181, 159, role=1), Peer(3, -1, 163, 155, role=200, system_ms=77))
+
+ONE_OF_EACH = {
+    "ANCHOR_FRAME0": anchor_frame0([(0, (2895, 2419, -263), 364)]),
+    "TAG_FRAME0": tag_frame0(),
+    "NODE_FRAME0": node_frame0(1, [(0, b""), (2, b"hi")]),
+    "NODE_FRAME1": node_frame1([(0, (2911, 2438, -101))]),
+    "NODE_FRAME2": node_frame2(5, PEERS),
+    "NODE_FRAME3": node_frame3(5, PEERS),
+    "NODE_FRAME4": node_frame4([(2, [(0, 2445), (1, 1748)]), (5, [])]),
+    "AOA_NODE_FRAME0": aoa_node_frame0([(3, 1416, -4967)]),
+    "NODE_FRAME5": node_frame5(0xBE23BE6B, [Peer(0xBEF2BE32, 300, 180, 176, role=7)]),
+    "NODE_FRAME6": node_frame6(0xBE23BE6B, [(0xBEF8BE1E, b"\x11\x22")]),
+    "SETTING_FRAME0": setting_frame0(),
+    "ERROR_FRAME0": error_frame0(0b1001),
+    "SYSTEM_COMMON_FRAME0": system_common_frame0(),
+}
+
+"""A LinkTrack frame of every kind."""

@@ -33,15 +33,20 @@ from drslamd.slam.robot_model import RobotModel
 Array = NDArray[Any]
 
 NOISE = OdometryNoise(0.03, math.radians(0.15), 0.01, math.radians(0.5))
-"""The default of the configuration."""
+"""Wheels of usual quality: their scale is better than the configuration allows for by default."""
 EXACT = OdometryNoise(1e-9, 1e-9, 1e-9, 1e-9)
 
 
-def config(robot: int = 0, extra: str = "") -> Config:
-    """A configuration that says only what must be said."""
+def config(robot: int = 0, extra: str = "", uwb: str = "", wheels: str | None = None) -> Config:
+    """A configuration that says only what must be said, in `uwb` more of that section.
+
+    Args:
+        wheels: the whole section, for another base than a Kobuki.
+    """
+    base = 'source = "kobuki"\nport = "/dev/wheels"\n' if wheels is None else wheels
     return parse(
-        f'[robot]\nid = {robot}\n[team]\ninsecure = true\n[uwb]\nport = "/dev/uwb"\n'
-        f'[wheels]\nsource = "kobuki"\nport = "/dev/wheels"\n{extra}'
+        f'[robot]\nid = {robot}\n[team]\ninsecure = true\n[uwb]\nport = "/dev/uwb"\n{uwb}'
+        f"[wheels]\n{base}{extra}"
     )
 
 
@@ -125,6 +130,21 @@ def window_of(
         t, ranges, seen_from_last(a), seen_from_last(b), np.array(a_antenna), np.array(b_antenna)
     )
     return window, product(inverted(a[-1]), b[-1])
+
+
+def curved_window(
+    rng: np.random.Generator,
+    apart: float = 6.0,
+    count: int = 60,
+    step_m: float = 0.25,
+    bias: float = 0.0,
+    a_antenna: Sequence[float] = (0.0, 0.0),
+    b_antenna: Sequence[float] = (0.0, 0.0),
+    step_s: float = 0.5,
+) -> tuple[Window, Array]:
+    """The exact window of two robots on random curves, b moved by `apart`, and the true a_T_b."""
+    a, b = wander(rng, count, step_m), wander(rng, count, step_m) + [apart, 0, 0]
+    return window_of(a, b, bias, a_antenna, b_antenna, step_s)
 
 
 # ---- items -------------------------------------------------------------------------------------

@@ -41,7 +41,7 @@ class IncrementalClique:
 
     @property
     def adjacency(self) -> list[int]:
-        """LiftedNeighbours of every vertex (bits)."""
+        """Neighbours of every vertex (bits)."""
         return [int.from_bytes(row.tobytes(), "little") for row in self._rows[: self._count]]
 
     def add(self, neighbours: int) -> None:

@@ -37,7 +37,7 @@ def twists(later: Array, earlier: Array) -> tuple[Array, Array, Array]:
 
 
 def carried_covariance(pose: Array, covariance: Array) -> Array:
-    """(6, m) covariances of twists, carried_covariance by the adjoint of poses (3, m) or (3, 1)."""
+    """(6, m) covariances of twists, carried by the adjoint of poses (3, m) or (3, 1)."""
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     wx, wy = pose[1], -pose[0]
     xx, xy, xt, yy, yt, tt = covariance

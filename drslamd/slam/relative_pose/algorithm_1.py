@@ -11,7 +11,7 @@ from drslamd.slam.relative_pose.window import Window
 from drslamd.slam.se2 import Array
 
 FEWEST = 4
-"""RangeFactors; three unknowns and one to contradict them."""
+"""Ranges; three unknowns and one to contradict them."""
 PRIOR = 1e-4
 """Information, 1/m^2 and 1/rad^2, added to what a window says: no verdict keeps windows back that
 say nothing, and a covariance of 100 m can still be sent."""

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
-from typing import Any
 
 import pytest
-from slam_scenes import NOISE, config
+from slam_scenes import config
 
 from drslamd.config import RelativePoseSection
 from drslamd.conventions import Segment
-from drslamd.sensors.samples import Motion
 from drslamd.slam.calibration.calibration_store import CalibrationStore
 from drslamd.slam.calibration.sensor_calibration import (
     CHANGED_BIAS_M,
-    CHANGED_SCALE,
-    MOST_BIAS_M,
-    MOST_SCALE_ERROR,
     NOTHING,
     SensorCalibration,
-    is_sound,
 )
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
 from drslamd.slam.settings import closure_method
@@ -48,62 +41,6 @@ def test_only_a_solution_that_came_to_an_end_is_kept(converged: bool) -> None:
     memory = CalibrationStore(SensorCalibration(), True)
     memory.update(replace(estimate(scale=Learned(0.15, 0.005)), converged=converged), 5, [2])
     assert (memory.latest.scale.value == pytest.approx(0.15)) is converged
-
-
-def test_what_is_written_is_read_back() -> None:
-    for constants in (KEPT, SensorCalibration()):
-        state = json.loads(json.dumps(constants.state()))
-        assert is_sound(state)
-        assert SensorCalibration.of_state(state) == constants
-
-
-@pytest.mark.parametrize(
-    "damage",
-    [
-        [],
-        {"scale": 0.1},
-        {"scale": [0.1]},
-        {"scale": [0.1, 0.01, 0.0]},
-        {"scale": [0.1, "0.01"]},
-        {"scale": [True, 0.01]},
-        {"scale": [float("nan"), 0.01]},
-        {"scale": [0.1, float("nan")]},
-        {"scale": [0.1, float("inf")]},
-        {"scale": [0.1, 0.0]},
-        {"scale": [10**400, 0.01]},
-        {"scale": [1.01 * MOST_SCALE_ERROR, 0.01]},
-        {"yaw_rad_per_m": [1.0, 0.01]},
-        {"bias_m": [[0.1, 0.01]]},
-        {"bias_m": {"two": [0.1, 0.01]}},
-        {"bias_m": {"-2": [0.1, 0.01]}},
-        {"bias_m": {"255": [0.1, 0.01]}},
-        {"bias_m": {"2": [-1.01 * MOST_BIAS_M, 0.01]}},
-        {"bias_m": {str(n).zfill(k): [0.1, 0.01] for n in range(200) for k in (1, 4)}},
-    ],
-)
-def test_what_nobody_can_have_learned_is_refused(damage: Any) -> None:
-    assert not is_sound(damage)
-
-
-def test_values_at_their_bounds_are_believed() -> None:
-    assert is_sound({"scale": [-MOST_SCALE_ERROR, 0.01], "bias_m": {"254": [MOST_BIAS_M, 0.01]}})
-    assert is_sound({"bias_m": {str(n): [0, 1] for n in range(254)}})
-
-
-def test_known_errors_of_the_wheels_are_taken_out() -> None:
-    back = KEPT.corrected(Motion(7, -2.0, 0.1))
-    assert back.distance_m == pytest.approx(-2.0 * 0.85)
-    assert back.turn_rad == pytest.approx(0.1 + 0.002 * 2.0)
-    assert (back.utime, back.gap) == (7, False)
-
-
-def test_sigmas_come_back_wider_than_they_were_kept_and_narrower_than_configured() -> None:
-    assert KEPT.narrowed(NOISE).scale < NOISE.scale
-    wide = replace(NOISE, scale=0.5)
-    assert CHANGED_SCALE < KEPT.narrowed(wide).scale < 1.1 * CHANGED_SCALE
-    assert CHANGED_BIAS_M < KEPT.bias_sigma(2, 5.0) < 1.1 * CHANGED_BIAS_M
-    assert KEPT.bias_sigma(3, 0.3) == pytest.approx(0.3)
-    assert SensorCalibration().narrowed(NOISE) == NOISE
 
 
 def test_what_is_left_adds_to_what_was_taken_out() -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from slam_scenes import NOISE, Array, same_pose, wander, window_of
+from slam_scenes import NOISE, Array, curved_window, same_pose
 
 from drslamd.conventions import Segment
 from drslamd.slam.calibration.window_calibration import (
@@ -28,9 +28,7 @@ KNOWN = PairCalibration(Learned(-0.4, 0.01), Learned(0.15, 0.001), Learned(-0.05
 
 def uncalibrated(seed: int) -> tuple[Window, Array]:
     """A window whose ranges are 0.4 m short, whose odometries count 1 / 0.85 and 1 / 1.05."""
-    rng = np.random.default_rng(seed)
-    a, b = wander(rng, 60, 0.25), wander(rng, 60, 0.25) + [7.0, 0, 0]
-    window, true = window_of(a, b)
+    window, true = curved_window(np.random.default_rng(seed), 7.0)
     return replace(
         window,
         ranges=window.ranges - 0.4,

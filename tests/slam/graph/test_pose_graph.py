@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 import random
 from dataclasses import replace
 
@@ -12,13 +11,8 @@ import pytest
 from slam_scenes import NOISE, closure, keyframes, model_of, range_item, small_team, wander
 
 from drslamd.conventions import Chain, Segment
-from drslamd.slam.graph import chain_data, pair_data, tables
-from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.graph.pose_graph import PoseGraph
-from drslamd.slam.graph.tables import KeyedRows
-from drslamd.slam.odometry.noise import growth
-from drslamd.slam.robot_model import UNTOLD, RobotModel
 
 A, B, C = Chain(0, 5), Chain(1, 6), Chain(2, 7)
 EVERYBODY = {0, 1, 2}
@@ -165,90 +159,7 @@ def test_an_item_may_name_a_keyframe_that_has_not_come_yet() -> None:
     assert items.keyframes.find(np.array([10.0, 9.0, 11.0]))[1].tolist() == [True, False, False]
 
 
-@pytest.mark.parametrize("count", [29, 30, 31, 75])
-def test_rows_keep_the_last_ones_in_the_order_of_their_keys(count: int) -> None:
-    shuffled = np.random.default_rng(2).permutation(count)
-    for looked in (False, True):
-        rows = KeyedRows(2, 30)
-        for key in shuffled:
-            rows.add([float(key), -float(key)])
-            if looked:
-                assert len(rows.data) <= 30
-        assert rows.data[:, 0].tolist() == list(range(max(0, count - 30), count))
-        assert np.array_equal(rows.data[:, 0], -rows.data[:, 1])
-
-
-def test_rows_that_nobody_looks_at_are_bounded_too() -> None:
-    rows = KeyedRows(2, 100)
-    for key in range(5_000):
-        rows.add([float(key), 0.0])
-        assert len(rows._new) < tables.WAITING
-    assert len(rows.data) == 100
-
-
-def test_a_chain_keeps_the_last_keyframes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chain_data, "MAX_KEYFRAMES", 50)
-    items = ChainData(A)
-    path = wander(np.random.default_rng(3), 80, 0.4)
-    for k in keyframes(range(80), path):
-        items.add(k)
-        assert len(items.keyframes.rows) == min(50, k.n + 1)
-    assert items.keyframes.n.tolist() == list(range(30, 80))
-
-
-def test_a_pair_keeps_the_last_ranges_and_closures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pair_data, "MAX_RANGES", 10)
-    monkeypatch.setattr(pair_data, "MAX_CLOSURES", 10)
-    graph = PoseGraph()
-    for seq in reversed(range(12)):
-        ranges = (range_item(seq, B, seq, 1.0),)
-        graph.insert(A, GraphEntry(seq, None, (), ranges, (closure(seq, 0, B, 0, (0, 0, 0)),)))
-    pair = graph.pairs[0, 1]
-    assert pair.ranges.a_n.tolist() == list(range(2, 12))
-    assert [c.number for c in pair.kept_closures()] == list(range(2, 12))
-
-
 # ---- sums ----
-
-
-def sums_between(items: ChainData, i: int, k: int) -> np.ndarray:
-    at, there = items.keyframes.find(np.array([i, k], dtype=float))
-    assert there.all()
-    return np.asarray(items.sums[at[1]] - items.sums[at[0]])
-
-
-def test_sums_are_those_of_the_whole_chain_however_it_came(monkeypatch: pytest.MonkeyPatch) -> None:
-    path = wander(np.random.default_rng(4), 60, 0.4)
-    frames = keyframes(range(60), path)
-    expected = growth(np.array([[k.x, k.y, k.theta] for k in frames]) * 1e-4)
-    monkeypatch.setattr(chain_data, "MAX_KEYFRAMES", 40)
-    shuffle = random.Random(5)
-    for _ in range(10):
-        order = list(frames)
-        shuffle.shuffle(order)
-        items = ChainData(A)
-        for k in order:
-            items.add(k)
-            if shuffle.random() < 0.5:
-                assert len(items.sums) == len(items.keyframes.rows)
-        assert np.allclose(sums_between(items, 25, 55), expected[55] - expected[25])
-
-
-def test_what_came_late_or_was_dropped_does_not_move_the_sums(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Candidates of module 2 remember them."""
-    monkeypatch.setattr(chain_data, "MAX_KEYFRAMES", 40)
-    frames = keyframes(range(60), wander(np.random.default_rng(6), 60, 0.4))
-    items = ChainData(A)
-    for k in frames[20:45]:
-        items.add(k)
-    remembered = items.sums[items.keyframes.find(np.array([30.0]))[0][0]].copy()
-    for part in (frames[5:20], frames[45:], frames[0:5]):
-        for k in part:
-            items.add(k)
-        now = items.sums[items.keyframes.find(np.array([30.0]))[0][0]]
-        assert np.allclose(now, remembered, atol=1e-9)
 
 
 # ---- segments ----
@@ -262,61 +173,13 @@ def test_rows_of_a_segment_are_found_and_of_one_that_is_not_there_are_none() -> 
     assert len(graph.segment(Segment(*A, 7))) == 0
 
 
-def test_a_segment_never_comes_back_whatever_a_robot_says() -> None:
-    items = ChainData(A)
-    for n, segment in enumerate([0, 3, 1, 1, 5, 0]):
-        items.add(Keyframe(n, segment, 0, 0, 0))
-    assert items.keyframes.rows[:, 1].tolist() == [0, 3, 3, 3, 5, 5]
-    assert [items.keyframes.of_segment(s) for s in (0, 3, 5)] == [
-        slice(0, 1),
-        slice(1, 4),
-        slice(4, 6),
-    ]
-
-
 # ---- nonsense is not taken in ----
-
-
-@pytest.mark.parametrize(("metres", "taken"), [(9_999.0, True), (10_001.0, False), (1e9, False)])
-def test_no_range_is_farther_than_any_radio_reaches(metres: float, taken: bool) -> None:
-    graph = graph_of((A, GraphEntry(0, ranges=(range_item(0, B, 0, metres),))))
-    assert (len(graph.pairs[0, 1].ranges) == 1) is taken
-
-
-@pytest.mark.parametrize(
-    ("sigma", "taken"), [(2e-5, False), (1e-3, True), (290, True), (700, False)]
-)
-def test_closures_are_as_good_as_can_be_measured(sigma: float, taken: bool) -> None:
-    """(The angle has half the sigma.)"""
-    graph = graph_of((A, GraphEntry(0, closures=(closure(0, 0, B, 0, (1, 2, 3), sigma),))))
-    assert (len(graph.pairs[0, 1].kept_closures()) == 1) is taken
-
-
-@pytest.mark.parametrize("x", [1e9, -1e9, math.nan, math.inf])
-def test_no_closure_leads_out_of_the_world(x: float) -> None:
-    graph = graph_of((A, GraphEntry(0, closures=(closure(0, 0, B, 0, (1, x, 3)),))))
-    assert graph.pairs[0, 1].kept_closures() == []
 
 
 def test_nobody_is_a_pair_with_himself() -> None:
     both = GraphEntry(0, None, (), (range_item(0, A, 1, 1.0),), (closure(0, 0, A, 1, (1, 0, 0)),))
     graph = graph_of((A, both))
     assert graph.pairs == {}
-
-
-@pytest.mark.parametrize(
-    "traits",
-    [
-        model_of(replace(NOISE, scale=9.0)),
-        model_of(replace(NOISE, translation_per_sqrt_m=0.0)),
-        model_of(NOISE, (9.0, 0.0)),
-        model_of(NOISE, (0.0, math.nan)),
-    ],
-)
-def test_traits_that_no_configuration_allows_are_not_believed(traits: RobotModel) -> None:
-    graph = graph_of((A, GraphEntry(0, traits)))
-    assert graph.chains[0].model == UNTOLD
-    assert graph.chains[0].model.antenna.tolist() == [0.0, 0.0]
 
 
 def test_the_small_team_of_the_other_tests_is_whole() -> None:

@@ -19,8 +19,6 @@ from slam_scenes import (
 )
 
 from drslamd.conventions import Chain, Segment
-from drslamd.slam.graph.estimate import Trajectory
-from drslamd.slam.graph.history import History
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.tables import RangeTable
@@ -114,6 +112,26 @@ def test_what_was_measured_at_a_keyframe_that_goes_is_true_at_the_one_that_stays
         assert same_pose(np.array(item.a_T_b), pose, 1e-3)
 
 
+@pytest.mark.parametrize("owner_turns", [True, False])
+def test_the_heading_of_a_carried_closure_stays_within_half_a_turn(owner_turns: bool) -> None:
+    """One robot circles, so now and then a closure is carried over the half turn."""
+    seconds = 460
+    circle = [np.array([math.cos(k / 5), math.sin(k / 5), k / 5 - 50]) for k in range(seconds)]
+    still = [np.array([4.0, 1.0, 0.4])] * seconds
+    one, other = (circle, still) if owner_turns else (still, circle)
+    n = range(0, 10 * seconds, 10)
+    graph = PoseGraph()
+    graph.insert(B, GraphEntry(0, keyframes=keyframes(n, other)))
+    seen = [closure(k, 10 * k, B, 10 * k, product(inverted(one[k]), other[k])) for k in range(140)]
+    graph.insert(A, GraphEntry(0, None, keyframes(n, one), (), tuple(seen)))
+    Thinning(graph).after((A if owner_turns else B).robot)
+    kept = graph.pairs[0, 1].kept_closures()
+    assert sum({item.a_n, item.b_n} != {10 * item.number} for item in kept) > 80
+    for item in kept:
+        a, b = one[item.a_n // 10], other[item.b_n // 10]
+        assert item.a_T_b == pytest.approx(product(inverted(a), b), abs=1e-3)
+
+
 def test_what_was_carried_far_is_less_certain_and_what_is_recent_is_not() -> None:
     graph, _, _ = two_robots(900)
     table = graph.pairs[0, 1].ranges
@@ -151,27 +169,3 @@ def test_the_first_keyframe_of_every_piece_stays_because_frames_begin_there() ->
         thinning.after(A.robot)
     for segment in range(10):
         assert graph.segment(Segment(0, 1, segment)).n[0] == 1000 * segment
-
-
-# ---- where we were -----------------------------------------------------------------------------
-
-
-def test_a_keyframe_that_was_thinned_out_moves_with_the_one_before_it() -> None:
-    path = wander(np.random.default_rng(3), 40)
-    history = History()
-    n = np.arange(0, 400, 10)
-    history.update(Trajectory(A, n, path))
-    turn = np.array([3.0, -1.0, 0.7])
-    stay = np.r_[0, 20, np.arange(30, 40)]
-    moved = np.array([product(turn, path[k]) for k in stay])
-    latest = history.update(Trajectory(A, n[stay], moved))
-    assert np.array_equal(latest.n, n)
-    for pose, was in zip(latest.poses, path, strict=True):
-        assert same_pose(pose, product(turn, was), 1e-9)
-
-
-def test_another_start_has_another_history() -> None:
-    history = History()
-    history.update(Trajectory(A, np.array([0, 10]), np.zeros((2, 3))))
-    later = Trajectory(Chain(0, 2), np.array([5]), np.ones((1, 3)))
-    assert history.update(later) is later

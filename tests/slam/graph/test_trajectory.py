@@ -1,4 +1,4 @@
-"""The 10 Hz track, deform_track to go through the solved keyframes."""
+"""The 10 Hz track, bent to go through the solved keyframes."""
 
 from __future__ import annotations
 

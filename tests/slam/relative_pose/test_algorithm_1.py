@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from slam_scenes import Array, matrix, same_pose, wander, window_of
+from slam_scenes import Array, curved_window, matrix, same_pose, wander, window_of
 
 from drslamd.slam.relative_pose.algorithm_1 import coarse_search, solve
 from drslamd.slam.relative_pose.estimate import Verdict
@@ -16,7 +16,7 @@ from drslamd.slam.relative_pose.window import Window
 
 def noisy_window(seed: int, tau: int, sigma: float = 0.1) -> Window:
     rng = np.random.default_rng(seed)
-    window, _ = window_of(wander(rng, tau, 0.05), wander(rng, tau, 0.05) + [4, 0, 0], step_s=0.1)
+    window, _ = curved_window(rng, 4.0, tau, 0.05, step_s=0.1)
     ranges = window.ranges + rng.normal(0, sigma, tau)
     return Window(
         window.t, ranges, window.a_poses, window.b_poses, window.a_antenna, window.b_antenna

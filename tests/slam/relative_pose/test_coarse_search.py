@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from slam_scenes import Array, matrix, wander, window_of
+from slam_scenes import Array, curved_window, matrix
 
 from drslamd.slam.relative_pose import coarse_search
 from drslamd.slam.relative_pose.window import Window
@@ -20,8 +20,7 @@ def errors_at(window: Window, rho: float, phi: float, theta: float) -> Array:
 
 
 def curved(rng: np.random.Generator, sigma: float = 0.1, count: int = 100) -> Window:
-    a, b = wander(rng, count), wander(rng, count)
-    window, _ = window_of(a, b)
+    window, _ = curved_window(rng, 0.0, count, 0.05)
     noisy = np.abs(window.ranges + rng.normal(0, sigma, count))
     return Window(
         window.t, noisy, window.a_poses, window.b_poses, window.a_antenna, window.b_antenna

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigvalsh
 from scipy.optimize import least_squares
-from slam_scenes import NOISE, Array, matrix, same_pose, wander, window_of
+from slam_scenes import NOISE, Array, curved_window, matrix, same_pose
 
 from drslamd.slam.range_model import RangeNoise
 from drslamd.slam.relative_pose.gls import middle, refine
@@ -21,7 +21,7 @@ RANGES = RangeNoise(0.1, 0.3)
 
 def noisy(seed: int) -> tuple[Window, Array]:
     rng = np.random.default_rng(seed)
-    window, true = window_of(wander(rng, 60, 0.25), wander(rng, 60, 0.25) + [8.0, 0, 0])
+    window, true = curved_window(rng, 8.0)
     return replace(window, ranges=window.ranges + rng.normal(0, 0.04, 60) + 0.2), true
 
 

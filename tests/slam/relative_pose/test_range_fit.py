@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.linalg import eigvalsh
-from slam_scenes import Array, matrix, same_pose, wander, window_of
+from slam_scenes import Array, curved_window, matrix, same_pose
 
-from drslamd.slam.range_model import RangeNoise
 from drslamd.slam.relative_pose import range_fit
-from drslamd.slam.relative_pose.descent import ITERATIONS, Descent
 from drslamd.slam.relative_pose.range_fit import Minima, RangeFit, stepped
-
-NOISE = RangeNoise(0.1, 0.3)
 
 
 def scene(seed: int, apart: float = 6.0) -> tuple[RangeFit, Array, Array, Array]:
     """A window's fit, its points a, b, and its true pose."""
     rng = np.random.default_rng(seed)
-    window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [apart, 0, 0])
+    window, true = curved_window(rng, apart, 50, 0.2)
     a, b = window.a_points, window.b_points
     return RangeFit(a, b, window.ranges), a, b, true
 
@@ -110,19 +104,6 @@ def test_a_long_valley_is_as_wide_as_its_arc_is_deep(
     assert np.array_equal(claimed[2], straight[2])
 
 
-def test_a_valley_is_followed_around_its_arc() -> None:
-    """A standing peer says nothing of its heading: any is as good, and the way there is short."""
-    rng = np.random.default_rng(4)
-    window, true = window_of(wander(rng, 50, 0.2), np.tile([5.0, 1.0, 0.3], (50, 1)))
-    fit = RangeFit(window.a_points, window.b_points, window.ranges)
-    seeds = np.array([true + [0.5, -0.4, 0.0], true + [0.5, -0.4, 2.0]])
-    descent = Descent(fit, fit.centred(seeds), NOISE)
-    descent.run(ITERATIONS)
-    refined = fit.poses(descent.minima().centred)
-    assert len(refined) == 2
-    assert np.hypot(*(refined[:, :2] - true[:2]).T).max() < 0.05
-
-
 @pytest.mark.parametrize("part", [0, 1, 2])
 @pytest.mark.parametrize(
     ("times", "chi2", "vague"),
@@ -160,7 +141,7 @@ def test_a_window_that_fits_nothing_is_not_called_vague(share: float, vague: boo
 
 def test_the_other_side_is_as_far_away_where_both_were_nearest() -> None:
     rng = np.random.default_rng(11)
-    window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [1.0, 0, 0])
+    window, true = curved_window(rng, 1.0, 50, 0.2)
     fit = RangeFit(window.a_points, window.b_points, window.ranges)
     other = fit.poses(fit.other_side(fit.centred(true[None])))[0]
     n = int(np.argmin(window.ranges))
@@ -170,28 +151,3 @@ def test_the_other_side_is_as_far_away_where_both_were_nearest() -> None:
     )
     assert np.allclose(after, -before)
     assert other[2] == pytest.approx(true[2])
-
-
-def test_a_descent_that_is_settled_does_nothing_more() -> None:
-    rng = np.random.default_rng(6)
-    window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [6.0, 0, 0])
-    fit = RangeFit(window.a_points, window.b_points, window.ranges)
-    once, twice = (Descent(fit, fit.centred(true[None]), NOISE) for _ in range(2))
-    once.run(ITERATIONS)
-    twice.run(ITERATIONS)
-    twice.run(ITERATIONS)
-    assert np.array_equal(once.minima().centred, twice.minima().centred)
-
-
-def test_ranges_that_are_known_to_scatter_less_leave_a_window_less_vague() -> None:
-    rng = np.random.default_rng(6)
-    window, true = window_of(wander(rng, 50, 0.2), wander(rng, 50, 0.2) + [6.0, 0, 0])
-    fit = RangeFit(window.a_points, window.b_points, window.ranges)
-    plain, quiet, loud = (
-        Descent(fit, fit.centred(true[None]), replace(NOISE, scatter=scatter)).minima()
-        for scatter in (1.0, 0.5, 2.0)
-    )
-    assert np.allclose(quiet.covariance, plain.covariance / 4)
-    assert np.array_equal(quiet.centred, plain.centred)
-    # the look must not be gloomier than the whole truth: that is for the refine to say
-    assert np.array_equal(loud.covariance, plain.covariance)

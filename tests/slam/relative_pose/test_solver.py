@@ -8,7 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import least_squares, minimize_scalar
-from slam_scenes import EXACT, NOISE, Array, matrix, same_pose, straight, wander, window_of
+from slam_scenes import (
+    EXACT,
+    NOISE,
+    Array,
+    curved_window,
+    matrix,
+    same_pose,
+    straight,
+    wander,
+    window_of,
+)
 
 from drslamd.slam import se2
 from drslamd.slam.range_model import LINKTRACK, RangeNoise
@@ -25,9 +35,9 @@ DELTA = 0.1
 
 
 def curved(seed: int, apart: float = 9.0, **antennas: tuple[float, float]) -> tuple[Window, Array]:
+    one, other = antennas.get("a", (0.0, 0.0)), antennas.get("b", (0.0, 0.0))
     rng = np.random.default_rng(seed)
-    a, b = wander(rng, 60, 0.25), wander(rng, 60, 0.25) + [apart, 0, 0]
-    return window_of(a, b, a_antenna=antennas.get("a", (0, 0)), b_antenna=antennas.get("b", (0, 0)))
+    return curved_window(rng, apart, a_antenna=one, b_antenna=other)
 
 
 def with_ranges(window: Window, ranges: Array) -> Window:

@@ -1,8 +1,9 @@
 """Modules 2 and 3 on relative poses that others estimated: consistency, then the paper's DPGO.
 
 Each pair's edges go through pairwise consistency maximisation in the order of time; what it keeps
-is the graph of a team whose robots optimise their own blocks in turns (`optimizer = "rbcd"`), with
-perfect radio, until nothing moves. (Or every robot solves all of it: `optimizer = "closures"`.)
+is the graph of a team whose robots optimise their own blocks in turns (`[optimizer]` with
+`algorithm = "rbcd"`), with perfect radio, until nothing moves. (Or every robot solves all of it:
+`algorithm = "closures"`.)
 """
 
 from __future__ import annotations

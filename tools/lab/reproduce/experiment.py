@@ -41,7 +41,7 @@ PRINTED_ODOMETRY = (0.85, 8.99)
 
 
 @dataclass(frozen=True)
-class PairData:
+class PairMeasurements:
     """What was measured between two robots, on the 10 Hz grid.
 
     Attributes:
@@ -67,7 +67,7 @@ class Trial:
 
     seed: int
     recording: Recording
-    pairs: dict[tuple[int, int], PairData]
+    pairs: dict[tuple[int, int], PairMeasurements]
     odometry: dict[int, Array]
     truth: dict[int, Array]
 
@@ -124,7 +124,7 @@ def trial(seed: int, scene: world.Scene = SCENE) -> Trial:
         # the grid's bins lie about its times, so that the latest range belongs to the latest pose
         t, ranges, _ = binned(rows[:, 0] + GRID_S / 2, rows[:, 3], GRID_S)
         t = t - GRID_S / 2
-        pairs[a, b] = PairData(
+        pairs[a, b] = PairMeasurements(
             a, b, t, ranges, *(metrics.at_times(trails[r].t, trails[r].odometry, t) for r in (a, b))
         )
     at_pose_times = {

@@ -1,4 +1,4 @@
-"""ClosureOptimizer that contradict the rest of the graph, found by graduated non-convexity.
+"""Closures that contradict the rest of the graph, found by graduated non-convexity.
 
 Module 2 looks at one pair at a time: a set of closures that agrees with itself is kept, also when
 it is wrong as a whole and nobody of that pair speaks against it. Where other pairs close the loop,

@@ -1,4 +1,4 @@
-"""A group's graph build_problem as a problem, solved, and sorted by robot again."""
+"""A group's graph, built as a problem, solved, and sorted by robot again."""
 
 from __future__ import annotations
 

@@ -24,7 +24,6 @@ from slam_scenes import Array, matrix, same_pose, wander
 from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.banded.banded_solver import solve
 from drslamd.slam.optimizer.problem import (
-    BetweenFactors,
     Calibration,
     OdometryFactors,
     Priors,
@@ -335,23 +334,6 @@ def test_numbers_that_are_none_are_no_progress() -> None:
     assert not solution.converged
     assert np.array_equal(solution.poses[:, :2], problem.initial[:, :2])
     assert solution.covariances[5][0, 0] == banded_solver.UNKNOWN
-
-
-def test_covariances_that_rounding_has_broken_are_inverted_all_the_same() -> None:
-    """One direction a billion times better known than the others, and correlated with them."""
-    lever = np.array([[1.0, 0, -1e4], [0, 1, 1e4], [0, 0, 1]])
-    bad = lever @ np.diag([1e-8, 1e-8, 1.0]) @ lever.T
-    edges = BetweenFactors(np.array([0]), np.array([1]), np.zeros((1, 3)), bad[None])
-    information = edges.information[0]
-    assert np.array_equal(information, information.T)
-    scale = np.sqrt(np.diag(bad))
-    assert np.linalg.eigvalsh(information * np.outer(scale, scale))[0] > 0
-    np.linalg.cholesky(information * np.outer(scale, scale))
-
-
-def test_ordinary_covariances_are_inverted_as_they_are() -> None:
-    edges = pose_edges(np.random.default_rng(18), np.zeros((2, 3)), [(0, 1)], (0.1, 0.05, 0.02))
-    assert np.allclose(edges.information[0] @ edges.covariance[0], np.eye(3), atol=1e-7)
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""The normal equations against dense residuals and finite differences, and where unknowns stand."""
+"""The normal equations against dense residuals and finite differences."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import pytest
 from slam_problems import (
     dense,
     jacobian,
-    no_ranges,
     packed,
     pose_edges,
     range_weights,
@@ -18,10 +17,9 @@ from slam_problems import (
 )
 from slam_scenes import Array
 
-from drslamd.slam.optimizer.banded.layout import BandLayout, border_poses
+from drslamd.slam.optimizer.banded.layout import BandLayout
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.problem import Calibration, Problem
-from drslamd.slam.optimizer.vertex_cover import vertex_cover
 
 
 def somewhere(problem: Problem, seed: int) -> tuple[Array, Calibration]:
@@ -73,66 +71,3 @@ def test_it_is_the_same_with_poses_at_the_border() -> None:
     scale = np.sqrt(np.diag(hessian))
     system = equations.at(poses, calibration)
     assert np.abs((dense(system, layout) - hessian) / np.outer(scale, scale)).max() < 1e-6
-
-
-def test_every_unknown_stands_somewhere_and_only_once() -> None:
-    problem, _ = team_problem(6, robots=3, count=30)
-    layout = BandLayout.of(problem)
-    parts = [layout.poses.ravel(), layout.bias, layout.scale, layout.yaw, layout.near_bias]
-    numbers = np.sort(np.concatenate(parts))
-    assert np.array_equal(numbers, np.arange(layout.band + layout.border))
-    # links of three robots reach three poses: 3 * 3 + 2 below the diagonal
-    assert layout.width == 3 * 3 + 3
-    step = np.arange(len(numbers), dtype=float)
-    assert layout.calibration(step).scale.tolist() == layout.scale.tolist()
-
-
-def test_a_group_of_one_pose_has_a_layout() -> None:
-    problem, _ = team_problem(7, robots=1, count=1, closures=0)
-    problem = replace(problem, ranges=no_ranges())
-    layout = BandLayout.of(problem)
-    assert (layout.band, layout.width) == (3, 3)
-
-
-@pytest.mark.parametrize(("reach", "apart"), [(20, 0), (21, 1)])
-def test_poses_are_taken_out_only_beyond_the_reach_that_needs_no_attention(
-    reach: int, apart: int
-) -> None:
-    i = np.array([0, 1, 2, 50])
-    assert len(border_poses(i, i + [1, 1, 1, reach], narrow=20)) == apart
-
-
-def test_the_pose_of_one_who_stands_is_enough_for_all_its_edges() -> None:
-    i, j = np.full(500, 7), np.arange(500)
-    assert border_poses(i, j, narrow=20).tolist() == [7]
-
-
-def test_what_is_left_in_the_band_is_narrow_and_few_are_at_the_border() -> None:
-    rng = np.random.default_rng(8)
-    i = np.arange(1000)
-    j = np.minimum(i + rng.integers(1, 6, 1000), 999)
-    hubs = rng.choice(1000, 12, replace=False)
-    i = np.concatenate([i, np.repeat(hubs, 40)])
-    j = np.concatenate([j, rng.integers(0, 1000, 480)])
-    apart = border_poses(i, j, narrow=20)
-    assert set(apart.tolist()) <= set(hubs.tolist())
-    left = ~np.isin(i, apart) & ~np.isin(j, apart)
-    assert np.abs(i - j)[left].max() <= 20
-
-
-def test_edges_all_over_the_place_widen_the_band_instead() -> None:
-    rng = np.random.default_rng(9)
-    i, j = rng.integers(0, 300, (2, 2000))
-    apart = border_poses(i, j, narrow=20)
-    left = ~np.isin(i, apart) & ~np.isin(j, apart)
-    reach = int(np.abs(i - j)[left].max(initial=0))
-    assert len(apart) <= 160
-    assert reach <= 320
-
-
-def test_the_busiest_come_first_and_no_more_than_asked_for() -> None:
-    i, j = np.array([1, 1, 1, 2, 2, 3]), np.array([4, 5, 6, 4, 5, 9])
-    assert vertex_cover(i, j, 1).tolist() == [1]
-    assert vertex_cover(i, j, 2).tolist() == [1, 2]
-    assert len(vertex_cover(i, j, 10)) == 3
-    assert vertex_cover(i[:0], j[:0], 5).tolist() == []

@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from slam_scenes import (
+    CLOCKS,
     NOISE,
     Array,
     closure,
     driven,
+    group_of,
     inverted,
     keyframes,
     model_of,
@@ -19,7 +21,7 @@ from slam_scenes import (
     wander,
 )
 
-from drslamd.conventions import GRID_US, Chain, Segment
+from drslamd.conventions import Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import GraphEntry
@@ -28,7 +30,6 @@ from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer.closures.closure_optimizer import ClosureOptimizer
 from drslamd.slam.optimizer.factors import chain_links
 
-CLOCKS = {0: 0, 1: 1000 * GRID_US, 2: 2000 * GRID_US}
 COUNT = 40
 
 
@@ -52,9 +53,7 @@ class Team:
 
     def solved(self, previous: TeamEstimate | None = None) -> TeamEstimate:
         graph: PoseGraph = self.team.graph
-        members = {Segment(*items.chain, 0) for items in graph.chains.values()}
-        group = Group(members, min(members), CLOCKS)
-        job = ClosureOptimizer().job(graph, group, previous, {})
+        job = ClosureOptimizer().job(graph, group_of(graph, CLOCKS), previous, {})
         assert job is not None
         return job()
 

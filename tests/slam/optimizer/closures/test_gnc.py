@@ -1,4 +1,4 @@
-"""ClosureOptimizer that contradict everybody else: their weights, and what is left without them."""
+"""Closures that contradict everybody else: their weights, and what is left without them."""
 
 from __future__ import annotations
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from slam_scenes import NOISE, Array, config, wander
+from slam_scenes import NOISE, Array, wander
 
-from drslamd.slam import se2, settings
+from drslamd.slam import se2
 from drslamd.slam.odometry.noise import OdometryNoise, covariance_between, growth, link_covariance
 
 QUIET = OdometryNoise(1e-12, 1e-12, 1e-12, 1e-12)
@@ -128,21 +128,6 @@ def test_a_link_far_from_the_origin_keeps_its_digits() -> None:
     one, other = (link_covariance(NOISE, se2.between(p[:1], p[1:])) for p in (far, near))
     assert np.allclose(one, other, rtol=1e-6)
     assert np.linalg.eigvalsh(one[0])[0] > 0
-
-
-def test_the_configuration_speaks_degrees_and_the_code_radians() -> None:
-    text = (
-        "[odometry]\nscale_sigma = 0.02\nyaw_sigma_deg_per_m = 1.8\n"
-        "random_translation_per_sqrt_m = 0.03\nrandom_yaw_deg_per_sqrt_m = 3.6\n"
-    )
-    noise = settings.odometry_noise(config(extra=text).odometry)
-    expected = (0.02, math.pi / 100, 0.03, math.pi / 50)
-    assert (
-        noise.scale,
-        noise.yaw_rad_per_m,
-        noise.translation_per_sqrt_m,
-        noise.yaw_rad_per_sqrt_m,
-    ) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(

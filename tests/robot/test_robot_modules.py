@@ -1,0 +1,211 @@
+"""The robot by itself: its three modules, their answers, and its log."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from pair_scenes import BESIDE, asked_at, estimate_of
+from robot_scenes import RobotScene, sends, solves
+
+from drslamd.conventions import GRID_US, Chain, Segment
+from drslamd.events import Effect, JobDone, Solve
+from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, Job
+from drslamd.slam.front_end import WindowJob
+from drslamd.slam.graph.estimate import Learned, Lifted, TeamEstimate, Trajectory
+from drslamd.slam.graph.measurements import GraphEntry, Keyframe
+from drslamd.slam.graph.public_poses import PublicPoses
+
+
+def answered(scene: RobotScene, job: Job, result: object) -> list[Effect]:
+    solve = scene.robot.jobs.begin(job, lambda: None)
+    return scene.robot.handle(JobDone(scene.utime, solve.job_id, result, 1000))
+
+
+def test_an_answer_of_module_1_goes_to_its_pair() -> None:
+    scene = RobotScene()
+    one, other = scene.own_pair(1), scene.own_pair(2)
+    assert answered(scene, Job(RELATIVE_POSE, other, asked_at(10)), estimate_of(BESIDE)) == []
+    assert (one.closures_seen, other.closures_seen) == (0, 1)
+    assert other.history[0].utime == 10 * GRID_US
+
+
+def test_an_answer_of_module_2_goes_to_its_pair() -> None:
+    scene = RobotScene()
+    one, other = scene.own_pair(1), scene.own_pair(2)
+    for robot in (0, 2):
+        frames = (Keyframe(10, 0, 0, 0, 0),)
+        scene.robot.back.insert(Chain(robot, 1), GraphEntry(0, keyframes=frames))
+    other.on_estimate(asked_at(10), estimate_of(BESIDE))
+    (solve,) = solves(scene.tick(), CONSISTENCY)
+    assert scene.robot.handle(JobDone(scene.utime, solve.job_id, solve.run(), 1000)) == []
+    assert [len(pair.kept) for pair in (one, other)] == [0, 1]
+
+
+def test_an_answer_of_module_3_is_our_estimate_and_our_pose_goes_out() -> None:
+    scene = RobotScene()
+    scene.drive(1)
+    n = scene.robot.front.reckoning.track.end - 1
+    own = Trajectory(scene.robot.own, np.array([n]), np.zeros((1, 3)))
+    estimate = TeamEstimate(
+        Segment(0, 1, 0), {0: own}, {0: np.eye(3)}, scale={0: Learned(0.03, 0.01)}
+    )
+    effects = answered(scene, Job(OPTIMIZER), estimate)
+    assert scene.robot.back.estimate is estimate
+    assert scene.robot.calibration.latest.scale == pytest.approx(Learned(0.03, 0.01))
+    assert len(sends(effects, "POSE")) == len(effects) == 1
+
+
+def test_public_poses_go_out_where_there_is_a_relaxation() -> None:
+    scene = RobotScene()
+    rows = np.ones((1, 4), dtype=complex)
+    lifted = Lifted(np.array([10]), rows, rows[0], np.array([10]))
+    estimate = TeamEstimate(Segment(0, 1, 0), {}, lifted=lifted)
+    assert len(sends(answered(scene, Job(OPTIMIZER), estimate), "PUBLIC")) == 1
+
+
+# our log
+
+
+def connected(scene: RobotScene, peer: int = 4) -> None:
+    """A peer in range, and some odometry of ours."""
+    scene.meet(peer)
+    scene.drive(1)
+    scene.range_to(peer)
+
+
+def test_our_log_grows_by_what_we_drove_and_is_sent_to_who_is_in_range() -> None:
+    scene = RobotScene()
+    connected(scene)
+    assert len(sends(scene.tick(), "GRAPH")) == 1
+    assert len(scene.robot.back.graph.chains[0].keyframes) == 1
+    # who stands still adds nothing
+    assert sends(scene.tick(1), "GRAPH") == []
+
+
+def test_with_nobody_in_range_our_log_grows_in_silence() -> None:
+    scene = RobotScene()
+    scene.drive(1)
+    effects = scene.tick()
+    assert sends(effects, "GRAPH") == []
+    assert len(scene.robot.back.graph.chains[0].keyframes) == 1
+    (state,) = scene.robot.team.logs.next_states()
+    assert state.newest == 1
+
+
+@pytest.mark.parametrize("ranges_to_us", [True, False])
+@pytest.mark.parametrize("we_range", [True, False])
+def test_a_living_peer_is_in_range_when_either_side_measures(
+    ranges_to_us: bool, we_range: bool
+) -> None:
+    scene = RobotScene()
+    scene.meet(4, ranges_to_us=ranges_to_us)
+    if we_range:
+        scene.range_to(4)
+    near = scene.robot.neighbours(scene.utime)
+    assert [peer.chain for peer in near] == ([Chain(4, 1)] if ranges_to_us or we_range else [])
+    scene.later(10)
+    assert scene.robot.neighbours(scene.utime) == []
+
+
+def test_log_entries_are_repeated_to_whom_we_share_a_graph_with_and_not_otherwise() -> None:
+    """Peer 4 lacks what we said before it came."""
+    for is_near in (True, False):
+        scene = RobotScene()
+        scene.drive(1)
+        scene.tick()
+        scene.later(5)
+        scene.meet(4)
+        if is_near:
+            scene.range_to(4)
+        repeated = sends(scene.tick(0.2), "GRAPH")
+        assert bool(repeated) is is_near
+
+
+# the modules, as timers call them
+
+
+def with_windows(monkeypatch: pytest.MonkeyPatch, *peers: int) -> RobotScene:
+    """A robot that finds a window of each pair whenever it looks."""
+    scene = RobotScene()
+    pairs = [scene.own_pair(peer) for peer in peers]
+
+    def found(*_: object) -> list[WindowJob]:
+        return [WindowJob(pair, asked_at(10), lambda: estimate_of(BESIDE)) for pair in pairs]
+
+    monkeypatch.setattr(scene.robot.front, "module1", found)
+    return scene
+
+
+def ended(scene: RobotScene, solve: Solve, took_us: int) -> None:
+    scene.robot.handle(JobDone(scene.utime, solve.job_id, solve.run(), took_us))
+
+
+def test_a_pair_whose_window_is_being_computed_gets_no_second_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = with_windows(monkeypatch, 1, 2)
+    first, second = solves(scene.tick(), RELATIVE_POSE)
+    assert solves(scene.tick(1), RELATIVE_POSE) == []
+    ended(scene, second, 1_000)
+    (again,) = solves(scene.tick(1), RELATIVE_POSE)
+    ended(scene, first, 1_000)
+    ended(scene, again, 1_000)
+    seen = {peer: pair.closures_seen for peer, pair in scene.robot.front.pairs.items()}
+    assert seen == {1: 1, 2: 2}
+
+
+@pytest.mark.parametrize(("took_us", "goes_on"), [(240_000, True), (260_000, False)])
+def test_module_1_rests_before_it_looks_at_windows_again(
+    took_us: int, goes_on: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Four times as long as it computed; it is asked once a second."""
+    scene = with_windows(monkeypatch, 1)
+    (solve,) = solves(scene.tick(), RELATIVE_POSE)
+    ended(scene, solve, took_us)
+    assert bool(solves(scene.tick(1), RELATIVE_POSE)) is goes_on
+
+
+@pytest.mark.parametrize(("took_us", "goes_on"), [(240_000, True), (260_000, False)])
+def test_module_3_runs_once_at_a_time_and_rests_too(
+    took_us: int, goes_on: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = RobotScene()
+    estimate = TeamEstimate(Segment(0, 1, 0), {})
+    monkeypatch.setattr(scene.robot.back, "begin", lambda *_: lambda: estimate)
+    (solve,) = solves(scene.tick(), OPTIMIZER)
+    assert solves(scene.tick(1), OPTIMIZER) == []
+    ended(scene, solve, took_us)
+    assert scene.robot.back.estimate is estimate
+    assert bool(solves(scene.tick(1), OPTIMIZER)) is goes_on
+
+
+def test_module_3_is_told_who_lives_what_their_clocks_say_and_their_public_poses(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene, told = RobotScene(), list[tuple[object, ...]]()
+    monkeypatch.setattr(scene.robot.back, "begin", lambda *known: told.append(known))
+    scene.meet(4)
+    scene.meet(5, hears_us=False)
+    public = PublicPoses(0, 1, 2, (10,), np.ones((2, 4), dtype=complex))
+    scene.hear(4, public)
+    assert solves(scene.tick(), OPTIMIZER) == []
+    assert told == [({0, 4}, {4: 0, 5: 0}, {4: public})]
+
+
+def test_each_module_runs_at_its_configured_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    extra = (
+        "[relative_pose]\nrate_hz = 2.0\n[consistency]\nrate_hz = 5.0\n[optimizer]\nrate_hz = 0.5\n"
+    )
+    scene = RobotScene(extra=extra)
+    calls: Counter[str] = Counter()
+    for part, name in (
+        (scene.robot.front, "module1"),
+        (scene.robot.front, "module2"),
+        (scene.robot.back, "begin"),
+    ):
+        monkeypatch.setattr(part, name, lambda *_, name=name: calls.update([name]) or [])
+    for _ in range(100):
+        scene.tick(0.1)
+    assert calls == {"module1": 20, "module2": 50, "begin": 5}

@@ -1,0 +1,127 @@
+"""AgileX bases on a CAN bus: odometry in millimetres, speeds while there is none, their state."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+from frames import SECOND_US
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drslamd.events import CanFrame
+from drslamd.sensors.samples import Twist, WheelCounts
+from drslamd.sensors.wheels.agilex import AgilexDriver
+from drslamd.sensors.wheels.wheel_driver import WheelRefusal
+
+MS = 1000
+T0 = 100 * SECOND_US
+
+
+def agilex(can_id: int, data: bytes, utime: int = T0) -> CanFrame:
+    return CanFrame(utime, can_id, False, data)
+
+
+def odometry(utime: int, left: int, right: int) -> CanFrame:
+    return agilex(0x311, struct.pack(">ii", left, right), utime)
+
+
+def motion(utime: int, linear: int, angular: int) -> CanFrame:
+    return agilex(0x221, struct.pack(">hhhh", linear, angular, 0, -1), utime)
+
+
+def test_odometry_counts_millimetres() -> None:
+    assert AgilexDriver().on_frame(odometry(T0, -63, 18)) == [WheelCounts(T0, -63, 18, 32)]
+    extremes = odometry(T0, (1 << 31) - 1, -(1 << 31))
+    assert AgilexDriver().on_frame(extremes) == [WheelCounts(T0, (1 << 31) - 1, -(1 << 31), 32)]
+
+
+@pytest.mark.parametrize(("after", "used"), [(500 * MS, False), (501 * MS, True)])
+def test_speeds_are_used_only_while_odometry_is_missing(after: int, used: bool) -> None:
+    driver = AgilexDriver()
+    driver.on_frame(odometry(T0, 0, 0))
+    samples = driver.on_frame(motion(T0 + after, 500, -250))
+    assert samples == ([Twist(T0 + after, 0.5, -0.25)] if used else [])
+
+
+def test_a_base_without_odometry_is_given_half_a_second_to_send_some() -> None:
+    driver = AgilexDriver()
+    samples = [driver.on_frame(motion(T0 + k * 100 * MS, 500, 0)) for k in range(10)]
+    assert [len(s) for s in samples] == [0] * 6 + [1] * 4
+
+
+def test_when_odometry_comes_speeds_are_no_longer_used() -> None:
+    driver = AgilexDriver()
+    for k in range(10):
+        driver.on_frame(motion(T0 + k * 100 * MS, 500, 0))
+    assert driver.on_frame(odometry(T0 + SECOND_US, 1, 2))
+    assert driver.on_frame(motion(T0 + SECOND_US + MS, 500, 0)) == []
+
+
+def test_the_state_of_the_base_is_told_with_its_error_bits() -> None:
+    driver = AgilexDriver()
+    driver.on_frame(agilex(0x211, bytes([1, 0, 1, 0, 0, 0x80, 0, 0])))
+    assert (driver.vehicle_state, driver.error_bits) == (1, 0x80)
+    assert "an emergency stop (error bits 0x0080)" in str(driver.fault())
+    driver.on_frame(agilex(0x211, bytes([2, 0, 1, 0, 1, 2, 0, 0])))
+    assert "a fault (error bits 0x0102)" in str(driver.fault())
+    driver.on_frame(agilex(0x211, bytes([0, 0, 1, 3, 0, 0, 0, 0xB1])))
+    assert driver.fault() is None
+
+
+def test_protocol_v1_is_named() -> None:
+    driver = AgilexDriver()
+    driver.on_frame(agilex(0x151, bytes(8)))
+    assert driver.tally.refused == {WheelRefusal.OLD_PROTOCOL: 1}
+    assert "protocol V1" in str(driver.fault())
+    driver.on_frame(odometry(T0, 0, 0))
+    assert driver.fault() is None  # it was somebody else on the bus
+
+
+@pytest.mark.parametrize("can_id", [0x311, 0x211])
+def test_a_short_frame_is_refused(can_id: int) -> None:
+    driver = AgilexDriver()
+    assert driver.on_frame(agilex(can_id, bytes(5))) == []
+    assert driver.tally.refused == {WheelRefusal.SHORT: 1}
+
+
+def test_a_short_speed_is_refused_when_it_is_needed() -> None:
+    driver = AgilexDriver()
+    driver.on_frame(motion(T0, 0, 0))
+    driver.on_frame(agilex(0x221, bytes(3), T0 + SECOND_US))
+    assert driver.tally.refused == {WheelRefusal.SHORT: 1}
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        agilex(0x212, bytes(4)),
+        agilex(0x312, bytes(8)),
+        agilex(0x241, bytes(8)),
+        CanFrame(T0, 0x311, True, bytes(8)),
+    ],
+)
+def test_frames_of_other_ids_are_normal(frame: CanFrame) -> None:
+    driver = AgilexDriver()
+    assert driver.on_frame(frame) == []
+    assert (driver.tally.ignored, driver.tally.received) == (1, 1)
+
+
+@settings(derandomize=True, max_examples=200, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([0x311, 0x221, 0x211, 0x151, 0x29, 0x7FF]),
+            st.booleans(),
+            st.binary(max_size=10),
+            st.integers(0, SECOND_US),
+        ),
+        max_size=20,
+    )
+)
+def test_no_frames_make_an_agilex_base_raise(frames: list[tuple[int, bool, bytes, int]]) -> None:
+    driver, utime = AgilexDriver(), T0
+    for can_id, extended, data, pause in frames:
+        utime += pause
+        driver.on_frame(CanFrame(utime, can_id, extended, data))
+    assert driver.tally.received == len(frames)

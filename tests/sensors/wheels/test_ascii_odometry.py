@@ -1,0 +1,125 @@
+"""The project's own $ODO line."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from frames import SECOND_US, ascii_line, cut
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drslamd.sensors.samples import WheelCounts
+from drslamd.sensors.wheels.ascii_odometry import AsciiDriver
+from drslamd.sensors.wheels.wheel_driver import WheelRefusal
+
+MS = 1000
+T0 = 100 * SECOND_US
+
+
+def test_the_first_line_gives_nothing_the_others_counters() -> None:
+    driver = AsciiDriver()
+    assert driver.feed(ascii_line(1000, 10, -20), T0) == []
+    samples = driver.feed(ascii_line(1020, 15, -25), T0 + 20 * MS)
+    assert samples == [WheelCounts(T0 + 20 * MS, 15, -25, 32)]
+
+
+def test_the_line_in_the_documentation_is_read() -> None:
+    driver = AsciiDriver()
+    driver.feed(ascii_line(123_436, 1500, -40), T0)
+    (sample,) = driver.feed(b"$ODO,123456,1532,-48*4B\n", T0 + 20 * MS)
+    assert sample == WheelCounts(T0 + 20 * MS, 1532, -48, 32)
+
+
+def test_time_wraps_as_millis_does() -> None:
+    driver = AsciiDriver()
+    driver.feed(ascii_line((1 << 32) - 10, 0, 0), T0)
+    (sample,) = driver.feed(ascii_line(10, 1, 1), T0 + 20 * MS)
+    assert sample.utime == T0 + 20 * MS
+
+
+@pytest.mark.parametrize(("count", "fits"), [(1 << 32, False), ((1 << 32) - 1, True)])
+def test_counters_may_be_unsigned(count: int, fits: bool) -> None:
+    driver = AsciiDriver()
+    driver.feed(ascii_line(1000, 0, 0), T0)
+    assert len(driver.feed(ascii_line(1020, count, 0), T0 + 20 * MS)) == fits
+
+
+@pytest.mark.parametrize(("count", "fits"), [(-(1 << 31) - 1, False), (-(1 << 31), True)])
+def test_counters_may_be_signed(count: int, fits: bool) -> None:
+    driver = AsciiDriver()
+    driver.feed(ascii_line(1000, 0, 0), T0)
+    assert len(driver.feed(ascii_line(1020, 0, count), T0 + 20 * MS)) == fits
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        (b"$ODO,1,2,3*00", WheelRefusal.CHECKSUM),
+        (b"$ODO,123456,1532,-48*4A", WheelRefusal.CHECKSUM),
+        (b"$ODO,123456,1532,-48", WheelRefusal.MALFORMED),
+        (b"$ODO,123456,1532*4B", WheelRefusal.MALFORMED),
+        (b"$ODO,123456,1532,-48*4B,", WheelRefusal.MALFORMED),
+        (b"$ODO,-5,1532,-48*4B", WheelRefusal.MALFORMED),
+        (ascii_line(1 << 32, 1, 2).strip(), WheelRefusal.MALFORMED),
+        (ascii_line(5, 1, 2).strip(), WheelRefusal.TIME),
+    ],
+)
+def test_a_damaged_line_is_refused_for_its_reason(line: bytes, reason: WheelRefusal) -> None:
+    driver = AsciiDriver()
+    assert driver.feed(line + b"\n", T0) == []
+    assert driver.tally.refused == {reason: 1}
+
+
+def test_whatever_else_the_base_prints_is_ignored() -> None:
+    driver = AsciiDriver()
+    driver.feed(b"booting v1.2\r\nODO,1,2,3\r\n\xff\xfe\r\n", T0)
+    assert (driver.tally.ignored, driver.tally.received) == (3, 3)
+
+
+def test_a_line_behind_a_torn_one_is_read() -> None:
+    driver = AsciiDriver()
+    driver.feed(ascii_line(1000, 0, 0), T0)
+    assert len(driver.feed(b"$ODO,1020,1" + ascii_line(1040, 2, 2), T0 + 40 * MS)) == 1
+
+
+@pytest.mark.parametrize("value", range(256))
+def test_a_poisoned_byte_before_a_line_costs_nothing(value: int) -> None:
+    driver = AsciiDriver()
+    driver.feed(ascii_line(1000, 0, 0), T0)
+    assert len(driver.feed(bytes([value]) + ascii_line(1020, 2, 2), T0 + 20 * MS)) == 1
+
+
+@settings(derandomize=True, max_examples=200, deadline=None)
+@given(st.integers(0, 20), st.integers(0, 7))
+def test_no_single_bit_flip_in_an_odo_line_gives_a_sample(position: int, bit: int) -> None:
+    driver = AsciiDriver()
+    driver.feed(ascii_line(1000, 100, 200), T0)
+    line = bytearray(ascii_line(1020, 103, 205))
+    line[position % (len(line) - 2)] ^= 1 << bit
+    samples = driver.feed(bytes(line), T0 + 20 * MS)
+    assert samples in ([], [WheelCounts(T0 + 20 * MS, 103, 205, 32)])  # the case of a hex digit
+
+
+def outcome(reads: list[bytes]) -> tuple[object, object]:
+    driver = AsciiDriver()
+    return [s for read in reads for s in driver.feed(read, T0)], driver.tally
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_whole_and_byte_by_byte_and_random_reads_give_the_same(seed: int) -> None:
+    draw = random.Random(seed)
+    parts = [ascii_line(1000 + 20 * k, k, -k) for k in range(40)]
+    parts += [draw.randbytes(draw.randint(1, 200)) for _ in range(20)]
+    draw.shuffle(parts)
+    stream = b"".join(parts)
+    whole = outcome([stream])
+    assert outcome([stream[i : i + 1] for i in range(len(stream))]) == whole
+    assert outcome(list(cut(stream, seed))) == whole
+
+
+@settings(derandomize=True, max_examples=200, deadline=None)
+@given(st.binary(max_size=300))
+def test_no_bytes_make_the_driver_raise(data: bytes) -> None:
+    for stream in (data, b"$ODO," + data + b"\n"):
+        AsciiDriver().feed(stream, T0)

@@ -1,0 +1,70 @@
+"""Two sides that report one after the other, brought to a common time."""
+
+from __future__ import annotations
+
+import pytest
+
+from drslamd.sensors.wheels.side_pairing import (
+    MAX_APART_US,
+    Pair,
+    Side,
+    SidePairing,
+    linear,
+    wrapping,
+)
+
+
+def paired(*values: tuple[Side, int, float]) -> tuple[list[Pair], int]:
+    pairing = SidePairing(linear)
+    pairs = [pairing.add(side, utime, value) for side, utime, value in values]
+    return [pair for pair in pairs if pair is not None], pairing.unpaired
+
+
+FIRST, SECOND = Side.FIRST, Side.SECOND
+
+
+def test_the_second_side_is_interpolated_to_the_time_of_the_first() -> None:
+    pairs, unpaired = paired((SECOND, 0, 1.0), (FIRST, 2_500, 7.0), (SECOND, 10_000, 2.0))
+    assert (pairs, unpaired) == ([Pair(2_500, 7.0, 1.25)], 0)
+
+
+def test_equal_times_need_no_interpolation() -> None:
+    assert paired((FIRST, 5, 7.0), (SECOND, 5, 1.0)) == ([Pair(5, 7.0, 1.0)], 0)
+
+
+def test_each_value_of_the_first_side_is_used_once() -> None:
+    values = [(SECOND, 0, 0.0)]
+    for k in range(1, 20):
+        values += [(FIRST, k * 10_000 - 3_000, k), (SECOND, k * 10_000, k)]
+    pairs, unpaired = paired(*values)
+    assert [pair.utime for pair in pairs] == [k * 10_000 - 3_000 for k in range(1, 20)]
+    assert unpaired == 0
+
+
+@pytest.mark.parametrize(("apart", "found"), [(MAX_APART_US, 1), (MAX_APART_US + 1, 0)])
+def test_values_too_far_apart_are_no_pair(apart: int, found: int) -> None:
+    pairs, unpaired = paired((SECOND, 0, 1.0), (FIRST, apart, 7.0), (SECOND, 3 * apart, 2.0))
+    assert (len(pairs), unpaired) == (found, 1 - found)
+
+
+def test_without_an_earlier_value_there_is_nothing_to_interpolate() -> None:
+    assert paired((FIRST, 0, 7.0), (SECOND, 1, 2.0)) == ([], 1)
+
+
+@pytest.mark.parametrize("utime", [9_999, 20_001])
+def test_nothing_is_extrapolated(utime: int) -> None:
+    for last in (10_000, 20_000):
+        values = [(SECOND, 10_000, 0.0), (FIRST, utime, 7.0), (SECOND, last, 1.0)]
+        assert paired(*values) == ([], 1)
+
+
+def test_a_value_of_the_first_side_that_is_overtaken_counts_as_unpaired() -> None:
+    pairs, unpaired = paired((SECOND, 0, 0.0), (FIRST, 1, 5.0), (FIRST, 2, 6.0), (SECOND, 4, 4.0))
+    assert (pairs, unpaired) == ([Pair(2, 6.0, 2.0)], 1)
+
+
+def test_counters_are_interpolated_over_their_wrap() -> None:
+    between = wrapping(16)
+    assert between(65_530, 10, 0.5) == 2
+    assert between(10, 65_530, 0.75) == 65_534
+    assert wrapping(64)((1 << 63) + 1, (1 << 63) + 3, 0.5) == (1 << 63) + 2

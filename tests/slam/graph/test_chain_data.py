@@ -1,0 +1,136 @@
+"""One chain: its keyframes, the sums along it, and what its robot says of its sensors."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from slam_scenes import NOISE, keyframes, model_of, wander
+
+from drslamd.conventions import Chain
+from drslamd.slam.graph import chain_data
+from drslamd.slam.graph.chain_data import ChainData
+from drslamd.slam.graph.measurements import Keyframe
+from drslamd.slam.odometry.noise import growth
+from drslamd.slam.robot_model import UNTOLD, RobotModel
+
+A = Chain(0, 5)
+
+
+def test_keyframes_come_in_steps_and_are_kept_in_metres_and_radians() -> None:
+    data = ChainData(A)
+    data.add(Keyframe(40, 2, 10_000, -20_000, 31_416))
+    assert data.keyframes.n.tolist() == [40]
+    assert data.keyframes.segment.tolist() == [2]
+    assert data.keyframes.poses[0] == pytest.approx([1.0, -2.0, math.pi], abs=1e-5)
+
+
+def test_a_chain_keeps_the_last_keyframes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chain_data, "MAX_KEYFRAMES", 50)
+    items = ChainData(A)
+    path = wander(np.random.default_rng(3), 80, 0.4)
+    for k in keyframes(range(80), path):
+        items.add(k)
+        assert len(items.keyframes.rows) == min(50, k.n + 1)
+    assert items.keyframes.n.tolist() == list(range(30, 80))
+
+
+def sums_between(items: ChainData, i: int, k: int) -> np.ndarray:
+    at, there = items.keyframes.find(np.array([i, k], dtype=float))
+    assert there.all()
+    return np.asarray(items.sums[at[1]] - items.sums[at[0]])
+
+
+def test_sums_are_those_of_the_whole_chain_however_it_came(monkeypatch: pytest.MonkeyPatch) -> None:
+    path = wander(np.random.default_rng(4), 60, 0.4)
+    frames = keyframes(range(60), path)
+    expected = growth(np.array([[k.x, k.y, k.theta] for k in frames]) * 1e-4)
+    monkeypatch.setattr(chain_data, "MAX_KEYFRAMES", 40)
+    shuffle = random.Random(5)
+    for _ in range(10):
+        order = list(frames)
+        shuffle.shuffle(order)
+        items = ChainData(A)
+        for k in order:
+            items.add(k)
+            if shuffle.random() < 0.5:
+                assert len(items.sums) == len(items.keyframes.rows)
+        assert np.allclose(sums_between(items, 25, 55), expected[55] - expected[25])
+
+
+def test_what_came_late_or_was_dropped_does_not_move_the_sums(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Candidates of module 2 remember them."""
+    monkeypatch.setattr(chain_data, "MAX_KEYFRAMES", 40)
+    frames = keyframes(range(60), wander(np.random.default_rng(6), 60, 0.4))
+    items = ChainData(A)
+    for k in frames[20:45]:
+        items.add(k)
+    remembered = items.sums[items.keyframes.find(np.array([30.0]))[0][0]].copy()
+    for part in (frames[5:20], frames[45:], frames[0:5]):
+        for k in part:
+            items.add(k)
+        now = items.sums[items.keyframes.find(np.array([30.0]))[0][0]]
+        assert np.allclose(now, remembered, atol=1e-9)
+
+
+def test_a_segment_never_comes_back_whatever_a_robot_says() -> None:
+    items = ChainData(A)
+    for n, segment in enumerate([0, 3, 1, 1, 5, 0]):
+        items.add(Keyframe(n, segment, 0, 0, 0))
+    assert items.keyframes.rows[:, 1].tolist() == [0, 3, 3, 3, 5, 5]
+    assert [items.keyframes.of_segment(s) for s in (0, 3, 5)] == [
+        slice(0, 1),
+        slice(1, 4),
+        slice(4, 6),
+    ]
+
+
+def test_what_was_thinned_out_moves_no_sum_of_what_stays() -> None:
+    """Not even of keyframes that come afterwards."""
+    frames = keyframes(range(60), wander(np.random.default_rng(7), 60, 0.4))
+    whole, thinned = ChainData(A), ChainData(A)
+    for k in frames[:50]:
+        whole.add(k)
+        thinned.add(k)
+    thinned.keep(np.arange(50) % 10 == 0)
+    assert thinned.keyframes.n.tolist() == [0, 10, 20, 30, 40]
+    for k in frames[50:]:
+        whole.add(k)
+        thinned.add(k)
+    for ends in ((0, 40), (10, 30), (50, 59)):
+        assert np.allclose(sums_between(thinned, *ends), sums_between(whole, *ends))
+
+
+def test_until_it_has_spoken_a_robot_is_like_any_other() -> None:
+    assert ChainData(A).model == UNTOLD
+
+
+def test_the_latest_entry_says_what_the_sensors_are_like() -> None:
+    data = ChainData(A)
+    for seq in (3, 9, 5):
+        data.take_model(seq, model_of(NOISE, (0.1 * seq, 0.0)))
+    assert data.model.antenna == pytest.approx([0.9, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("model", "is_believed"),
+    [
+        (model_of(replace(NOISE, scale=0.4)), True),
+        (model_of(replace(NOISE, scale=9.0)), False),
+        (model_of(replace(NOISE, translation_per_sqrt_m=0.0)), False),
+        (model_of(NOISE, (4.9, 0.0)), True),
+        (model_of(NOISE, (9.0, 0.0)), False),
+        (model_of(NOISE, (0.0, math.nan)), False),
+    ],
+)
+def test_a_model_that_no_configuration_allows_is_not_believed(
+    model: RobotModel, is_believed: bool
+) -> None:
+    data = ChainData(A)
+    data.take_model(0, model)
+    assert data.model == (model if is_believed else UNTOLD)

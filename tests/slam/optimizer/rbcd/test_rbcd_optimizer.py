@@ -1,0 +1,338 @@
+"""The paper's module 3 as one robot runs it: its block, its neighbours, round by round."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from slam_scenes import (
+    EXACT,
+    Array,
+    SmallTeam,
+    closure,
+    group_of,
+    inverted,
+    product,
+    same_pose,
+    small_team,
+)
+
+from drslamd.conventions import Segment
+from drslamd.slam.graph.estimate import TeamEstimate
+from drslamd.slam.graph.measurements import GraphEntry
+from drslamd.slam.graph.public_poses import PublicPoses
+from drslamd.slam.graph.team_frame import Group
+from drslamd.slam.optimizer.factors import chain_links
+from drslamd.slam.optimizer.rbcd.rbcd_optimizer import (
+    SETTLED,
+    LiftedNeighbours,
+    RbcdOptimizer,
+    lifted_neighbours,
+)
+
+RANK = 3
+COUNT = 20
+CARRIERS = [5, 15]
+"""Keyframes of `small_team` that carry closures, by their place; of each pair of robots."""
+
+
+@pytest.fixture(scope="module")
+def team() -> SmallTeam:
+    """Three robots with good wheels; closures are as wrong as they say, 5 cm."""
+    return small_team(3, count=COUNT, noise=EXACT)
+
+
+def plain_lift(pose: Array, rank: int = RANK) -> Array:
+    """A planar pose in the first direction of the relaxation."""
+    row = np.zeros(2 * rank, dtype=complex)
+    row[0], row[rank] = np.exp(1j * pose[2]), complex(pose[0], pose[1])
+    return row
+
+
+def in_frame(team: SmallTeam, robot: int) -> list[Array]:
+    """True poses of a robot, seen from the first of robot 0."""
+    origin = inverted(team.truth[0][0])
+    return [product(origin, pose) for pose in team.truth[robot]]
+
+
+def true_public(
+    team: SmallTeam, robot: int, length: float = 1.0, rank: int = RANK, anchor: float = 1.0
+) -> PublicPoses:
+    """What a robot says that knows the truth.
+
+    Args:
+        length, anchor: of the rotations of its poses and of its origin; 1 is right.
+    """
+    numbers = tuple(int(team.n[robot][k]) for k in CARRIERS)
+    poses = [np.zeros(3), *(in_frame(team, robot)[k] for k in CARRIERS)]
+    values = np.array([plain_lift(pose, rank) for pose in poses])
+    values[0, :rank] *= anchor
+    values[1:, :rank] *= length
+    return PublicPoses(0, team.chains[0].epoch, rank, numbers, values)
+
+
+def a_round(
+    team: SmallTeam,
+    robot: int,
+    public: Mapping[int, PublicPoses],
+    previous: TeamEstimate | None = None,
+    group: Group | None = None,
+) -> TeamEstimate | None:
+    optimizer = RbcdOptimizer(team.chains[robot], RANK)
+    run = optimizer.job(team.graph, group or group_of(team.graph), previous, public)
+    return run() if run else None
+
+
+def neighbours_of(
+    team: SmallTeam, robot: int, public: Mapping[int, PublicPoses]
+) -> LiftedNeighbours:
+    data = team.graph.chains[robot]
+    return lifted_neighbours(team.graph, data, np.arange(COUNT), public, RANK)
+
+
+def said(estimate: TeamEstimate) -> PublicPoses:
+    """What a robot tells of its state, as `BackEnd.public_poses` does."""
+    state = estimate.lifted
+    assert state is not None
+    table = dict(zip(state.n.tolist(), state.rows, strict=True))
+    values = np.array([state.anchor, *(table[int(n)] for n in state.carriers)])
+    numbers = tuple(int(n) for n in state.carriers)
+    return PublicPoses(*estimate.frame.chain, RANK, numbers, values)
+
+
+# where a block starts
+
+
+def test_the_robot_whose_frame_it_is_begins_at_its_origin(team: SmallTeam) -> None:
+    found = a_round(team, 0, {})
+    assert found is not None
+    own = found.trajectories[0]
+    assert own.n.tolist() == team.n[0].tolist()
+    assert same_pose(own.poses[0], np.zeros(3))
+    for pose, true in zip(own.poses, in_frame(team, 0), strict=True):
+        assert same_pose(pose, true, 5e-3)
+
+
+def test_a_robot_that_nobody_has_placed_waits(team: SmallTeam) -> None:
+    assert a_round(team, 1, {}) is None
+    assert a_round(team, 2, {}) is None
+
+
+@pytest.mark.parametrize(("robot", "other"), [(1, 0), (0, 1), (1, 2), (2, 1)])
+def test_a_robot_is_placed_by_its_closures_with_one_who_is(
+    team: SmallTeam, robot: int, other: int
+) -> None:
+    """Whichever of the two made them."""
+    members = {Segment(*team.chains[r], 0) for r in range(3)}
+    group = Group(members, Segment(*team.chains[3 - robot - other], 0), {})
+    public = replace(true_public(team, other), frame=group.frame.robot)
+    found = a_round(team, robot, {other: public}, group=group)
+    assert found is not None
+    for pose, true in zip(found.trajectories[robot].poses, in_frame(team, robot), strict=True):
+        assert same_pose(pose, true, 0.3)
+
+
+def test_a_robot_that_is_placed_needs_an_origin_too(team: SmallTeam) -> None:
+    public = {0: true_public(team, 0)}
+    before = a_round(team, 1, public)
+    assert a_round(team, 1, public, before) is not None
+    assert a_round(team, 1, {}, before) is None
+
+
+def test_a_block_goes_on_from_where_it_was_and_new_keyframes_follow_by_odometry(
+    team: SmallTeam,
+) -> None:
+    before = a_round(team, 0, {})
+    assert before is not None
+    assert before.lifted is not None
+    turned = np.exp(0.4j)
+    state = before.lifted
+    half = replace(state, n=state.n[:10], rows=state.rows[:10] * turned)
+    found = a_round(team, 0, {}, replace(before, lifted=half))
+    assert found is not None
+    assert found.lifted is not None
+    # all turned alike is nothing that could be gained by turning back
+    assert np.allclose(found.lifted.rows, before.lifted.rows * turned, atol=1e-3)
+
+
+def test_what_was_solved_in_another_frame_is_no_start(team: SmallTeam) -> None:
+    public = {0: true_public(team, 0)}
+    before = a_round(team, 1, public)
+    assert before is not None
+    elsewhere = replace(before, frame=Segment(9, 9, 0))
+    plain, again = a_round(team, 1, public), a_round(team, 1, public, elsewhere)
+    assert plain is not None
+    assert again is not None
+    assert np.array_equal(plain.trajectories[1].poses, again.trajectories[1].poses)
+
+
+def test_only_segments_of_the_group_are_in_the_block() -> None:
+    team = small_team(3, count=COUNT, noise=EXACT)
+    later = replace(team.entries[0][1].keyframes[-1], n=500, segment=1)
+    team.graph.insert(team.chains[0], GraphEntry(9, keyframes=(later,)))
+    found = a_round(team, 0, {})
+    assert found is not None
+    assert found.trajectories[0].n.tolist() == team.n[0].tolist()
+
+
+# neighbours
+
+
+def test_closures_lead_out_to_those_that_we_measured_and_in_from_those_that_measured_us(
+    team: SmallTeam,
+) -> None:
+    """The lower robot of a pair made its closures."""
+    around = neighbours_of(team, 1, {0: true_public(team, 0), 2: true_public(team, 2)})
+    assert around.carriers.tolist() == [int(team.n[1][k]) for k in CARRIERS]
+    assert around.arriving.j.tolist() == CARRIERS
+    assert around.leaving.i.tolist() == CARRIERS
+    for rows, robot in ((around.arriving.i, 0), (around.leaving.j, 2)):
+        assert [around.chains[r] for r in rows] == [team.chains[robot]] * 2
+        assert [int(around.n[r]) for r in rows] == [int(team.n[robot][k]) for k in CARRIERS]
+        expected = true_public(team, robot).values[1:]
+        assert np.array_equal(around.rows[rows], expected)
+
+
+def test_poses_that_carry_closures_to_somebody_unknown_are_public_all_the_same(
+    team: SmallTeam,
+) -> None:
+    around = neighbours_of(team, 1, {})
+    assert around.carriers.tolist() == [int(team.n[1][k]) for k in CARRIERS]
+    assert (len(around.leaving), len(around.arriving), len(around.rows)) == (0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("length", "is_used"), [(1.009, True), (1.011, False), (0.991, True), (0.989, False)]
+)
+def test_a_rotation_whose_length_is_wrong_is_none(
+    team: SmallTeam, length: float, is_used: bool
+) -> None:
+    around = neighbours_of(team, 1, {0: true_public(team, 0, length)})
+    assert len(around.rows) == (2 if is_used else 0)
+    # with nobody else to be placed by, the robot waits
+    assert (a_round(team, 1, {0: true_public(team, 0, length)}) is not None) is is_used
+
+
+@pytest.mark.parametrize(
+    ("anchor", "is_used"), [(1.009, True), (1.011, False), (0.991, True), (0.989, False)]
+)
+def test_an_origin_whose_length_is_wrong_is_none(
+    team: SmallTeam, anchor: float, is_used: bool
+) -> None:
+    assert (a_round(team, 1, {0: true_public(team, 0, anchor=anchor)}) is not None) is is_used
+
+
+def test_poses_of_another_rank_are_not_listened_to(team: SmallTeam) -> None:
+    wrong = true_public(team, 0, rank=RANK + 1)
+    assert a_round(team, 1, {0: wrong}) is None
+    right = {2: true_public(team, 2)}
+    plain, mixed = a_round(team, 1, right), a_round(team, 1, {**right, 0: wrong})
+    assert plain is not None
+    assert mixed is not None
+    assert np.array_equal(plain.trajectories[1].poses, mixed.trajectories[1].poses)
+
+
+def test_a_closure_that_was_withdrawn_leads_nowhere() -> None:
+    team = small_team(3, count=COUNT, noise=EXACT)
+    gone = closure(0, int(team.n[0][5]), team.chains[1], int(team.n[1][5]), (0, 0, 0), kept=False)
+    team.graph.insert(team.chains[0], GraphEntry(9, closures=(gone,)))
+    around = neighbours_of(team, 1, {0: true_public(team, 0)})
+    assert [int(n) for n in around.n] == [int(team.n[0][15])]
+
+
+def origin_of(team: SmallTeam, public: Mapping[int, PublicPoses]) -> complex:
+    """Where robot 1 thinks that the frame begins."""
+    found = a_round(team, 1, public)
+    assert found is not None
+    assert found.lifted is not None
+    return complex(found.lifted.anchor[RANK])
+
+
+def test_the_origin_is_as_its_owner_says_it_else_as_the_lowest_robot_does(
+    team: SmallTeam,
+) -> None:
+    public = {robot: true_public(team, robot) for robot in (0, 2)}
+    for robot, said_by in public.items():
+        said_by.values[0, RANK] = 1e-6 * (robot + 1)
+    assert origin_of(team, public) == 1e-6
+    assert origin_of(team, {2: public[2]}) == 3e-6
+    public[0].values[0, :RANK] *= 2
+    assert origin_of(team, public) == 3e-6
+
+
+# rounds
+
+
+def test_a_round_says_where_we_and_the_known_poses_of_our_neighbours_are(team: SmallTeam) -> None:
+    public = {0: true_public(team, 0), 2: true_public(team, 2)}
+    found = a_round(team, 1, public)
+    assert found is not None
+    assert found.frame == Segment(*team.chains[0], 0)
+    assert set(found.trajectories) == {0, 1, 2}
+    for robot in (0, 2):
+        other = found.trajectories[robot]
+        assert other.chain == team.chains[robot]
+        assert other.n.tolist() == [int(team.n[robot][k]) for k in CARRIERS]
+        for pose, k in zip(other.poses, CARRIERS, strict=True):
+            assert same_pose(pose, in_frame(team, robot)[k], 1e-6)
+    assert set(found.covariances) == {1}
+    assert np.linalg.eigvalsh(found.covariances[1])[0] > 0
+
+
+def test_the_robot_of_the_frame_is_as_uncertain_as_its_odometry_since_the_origin(
+    team: SmallTeam,
+) -> None:
+    """Each link is wrong by itself, and its turn swings all that lies behind it."""
+    found = a_round(team, 0, {})
+    assert found is not None
+    places = np.array(in_frame(team, 0))[:, :2]
+    links = chain_links(team.graph.chains[0], calibrated=False).covariance
+    swings = np.sum((places[-1] - places[1:]) ** 2, axis=1)
+    spread = np.sum((links[:, 0, 0] + links[:, 1, 1]) / 2 + swings * links[:, 2, 2] / 2)
+    expected = np.diag([spread, spread, np.sum(links[:, 2, 2])])
+    assert found.covariances[0] == pytest.approx(expected, rel=0.02)
+
+
+def played(team: SmallTeam, rounds: int) -> dict[int, list[TeamEstimate]]:
+    """The team takes turns; everybody hears everybody."""
+    found: dict[int, list[TeamEstimate]] = {robot: [] for robot in range(3)}
+    public: dict[int, PublicPoses] = {}
+    for _ in range(rounds):
+        for robot in range(3):
+            others = {k: p for k, p in public.items() if k != robot}
+            before = found[robot][-1] if found[robot] else None
+            answer = a_round(team, robot, others, before)
+            assert answer is not None
+            found[robot].append(answer)
+            public[robot] = said(answer)
+    return found
+
+
+def test_in_turns_the_team_comes_to_where_everybody_is(team: SmallTeam) -> None:
+    found = played(team, 30)
+    for robot in range(3):
+        poses = found[robot][-1].trajectories[robot].poses
+        off = [pose[:2] - true[:2] for pose, true in zip(poses, in_frame(team, robot), strict=True)]
+        assert np.sqrt(np.mean(np.sum(np.square(off), axis=1))) < 0.06
+
+
+def test_alone_with_its_neighbours_a_block_costs_less_each_round_until_it_has_converged(
+    team: SmallTeam,
+) -> None:
+    """By the relative gain of a round, on both sides of its bound."""
+    public = {0: true_public(team, 0), 2: true_public(team, 2)}
+    before = a_round(team, 1, public)
+    assert before is not None
+    flags = []
+    for _ in range(60):
+        after = a_round(team, 1, public, before)
+        assert after is not None
+        assert after.cost <= before.cost
+        gain = before.cost - after.cost
+        assert after.converged is bool(gain <= SETTLED * (1 + after.cost))
+        flags.append(after.converged)
+        before = after
+    assert not flags[0]
+    assert flags[-1]

@@ -1,0 +1,253 @@
+"""Module 3 as one robot runs it: when there is something to compute, and what follows from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+from slam_scenes import CLOCKS, SmallTeam, closure, config, keyframes, same_pose, small_team, wander
+
+from drslamd.conventions import Chain, Segment
+from drslamd.slam.back_end import BackEnd
+from drslamd.slam.graph.estimate import Lifted, TeamEstimate, Trajectory
+from drslamd.slam.graph.measurements import GraphEntry, Keyframe
+from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.graph.public_poses import PublicPoses
+from drslamd.slam.graph.team_frame import Group
+from drslamd.slam.optimizer.contract import Job
+
+EVERYBODY = {0, 1, 2}
+FIRST = {Segment(robot, 10 + robot, 0) for robot in EVERYBODY}
+"""Of `small_team`: everybody's first segment."""
+
+
+@dataclass
+class Asked:
+    """An optimiser that notes what it is given, and answers with a frame and nothing in it."""
+
+    groups: list[Group] = field(default_factory=list)
+    previous: TeamEstimate | None = None
+    public: Mapping[int, PublicPoses] = field(default_factory=dict)
+
+    def job(
+        self,
+        graph: PoseGraph,
+        group: Group,
+        previous: TeamEstimate | None,
+        public: Mapping[int, PublicPoses],
+    ) -> Job:
+        self.groups.append(group)
+        self.previous, self.public = previous, public
+        return lambda: TeamEstimate(group.frame, {})
+
+
+@pytest.fixture(scope="module")
+def team() -> SmallTeam:
+    return small_team(0, count=20)
+
+
+def back_end(team: SmallTeam, robot: int = 0) -> tuple[BackEnd, Asked]:
+    """A back end that holds all that the team has said, with an optimiser that takes notes."""
+    back = BackEnd(config(robot), team.chains[robot])
+    for origin, entry in team.entries:
+        back.insert(origin, entry)
+    asked = Asked()
+    back._optimizer = asked
+    return back, asked
+
+
+def begin(
+    back: BackEnd, present: set[int] = EVERYBODY, public: Mapping[int, PublicPoses] | None = None
+) -> Job | None:
+    return back.begin(present, {1: 7, 2: 9}, public or {})
+
+
+def settled(team: SmallTeam, robot: int = 0) -> tuple[BackEnd, Asked]:
+    """The same after one solution."""
+    back, asked = back_end(team, robot)
+    run = begin(back)
+    assert run is not None
+    back.on_solution(run())
+    return back, asked
+
+
+def lifted_poses(frame: int = 0, epoch: int = 10) -> PublicPoses:
+    return PublicPoses(frame, epoch, 2, (10,), np.zeros((2, 4), dtype=complex))
+
+
+# news
+
+
+def test_before_anything_was_said_there_is_nothing_to_compute() -> None:
+    back = BackEnd(config(), Chain(0, 10))
+    assert begin(back) is None
+    back.insert(Chain(0, 10), GraphEntry(0))
+    assert begin(back) is None
+
+
+def test_what_was_solved_is_not_solved_again_without_news(team: SmallTeam) -> None:
+    back, asked = settled(team)
+    assert begin(back) is None
+    assert len(asked.groups) == 1
+
+
+def test_a_log_entry_is_news(team: SmallTeam) -> None:
+    back, _ = settled(team)
+    back.insert(team.chains[1], GraphEntry(7, keyframes=(Keyframe(2_000, 0, 1, 2, 3),)))
+    assert begin(back) is not None
+    assert begin(back) is None
+
+
+@pytest.mark.parametrize("present", [{0, 1}, {0, 1, 2, 3}])
+def test_who_lives_is_news(team: SmallTeam, present: set[int]) -> None:
+    back, _ = settled(team)
+    assert begin(back, present) is not None
+    assert begin(back, present) is None
+
+
+def test_public_poses_of_a_peer_are_news_each_time_that_they_come(team: SmallTeam) -> None:
+    back, _ = settled(team)
+    one, same = lifted_poses(), lifted_poses()
+    assert one == same
+    for public in ({1: one}, {1: same}, {1: same, 2: one}, {1: same}):
+        assert begin(back, public=public) is not None
+        assert begin(back, public=public) is None
+
+
+def test_clocks_are_no_news(team: SmallTeam) -> None:
+    back, _ = settled(team)
+    assert back.begin(EVERYBODY, {1: 8, 2: 10}, {}) is None
+
+
+@pytest.mark.parametrize("converged", [True, False])
+def test_what_has_not_converged_goes_on_without_news(team: SmallTeam, converged: bool) -> None:
+    back, asked = settled(team)
+    assert back.estimate is not None
+    result = replace(back.estimate, converged=converged)
+    back.on_solution(result)
+    assert (begin(back) is not None) is not converged
+    if not converged:
+        assert asked.previous is result
+
+
+# who is connected, and in whose frame
+
+
+def test_a_job_is_of_the_group_of_our_current_segment(team: SmallTeam) -> None:
+    back, asked = back_end(team, robot=1)
+    assert begin(back) is not None
+    assert back.group == asked.groups[0].members == FIRST
+    assert asked.groups[0].shift_us == {1: 0, 2: 9}
+
+
+@pytest.mark.parametrize(("present", "frame"), [({0, 1, 2}, 0), ({1, 2}, 1)])
+def test_the_frame_is_that_of_the_lowest_robot_that_lives(
+    team: SmallTeam, present: set[int], frame: int
+) -> None:
+    back, asked = back_end(team, robot=1)
+    assert begin(back, present) is not None
+    assert asked.groups[0].frame == Segment(frame, 10 + frame, 0)
+
+
+def test_after_a_break_in_our_odometry_we_are_nowhere_until_closures_say_more(
+    team: SmallTeam,
+) -> None:
+    back, asked = settled(team)
+    back.insert(team.chains[0], GraphEntry(7, keyframes=(Keyframe(500, 1, 0, 0, 0),)))
+    assert begin(back) is None
+    assert back.estimate is None
+    assert back.group == set()
+    again = closure(900, 500, team.chains[1], int(team.n[1][19]), (1.0, 0.0, 0.0))
+    back.insert(team.chains[0], GraphEntry(8, closures=(again,)))
+    assert begin(back) is not None
+    assert Segment(0, 10, 1) in asked.groups[-1].members
+
+
+def test_without_closures_a_robot_is_in_no_group(team: SmallTeam) -> None:
+    back = BackEnd(config(), team.chains[0])
+    back.insert(*team.entries[0])
+    assert begin(back) is None
+    assert (back.group, back.estimate) == (set(), None)
+
+
+def test_public_poses_of_other_frames_are_of_no_use(team: SmallTeam) -> None:
+    back, asked = back_end(team)
+    ours = lifted_poses()
+    others = {1: ours, 2: lifted_poses(frame=1, epoch=11), 3: lifted_poses(epoch=9)}
+    assert begin(back, public=others) is not None
+    assert dict(asked.public) == {1: ours}
+
+
+# what follows from an answer
+
+
+def test_the_answer_of_the_default_optimiser_says_where_everybody_was(team: SmallTeam) -> None:
+    back = BackEnd(config(), team.chains[0])
+    for origin, entry in team.entries:
+        back.insert(origin, entry)
+    run = back.begin(EVERYBODY, CLOCKS, {})
+    assert run is not None
+    back.on_solution(run())
+    own = back.trajectory(0)
+    assert own is not None
+    assert own.n.tolist() == team.n[0].tolist()
+    assert same_pose(own.poses[0], np.zeros(3), 1e-3)
+    assert back.trajectory(2) is not None
+    assert back.trajectory(7) is None
+
+
+def test_our_part_of_the_answer_becomes_our_history(team: SmallTeam) -> None:
+    back, _ = back_end(team)
+    frame = Segment(0, 10, 0)
+    own, other = (
+        Trajectory(team.chains[robot], team.n[robot], team.truth[robot]) for robot in (0, 1)
+    )
+    back.on_solution(TeamEstimate(frame, {0: own, 1: other}))
+    assert back.history.latest is own
+    back.on_solution(TeamEstimate(frame, {1: other}))
+    assert back.history.latest is own
+    assert back.trajectory(0) is None
+
+
+def test_two_robots_of_a_group_that_hold_the_same_say_the_same_of_it(team: SmallTeam) -> None:
+    one, other = (settled(team, robot)[0] for robot in (0, 1))
+    assert one.digest() == other.digest()
+    # whoever is in no group of theirs does not count
+    stranger = GraphEntry(0, keyframes=(Keyframe(5, 0, 0, 0, 0),))
+    one.insert(Chain(9, 1), stranger)
+    assert one.digest() == other.digest()
+    one.insert(team.chains[2], GraphEntry(7, keyframes=(Keyframe(9_000, 0, 1, 2, 3),)))
+    assert one.digest() != other.digest()
+
+
+def test_what_is_told_of_a_relaxation_are_our_poses_that_carry_closures(team: SmallTeam) -> None:
+    back, _ = back_end(team)
+    rows = np.arange(12).reshape(3, 4) * (1 + 2j)
+    anchor = np.array([1, 0, 5, 6j])
+    lifted = Lifted(np.array([10, 20, 30]), rows, anchor, np.array([10, 30]))
+    back.on_solution(TeamEstimate(Segment(1, 11, 0), {}, lifted=lifted))
+    public = back.public_poses()
+    assert public is not None
+    assert (public.frame, public.frame_epoch, public.rank) == (1, 11, 2)
+    assert public.keyframes == (10, 30)
+    assert np.array_equal(public.values, [anchor, rows[0], rows[2]])
+
+
+def test_without_a_relaxation_or_without_carriers_nothing_is_told(team: SmallTeam) -> None:
+    back, _ = back_end(team)
+    assert back.public_poses() is None
+    frame, none = Segment(0, 10, 0), np.zeros(0)
+    back.on_solution(TeamEstimate(frame, {}))
+    assert back.public_poses() is None
+    rows = np.zeros((1, 4), dtype=complex)
+    back.on_solution(TeamEstimate(frame, {}, lifted=Lifted(np.array([10]), rows, rows[0], none)))
+    assert back.public_poses() is None
+
+
+def test_the_graph_is_thinned_as_it_grows() -> None:
+    back = BackEnd(config(), Chain(0, 10))
+    path = wander(np.random.default_rng(1), 900)
+    back.insert(Chain(0, 10), GraphEntry(0, keyframes=keyframes(range(0, 9000, 10), path)))
+    assert len(back.graph.chains[0].keyframes) < 600
