@@ -18,6 +18,7 @@ from drslamd.slam.consistency.pair import PairTracker
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.relative_pose.estimate import Verdict
+from drslamd.whereabouts import Whereabouts
 
 PATIENCE_US = 3 * SECOND_US
 """How long an open port may be silent before that is worth a word."""
@@ -44,9 +45,12 @@ class Stages(Protocol):
     outbox: Outbox
     ports: dict[str, PortState]
     network: NetworkState | None
+    save_fault: str
     jobs: Jobs
 
     def neighbours(self, utime: int) -> list[PeerInRange]: ...
+
+    def whereabouts(self, utime: int) -> Whereabouts: ...
 
 
 def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
@@ -59,6 +63,7 @@ def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
     yield "pose", why_not_localised(robot, utime)
     yield "load", _load(robot, utime)
     yield "budget", robot.outbox.condition(utime)
+    yield "state", _state(robot)
 
 
 def _sensor(
@@ -88,10 +93,28 @@ def _load(robot: Stages, utime: int) -> str | None:
     return f"{', '.join(late)}, to leave time for the sensors; the team is large for this computer"
 
 
+def _state(robot: Stages) -> str | None:
+    if not robot.save_fault:
+        return None
+    return (
+        f"{robot.save_fault}: the next start will not know what this one learned, nor its number; "
+        "make room, make the folder writable, or name another in daemon.state_dir"
+    )
+
+
 def why_not_localised(robot: Stages, utime: int) -> str | None:
     """The first stage at which it stops, None when the robot is localised."""
-    if robot.back.estimate is not None:
+    where = robot.whereabouts(utime)
+    if where.is_old:
+        seconds = where.age_us // SECOND_US
+        return (
+            f"no odometry for {seconds} s: the pose is that of then, and its sigma grows as fast "
+            "as the robot drives; check the wheels"
+        )
+    if where.pose is not None:
         return None
+    if robot.back.estimate is not None:
+        return "not localised: the odometry was interrupted, and what follows it has no place yet"
     peers = robot.team.peers
     living = robot.team.living(utime)
     if not peers:

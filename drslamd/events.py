@@ -103,6 +103,14 @@ class JobDone:
 
 
 @dataclass(frozen=True)
+class SaveDone:
+    """The result of a `Save` effect: why nothing could be kept, empty when it was."""
+
+    utime: int
+    fault: str = ""
+
+
+@dataclass(frozen=True)
 class Stop:
     """The daemon is about to end."""
 
@@ -110,7 +118,16 @@ class Stop:
 
 
 Event = Union[
-    SerialData, CanFrame, PortState, Datagram, ChannelMessage, NetworkState, Tick, JobDone, Stop
+    SerialData,
+    CanFrame,
+    PortState,
+    Datagram,
+    ChannelMessage,
+    NetworkState,
+    Tick,
+    JobDone,
+    SaveDone,
+    Stop,
 ]
 
 # ---- effects ---------------------------------------------------------------------------------
@@ -150,9 +167,10 @@ class Save:
 
 @dataclass(frozen=True)
 class Restart:
-    """Forget everything and begin again under this epoch."""
+    """Forget everything and begin again under an epoch above this one; said until it is done."""
 
-    epoch: int
+    above: int
+    why: str
 
 
 class Level(Enum):

@@ -35,12 +35,15 @@ from drslamd.events import (
     PortState,
     Restart,
     Save,
+    SaveDone,
     Send,
     SerialData,
     Stop,
     Tick,
     Write,
 )
+from drslamd.gossip.bounds import is_sayable
+from drslamd.gossip.epochs import kept_epochs
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
@@ -61,6 +64,7 @@ from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.settings import closure_method
 from drslamd.slam.tuning import DEFAULTS, Tuning
 from drslamd.timers import Action, Timers
+from drslamd.whereabouts import Whereabouts, whereabouts
 
 POLL_US = 10 * MILLISECOND_US
 """How finely the wheels that must be asked are asked; their driver knows its own rate."""
@@ -109,6 +113,8 @@ class Robot:
         self.health = Health()
         self.ports: dict[str, PortState] = {}
         self.network: NetworkState | None = None
+        self.save_fault = ""
+        """Why nothing is kept over a restart; empty while it is."""
         self.jobs = Jobs()
         self.timers = Timers(self._periods())
         self._saved_epochs = dict(epochs)
@@ -121,6 +127,7 @@ class Robot:
             NetworkState: self._on_network,
             Tick: self._on_tick,
             JobDone: self._on_job,
+            SaveDone: self._on_saved,
             Stop: self._on_stop,
         }
 
@@ -201,8 +208,10 @@ class Robot:
         return [*repeats, *self._take_turn(utime)]
 
     def _send_status(self, utime: int) -> list[Effect]:
-        clock = self.uwb.system_offset_us(utime)
-        return self.broadcast.heartbeat(self.neighbours(utime), clock, utime)
+        clock, where = self.uwb.system_offset_us(utime), self.whereabouts(utime)
+        status = self.broadcast.heartbeat(self.neighbours(utime), clock, where.state, utime)
+        # solutions come with news; that a pose grew old is said without any
+        return [*status, *(self.broadcast.pose(where, utime) if where.is_old else [])]
 
     def _send_odometry(self, utime: int) -> list[Effect]:
         return self.broadcast.odometry(self.neighbours(utime), utime)
@@ -223,6 +232,8 @@ class Robot:
         closures = self.front.tell_closures()
         if not (keyframe or ranges or closures):
             return []
+        if self.team.is_spent or (keyframe and not is_sayable(keyframe)):
+            return [Restart(self.own.epoch, "it has used up the numbers of its messages")]
         sends: list[Effect] = []
         keyframes = (keyframe,) if keyframe else ()
         for entry in self.team.entries(self.front.model, keyframes, ranges, closures):
@@ -259,7 +270,7 @@ class Robot:
         if self.jobs.is_busy(OPTIMIZER) or self.jobs.is_resting(OPTIMIZER, utime):
             return []
         talking = set(self.team.living(utime))
-        run = self.back.begin(self.team.present(utime), self.team.shifts(utime), talking, utime)
+        run = self.back.begin(self.team.present(utime), talking, utime)
         return [self.jobs.begin(Job(OPTIMIZER), run)] if run else []
 
     def _take_turn(self, utime: int) -> list[Effect]:
@@ -272,7 +283,7 @@ class Robot:
         return [*effects, *self._say(exchange.answers(utime, at_rest), utime)]
 
     def _say(self, public: list[PublicPoses], utime: int) -> list[Effect]:
-        return [send for poses in public for send in self.team.send_public(poses, utime)]
+        return [s for p in public if is_sayable(p) for s in self.team.send_public(p, utime)]
 
     def _on_job(self, event: JobDone) -> list[Effect]:
         job = self.jobs.finish(event)
@@ -284,7 +295,7 @@ class Robot:
             return []
         public = self._say(self.back.on_solution(event.result), event.utime)
         self.calibration.update(self.back.estimate, self.own.robot, self.front.pairs)
-        return [*self.broadcast.pose(self.pose(), event.utime), *public]
+        return [*self.broadcast.pose(self.whereabouts(event.utime), event.utime), *public]
 
     # ---- what we know of ourselves ----
 
@@ -301,6 +312,11 @@ class Robot:
         covariance = self.back.estimate.covariances[self.own.robot]
         return PoseNow(now * GRID_US, np.append(pose[:2], se2.wrap(pose[2])), covariance)
 
+    def whereabouts(self, utime: int) -> Whereabouts:
+        """What that pose is worth now."""
+        most_mps = self.config.wheels.max_speed_mps
+        return whereabouts(self.pose(), self.front.reckoning.track, most_mps, utime)
+
     def _check_health(self, utime: int) -> list[Effect]:
         self.team.forget_silent(utime)
         self.back.exchange.keep({peer.chain for peer in self.team.peers.values()})
@@ -310,12 +326,11 @@ class Robot:
         return [*notes, *self._restart_if_superseded(utime)]
 
     def _restart_if_superseded(self, utime: int) -> list[Effect]:
-        """Peers know a later start of ours, so our own memory was lost: begin above it."""
+        """Peers know a later start of ours: our own memory was lost, or a lie is believed."""
         above = self.team.superseded_by
         if above is None or self.team.is_own_id_used(utime):
             return []
-        fields = {"epoch": self.own.epoch, "known_to_peers": above}
-        return [Note(Level.WARNING, "epoch.superseded", fields), Restart(above + 1)]
+        return [Restart(above, "peers know a later start of this robot and refuse this one")]
 
     # ---- time passes, and ends ----
 
@@ -325,7 +340,7 @@ class Robot:
 
     def state(self) -> dict[str, Any]:
         """What must outlive this start."""
-        state = {"epoch": self.own.epoch, "epochs": self.team.seal.epochs}
+        state = {"epoch": self.own.epoch, "epochs": kept_epochs(self.team.seal.epochs)}
         return {**state, "calibration": self.calibration.latest.state()}
 
     def _save(self, utime: int) -> list[Effect]:
@@ -335,7 +350,12 @@ class Robot:
         self._saved_epochs = dict(self.team.seal.epochs)
         return [Save(self.state())]
 
+    def _on_saved(self, event: SaveDone) -> list[Effect]:
+        self.save_fault = event.fault
+        return []
+
     def _on_stop(self, event: Stop) -> list[Effect]:
-        goodbye = self.broadcast.make_status([], None, event.utime, leaving=True)
+        state = self.whereabouts(event.utime).state
+        goodbye = self.broadcast.make_status([], None, state, event.utime, leaving=True)
         sends = [self.team.send(goodbye, event.utime) for _ in range(GOODBYES)]
         return [*sends, Save(self.state())]

@@ -29,7 +29,7 @@ def test_everything_is_looked_after_from_the_sensors_to_the_budget() -> None:
     scene = RobotScene()
     keys = [key for key, _ in conditions(scene.robot, scene.utime)]
     team = [key for key in keys if key.startswith("team.")]
-    assert keys == ["uwb", "wheels", "network", *team, "pose", "load", "budget"]
+    assert keys == ["uwb", "wheels", "network", *team, "pose", "load", "budget", "state"]
     assert len(team) >= 4
 
 

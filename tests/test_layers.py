@@ -24,6 +24,7 @@ RINGS = {
         "gossip",
         "timers",
         "jobs",
+        "whereabouts",
         "broadcast",
         "health",
         "diagnosis",
@@ -32,7 +33,7 @@ RINGS = {
         "status_text",
     ],
     "shell": ["io"],
-    "entry": ["daemon", "cli", "__main__"],
+    "entry": ["parts", "daemon", "cli", "__main__"],
 }
 """From the inside out; a module imports only from its own ring and those before it."""
 

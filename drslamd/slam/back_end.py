@@ -15,7 +15,6 @@ from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
-from drslamd.slam.graph.thinning import Thinning
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.rbcd import lifted_neighbours
 from drslamd.slam.optimizer.rbcd.pose_exchange import PoseExchange
@@ -50,8 +49,7 @@ class BackEnd:
         self._optimizer = settings.optimizer(config, own, tuning)
         self._takes_turns = config.optimizer.algorithm == "rbcd"
         self.exchange = PoseExchange(own)
-        self.graph = PoseGraph()
-        self._thinning = Thinning(self.graph)
+        self.graph = PoseGraph(tuning.recent_s)
         self.history = History()
         self.group: set[Segment] = set()
         self.estimate: TeamEstimate | None = None
@@ -60,7 +58,6 @@ class BackEnd:
 
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
         self.graph.insert(origin, entry)
-        self._thinning.after(origin.robot)
         self._inserted += 1
 
     def digest(self) -> int:
@@ -80,11 +77,7 @@ class BackEnd:
             self.estimate = self._anchored(self.estimate)
 
     def begin(
-        self,
-        present: set[int],
-        shift_us: dict[int, int],
-        talking: Set[int] = frozenset(),
-        utime: int = 0,
+        self, present: set[int], talking: Set[int] = frozenset(), utime: int = 0
     ) -> Job | None:
         """Begin to renew the estimate; None when nothing is new or connected.
 
@@ -93,7 +86,6 @@ class BackEnd:
 
         Args:
             present: robots that live.
-            shift_us: clock of each robot minus ours, us.
             talking: those of them that hear us as we hear them.
         """
         now = _Known(self._inserted, frozenset(present), self.exchange.news)
@@ -102,20 +94,19 @@ class BackEnd:
             return None
         if self._takes_turns and not self.exchange.begin(self._neighbours(talking), utime):
             return None
-        data = self.graph.chains.get(self._own.robot)
-        if data is None or not len(data.keyframes):
+        chain = self.graph.view.chains.get(self._own.robot)
+        if chain is None:
             self._known = now
             return None
-        current = Segment(*self._own, int(data.keyframes.segment[-1]))
+        current = Segment(*self._own, int(chain.keyframes.segment[-1]))
         groups = [group for group in team_frame.groups(self.graph) if current in group]
         self.group = groups[0] if groups else set()
         gauge = team_frame.gauge_segment(self.group, present)
         if gauge is None:
             self.estimate, self._known = None, now
             return None
-        group = Group(self.group, gauge, {**shift_us, self._own.robot: 0})
         same = self.exchange.held(gauge.chain)
-        job = self._optimizer.job(self.graph, group, self.estimate, same)
+        job = self._optimizer.job(self.graph, Group(self.group, gauge), self.estimate, same)
         if job is None:
             self.exchange.wait(utime)
             return None

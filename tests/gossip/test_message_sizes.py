@@ -10,7 +10,7 @@ from drslamd.config import OptimizerSection
 from drslamd.conventions import Chain
 from drslamd.events import ChannelMessage, Send
 from drslamd.gossip import lc02, messages
-from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose
+from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose, PoseState
 from drslamd.gossip.team import MEASUREMENTS_PER_ENTRY, Team
 from drslamd.slam.graph.measurements import ClosureMeasurement, Keyframe, RangeMeasurement
 from drslamd.slam.graph.public_poses import PublicPoses
@@ -44,7 +44,8 @@ def test_a_full_batch_of_odometry_has_955_bytes() -> None:
 
 
 def test_a_pose_has_94_bytes() -> None:
-    assert len(messages.encode(HEADER, Pose(1, 3, 11, 0))) == 8 + 31 + 19 + 12 + 24 == 94
+    pose = Pose(PoseState.LOCALISED, 3, 11, 0)
+    assert len(messages.encode(HEADER, pose)) == 8 + 31 + 19 + 12 + 24 == 94
 
 
 def test_an_entry_with_one_keyframe_has_70_bytes() -> None:

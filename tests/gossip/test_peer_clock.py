@@ -243,3 +243,16 @@ def test_the_radio_alone_is_not_believed() -> None:
     found = clock.offset(T0)
     assert found is not None
     assert found.source == "one way"
+
+
+@pytest.mark.parametrize("lie", [-3600 * SECOND, 3600 * SECOND])
+def test_what_a_peer_says_of_our_messages_makes_its_clock_as_uncertain_as_it_is_wrong(
+    lie: int,
+) -> None:
+    """Both delays together are never less than nothing."""
+    talk = Conversation(50 * SECOND)
+    talk.talk(5)
+    talk.ours.echoed((lie, talk.now))
+    found = talk.found()
+    assert abs(found.us - talk.offset()) <= found.uncertainty_us
+    assert found.uncertainty_us > 1000 * SECOND

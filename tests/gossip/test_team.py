@@ -91,6 +91,17 @@ def test_a_log_entry_says_nothing_of_whether_its_origin_lives() -> None:
     assert team.logs.next_states() == (LogState(3, 1, 0, 1, 1),)
 
 
+@pytest.mark.parametrize(("newest", "taken"), [(3_977, True), (3_976, False)])
+def test_an_entry_far_from_what_we_hold_is_taken_when_any_status_speaks_of_its_log(
+    newest: int, taken: bool
+) -> None:
+    """A newcomer may hear an old robot through others only."""
+    team = a_team()
+    tell(team, a_seal(4), hearing(logs=(LogState(3, 1, 0, newest, newest),)))
+    assert tell(team, a_seal(3), an_entry(5_000, 1)) == taken
+    assert dict(team.refused) == ({} if taken else {"entry far ahead of its log": 1})
+
+
 def test_a_log_entry_is_handed_out_once_whoever_sends_it() -> None:
     team, event = a_team(), ChannelMessage(T0, *sealed(a_seal(3), an_entry(0, 1)))
     assert team.receive(event) is not None
@@ -102,7 +113,7 @@ def test_a_robot_that_starts_again_is_a_new_peer() -> None:
     team = a_team()
     tell(team, a_seal(3, epoch=5), kinds()["ODOMETRY"])
     tell(team, a_seal(3, epoch=5), an_entry(0, 1))
-    assert tell(team, a_seal(3, epoch=6), a_status())
+    assert tell(team, a_seal(3, epoch=6), a_status(), T0 + 3 * SECOND)
     assert team.peers[3].chain == Chain(3, 6)
     assert len(team.peers[3].track) == 0
     assert team.logs.next_states() == (LogState(3, 6, 0, 0, 0),)
@@ -279,12 +290,6 @@ def test_a_module_moves_with_its_robot_once_the_last_owner_is_silent() -> None:
     assert dict(team.conditions(T0 + 5 * SECOND))["team.uwb_id"] is None
 
 
-def test_clocks_of_peers_are_told_as_shifts() -> None:
-    team = a_team()
-    team.receive(ChannelMessage(T0, *sealed(a_seal(3), hearing(OWN), T0 + 5 * SECOND)))
-    assert team.shifts(T0) == {3: 2_500_000}
-
-
 PERIOD = 2**32 * MS
 
 
@@ -294,7 +299,6 @@ def test_radio_clocks_are_compared_modulo_their_period(wrap: int) -> None:
     status = a_status((Heard(*OWN, 8 * SECOND + 9 * MS),), uwb_clock_us=50 * SECOND + wrap)
     team.receive(ChannelMessage(T0, *sealed(a_seal(3), status, T0 + 8 * SECOND - 1 * MS)))
     team.compare_radio_clocks(42 * SECOND, T0)
-    assert team.shifts(T0) == {3: 8 * SECOND}
     assert team.peers[3].neighbour(OWN, T0).ahead_us == 8 * SECOND
 
 
@@ -324,28 +328,15 @@ def test_what_a_silent_peer_said_of_its_radio_clock_is_not_taken_for_fresh() -> 
 # ---- our own id and epoch ----------------------------------------------------------------------
 
 
-def test_a_peer_that_heard_a_later_start_of_ours_says_that_we_are_superseded() -> None:
-    for status in (hearing(Chain(1, 12)), hearing(logs=(LogState(1, 12, 0, 0, 0),))):
-        team = a_team()
-        tell(team, a_seal(3), status)
-        assert team.superseded_by == 12
-
-
-@pytest.mark.parametrize("epoch", [9, 10])
-def test_a_peer_that_heard_this_start_or_an_earlier_one_says_nothing_of_the_kind(
-    epoch: int,
-) -> None:
-    team = a_team()
-    tell(team, a_seal(3), hearing(Chain(1, epoch), logs=(LogState(1, epoch, 0, 0, 0),)))
-    assert team.superseded_by is None
-
-
 def test_a_robot_that_lost_its_memory_learns_its_last_epoch_after_any_silence() -> None:
     peer = Team(a_seal(3))
     tell(peer, a_seal(1, epoch=12), a_status(), T0)
     team = a_team()
-    status = a_status(peer.next_heard(T0 + 60 * SECOND), peer.logs.next_states())
-    tell(team, a_seal(3), status, T0 + 60 * SECOND)
+    for seconds in (60, 63):
+        utime = T0 + seconds * SECOND
+        status = a_status(peer.next_heard(utime), peer.logs.next_states())
+        assert team.superseded_by is None
+        tell(team, a_seal(3, epoch=seconds), status, utime)
     assert team.superseded_by == 12
 
 

@@ -9,7 +9,15 @@ import numpy as np
 
 from drslamd.conventions import Chain
 from drslamd.gossip import messages
-from drslamd.gossip.message_types import Heard, LogState, Message, OdometryBatch, Pose, Status
+from drslamd.gossip.message_types import (
+    Heard,
+    LogState,
+    Message,
+    OdometryBatch,
+    Pose,
+    PoseState,
+    Status,
+)
 from drslamd.gossip.seal import Header, Seal, team_key
 from drslamd.slam.graph.measurements import (
     ClosureMeasurement,
@@ -45,7 +53,8 @@ def a_status(
     uwb_clock_us: int = messages.UNKNOWN_CLOCK,
     ranged: tuple[int, ...] = (),
 ) -> Status:
-    return Status(0, 3, leaving, uwb_id, uwb_clock_us, 99, heard, ranged, logs)
+    state, frame, graph_hash = PoseState.NOT_LOCALISED, 3, 99
+    return Status(state, frame, leaving, uwb_id, uwb_clock_us, graph_hash, heard, ranged, logs)
 
 
 def an_entry(seq: int, *keyframes: int) -> GraphEntry:
@@ -59,7 +68,7 @@ def one_of_each_kind() -> list[Message]:
     lifted = (np.arange(12) + 1j * np.arange(12, 24)).reshape(3, 4)
     return [
         Status(
-            1,
+            PoseState.LOCALISED,
             3,
             True,
             70_000,
@@ -77,7 +86,7 @@ def one_of_each_kind() -> list[Message]:
             (RangeMeasurement(40, peer, 41, (0.25, 0.0), (-0.125, 0.5), 3.5, 0.125),),
             (ClosureMeasurement(8, True, 40, peer, 41, (1.5, -2.5, 0.25), COVARIANCE),),
         ),
-        Pose(1, 3, 11, 4_000_000, (1.25, -2.5, 3.0), COVARIANCE),
+        Pose(PoseState.LOCALISED, 3, 11, 4_000_000, (1.25, -2.5, 3.0), COVARIANCE),
         PublicPoses(3, 11, 2, (40, 50), lifted),
     ]
 

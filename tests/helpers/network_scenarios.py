@@ -12,7 +12,7 @@ from transport_helpers import GROUP, Ear, native, running, section, spoken_until
 from drslamd.config import GossipSection
 from drslamd.events import ChannelMessage
 from drslamd.gossip import lc02, messages
-from drslamd.gossip.message_types import Pose
+from drslamd.gossip.message_types import Pose, PoseState
 from drslamd.gossip.seal import Seal, team_key
 from drslamd.gossip.team import Team
 from drslamd.io.clock import MonotonicClock
@@ -248,7 +248,7 @@ async def lcm_logger_records_what_we_say(folder: str) -> None:
     route_to_the_group()
     where, log = section("lo"), Path(folder) / "team.lcmlog"
     speaker, listener = (Team(Seal(team_key(None), robot, 1, {})) for robot in (3, 4))
-    poses = [Pose(1, 3, 1, number, (1.0, 2.0, 3.0)) for number in range(20)]
+    poses = [Pose(PoseState.LOCALISED, 3, 1, number, (1.0, 2.0, 3.0)) for number in range(20)]
     transport, ear = native(where)
     # the program itself, which the console script of the same name would only start
     logger = await asyncio.create_subprocess_exec(

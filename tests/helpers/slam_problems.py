@@ -12,6 +12,7 @@ from drslamd.slam.optimizer.banded.normal_equations import GAUGE_SIGMA, System
 from drslamd.slam.optimizer.problem import (
     BetweenFactors,
     Calibration,
+    CarriedEnds,
     OdometryFactors,
     Priors,
     Problem,
@@ -67,7 +68,7 @@ def team_problem(
 
     Pose robots * k + r is keyframe k of robot r. Each pair has its ranges, between antennas off
     the middle, wrong by `near_bias` where they are near; neighbouring poses of a robot have their
-    odometry, wrong by `scale` and `yaw`.
+    odometry, wrong by `scale` and `yaw`. Each third range was carried by such odometry.
     """
     rng = np.random.default_rng(seed)
     paths = [wander(rng, count, 0.4) for _ in range(robots)]
@@ -83,7 +84,8 @@ def team_problem(
         bend = yaw[r] * path[k]
         x, y = (1 + scale[r]) * measured[k, :2]
         measured[k] = [x - bend / 2 * y, y + bend / 2 * x, measured[k, 2] + bend]
-    odometry = OdometryFactors(odometry.i, odometry.j, measured, odometry.covariance, robot, path)
+    by_yaw = np.stack([-path / 2 * measured[:, 1], path / 2 * measured[:, 0], path], axis=-1)
+    odometry = OdometryFactors(odometry.i, odometry.j, measured, odometry.covariance, robot, by_yaw)
     names = [(a, b) for a in range(robots) for b in range(a + 1, robots)]
     rows = []
     q = rng.normal(0, 0.2, (robots, 2))
@@ -110,6 +112,7 @@ def team_problem(
         table[:, 6] + range_error * rng.normal(size=len(table)),
         np.full(len(table), 0.05),
         table[:, 7].astype(int),
+        carried_ends(seed, table, robots, scale, yaw),
     )
     joined = [(robots * k, robots * k + 1) for k in np.linspace(1, count - 2, closures).astype(int)]
     priors = Priors(
@@ -127,6 +130,24 @@ def team_problem(
         priors,
     )
     return problem, truth
+
+
+def carried_ends(
+    seed: int,
+    table: Array,
+    robots: int,
+    scale: tuple[float, ...],
+    yaw: tuple[float, ...],
+) -> CarriedEnds:
+    """Each third range of a table (m, 6 or more) of i, j, q_i and q_j: how its points move; in the
+    table they are made wrong by the constants of their robots."""
+    rows = np.arange(1, len(table), 3)
+    whose = table[rows, :2].astype(int) % robots
+    moves = np.random.default_rng(seed).normal(0, [[1.0], [0.3]], (len(rows), 2, 2, 2))
+    for row, (a, b), move in zip(rows, whose, moves, strict=True):
+        for robot, at, by in ((a, slice(2, 4), move[0]), (b, slice(4, 6), move[1])):
+            table[row, at] += yaw[robot] * by[0] + scale[robot] * by[1]
+    return CarriedEnds(rows, whose, moves)
 
 
 # ---- the same written once more, plainly -------------------------------------------------------
@@ -156,16 +177,25 @@ def residual_vector(problem: Problem, x: Array, robust: bool = True) -> Array:
     odometry = problem.odometry
     for m in range(len(odometry)):
         mx, my, mt = odometry.measured[m]
-        s, b = scale[odometry.robot[m]], yaw[odometry.robot[m]] * odometry.path[m]
-        right = ((1 - s) * mx + b / 2 * my, (1 - s) * my - b / 2 * mx, mt - b)
+        s, bend = scale[odometry.robot[m]], yaw[odometry.robot[m]] * odometry.by_yaw[m]
+        right = ((1 - s) * mx - bend[0], (1 - s) * my - bend[1], mt - bend[2])
         out += whitened(poses[odometry.i[m]], poses[odometry.j[m]], right, odometry.covariance[m])
     closures = problem.closures
     for m in range(len(closures)):
         ends = poses[closures.i[m]], poses[closures.j[m]]
         out += whitened(*ends, closures.measured[m], closures.covariance[m])
     r = problem.ranges
+    arms = [[*r.q_i[m], *r.q_j[m]] for m in range(len(r))]
+    for row, (a, b), ((a_yaw, a_scale), (b_yaw, b_scale)) in zip(
+        r.carried.rows, r.carried.robots, r.carried.moves, strict=True
+    ):
+        for axis in range(2):
+            arms[row][axis] -= yaw[a] * a_yaw[axis] + scale[a] * a_scale[axis]
+            arms[row][2 + axis] -= yaw[b] * b_yaw[axis] + scale[b] * b_scale[axis]
     for m in range(len(r)):
-        i, j = (product(poses[k], (*q, 0)) for k, q in ((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m])))
+        i, j = (
+            product(poses[k], (*q, 0)) for k, q in ((r.i[m], arms[m][:2]), (r.j[m], arms[m][2:]))
+        )
         wrong = bias[r.pair[m]] + near_bias[0] * math.exp(-r.measured[m] / LINKTRACK.near_reach_m)
         e = (math.hypot(*(j - i)[:2]) + wrong - r.measured[m]) / r.sigma[m]
         out.append(cauchy_root(e, LINKTRACK.cauchy_sigmas) if robust else e)

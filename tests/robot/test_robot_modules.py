@@ -181,7 +181,7 @@ def test_module_3_runs_once_at_a_time_and_rests_too(
     assert bool(solves(scene.tick(1), OPTIMIZER)) is goes_on
 
 
-def test_module_3_is_told_who_lives_what_their_clocks_say_and_their_public_poses(
+def test_module_3_is_told_who_lives_and_their_public_poses(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     scene, told = RobotScene(), list[tuple[object, ...]]()
@@ -191,7 +191,7 @@ def test_module_3_is_told_who_lives_what_their_clocks_say_and_their_public_poses
     public = PublicPoses(0, 1, 2, (10,), np.ones((2, 4), dtype=complex))
     scene.hear(4, public)
     assert solves(scene.tick(), OPTIMIZER) == []
-    assert told == [({0, 4}, {4: 0, 5: 0}, {4: public})]
+    assert told == [({0, 4}, {4: public})]
 
 
 def test_each_module_runs_at_its_configured_rate(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from slam_scenes import CLOCKS, SmallTeam, closure, config, keyframes, same_pose, small_team, wander
+from slam_scenes import SmallTeam, closure, config, keyframes, same_pose, small_team, wander
 
 from drslamd.conventions import Chain, Segment
 from drslamd.slam.back_end import BackEnd
@@ -61,7 +61,7 @@ def back_end(team: SmallTeam, robot: int = 0) -> tuple[BackEnd, Asked]:
 def begin(
     back: BackEnd, present: set[int] = EVERYBODY, public: Mapping[int, PublicPoses] | None = None
 ) -> Job | None:
-    return back.begin(present, {1: 7, 2: 9}, public or {})
+    return back.begin(present, public or {})
 
 
 def settled(team: SmallTeam, robot: int = 0) -> tuple[BackEnd, Asked]:
@@ -116,11 +116,6 @@ def test_public_poses_of_a_peer_are_news_each_time_that_they_come(team: SmallTea
         assert begin(back, public=public) is None
 
 
-def test_clocks_are_no_news(team: SmallTeam) -> None:
-    back, _ = settled(team)
-    assert back.begin(EVERYBODY, {1: 8, 2: 10}, {}) is None
-
-
 @pytest.mark.parametrize("converged", [True, False])
 def test_what_has_not_converged_goes_on_without_news(team: SmallTeam, converged: bool) -> None:
     back, asked = settled(team)
@@ -139,7 +134,6 @@ def test_a_job_is_of_the_group_of_our_current_segment(team: SmallTeam) -> None:
     back, asked = back_end(team, robot=1)
     assert begin(back) is not None
     assert back.group == asked.groups[0].members == FIRST
-    assert asked.groups[0].shift_us == {1: 0, 2: 9}
 
 
 @pytest.mark.parametrize(("present", "frame"), [({0, 1, 2}, 0), ({1, 2}, 1)])
@@ -187,7 +181,7 @@ def test_the_answer_of_the_default_optimiser_says_where_everybody_was(team: Smal
     back = BackEnd(config(), team.chains[0])
     for origin, entry in team.entries:
         back.insert(origin, entry)
-    run = back.begin(EVERYBODY, CLOCKS, {})
+    run = back.begin(EVERYBODY, {})
     assert run is not None
     back.on_solution(run())
     own = back.trajectory(0)
@@ -246,8 +240,9 @@ def test_without_a_relaxation_or_without_carriers_nothing_is_told(team: SmallTea
     assert back.public_poses() is None
 
 
-def test_the_graph_is_thinned_as_it_grows() -> None:
+def test_what_is_solved_is_thinned_and_what_was_said_is_held() -> None:
     back = BackEnd(config(), Chain(0, 10))
     path = wander(np.random.default_rng(1), 900)
     back.insert(Chain(0, 10), GraphEntry(0, keyframes=keyframes(range(0, 9000, 10), path)))
-    assert len(back.graph.chains[0].keyframes) < 600
+    assert len(back.graph.chains[0].keyframes) == 900
+    assert len(back.graph.view.chains[0].keyframes) < 600

@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from drslamd.conventions import MAX_ROBOT_ID
+from drslamd.conventions import MAX_ROBOT_ID, ROBOT_NAMES
 from drslamd.sensors.samples import Motion
 from drslamd.slam.calibration.window_calibration import remaining
 from drslamd.slam.graph.estimate import Learned
@@ -105,7 +105,7 @@ def is_sound(state: object) -> bool:
     return (
         isinstance(biases, dict)
         and len(biases) <= MAX_BIASES
-        and all(peer.isdecimal() and int(peer) <= MAX_ROBOT_ID for peer in biases)
+        and biases.keys() <= ROBOT_NAMES
         and all(is_value(value, MOST_BIAS_M) for value in biases.values())
         and ("scale" not in state or is_value(state["scale"], MOST_SCALE_ERROR))
         and ("yaw_rad_per_m" not in state or is_value(state["yaw_rad_per_m"], MOST_YAW_RATE))

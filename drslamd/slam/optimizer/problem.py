@@ -68,11 +68,39 @@ class OdometryFactors(BetweenFactors):
 
     Attributes:
         robot: (m,) the robot whose calibration applies, as the problem numbers them.
-        path: (m,) metres.
+        by_yaw: (m, 3) how `measured` moves with the constant yaw rate, per rad/m, over the way that
+            was driven; its last column is how long that is.
     """
 
     robot: Index
-    path: Array
+    by_yaw: Array
+
+
+@dataclass(frozen=True)
+class CarriedEnds:
+    """Of ranges that odometry brought to other poses, whose ends move with its constants.
+
+    Attributes:
+        rows: (c,) which ranges, ascending.
+        robots: (c, 2) whose poses i and j are, as the problem numbers them.
+        moves: (c, 2, 2, 2) m: how q_i and q_j (second axis) move with the yaw rate (per rad/m) and
+            the scale of that robot (third axis).
+    """
+
+    rows: Index
+    robots: Index
+    moves: Array
+
+    @staticmethod
+    def none() -> CarriedEnds:
+        empty = np.zeros(0, dtype=np.int64)
+        return CarriedEnds(empty, empty.reshape(0, 2), np.zeros((0, 2, 2, 2)))
+
+    def chosen(self, which: NDArray[np.bool_]) -> CarriedEnds:
+        """Those of the ranges `which` (m,)."""
+        stay = which[self.rows]
+        place = np.cumsum(which) - 1
+        return CarriedEnds(place[self.rows[stay]], self.robots[stay], self.moves[stay])
 
 
 @dataclass(frozen=True)
@@ -83,6 +111,7 @@ class RangeFactors:
         q_i, q_j: (m, 2) between which points, in the frames of poses i and j, m.
         measured, sigma: (m,) m.
         pair: (m,) the pair of robots whose bias applies, as the problem numbers them.
+        carried: those of them whose points move with the constants of odometry.
     """
 
     i: Index
@@ -92,13 +121,37 @@ class RangeFactors:
     measured: Array
     sigma: Array
     pair: Index
+    carried: CarriedEnds = field(default_factory=CarriedEnds.none)
 
     def __len__(self) -> int:
         return len(self.i)
 
     def chosen(self, which: NDArray[np.bool_]) -> RangeFactors:
-        columns = (self.i, self.j, self.q_i, self.q_j, self.measured, self.sigma, self.pair)
-        return RangeFactors(*(column[which] for column in columns))
+        return RangeFactors(
+            i=self.i[which],
+            j=self.j[which],
+            q_i=self.q_i[which],
+            q_j=self.q_j[which],
+            measured=self.measured[which],
+            sigma=self.sigma[which],
+            pair=self.pair[which],
+            carried=self.carried.chosen(which),
+        )
+
+    @property
+    def is_carried(self) -> NDArray[np.bool_]:
+        """(m,)"""
+        out = np.zeros(len(self), dtype=bool)
+        out[self.carried.rows] = True
+        return out
+
+    def arms(self, calibration: Calibration) -> tuple[Array, Array]:
+        """q_i and q_j (m, 2), yaw rate and scale taken out."""
+        ends, carried = np.stack([self.q_i, self.q_j]), self.carried
+        constants = np.stack([calibration.yaw, calibration.scale], axis=-1)[carried.robots]
+        moved = (constants[..., None] * carried.moves).sum(axis=2)
+        ends[:, carried.rows] -= np.swapaxes(moved, 0, 1)
+        return ends[0], ends[1]
 
 
 @dataclass(frozen=True)
@@ -198,11 +251,11 @@ def pose_errors(poses: Array, factors: BetweenFactors, measured: Array) -> Array
 
 
 def corrected(odometry: OdometryFactors, calibration: Calibration) -> Array:
-    """(m, 3) odometry with scale and yaw rate taken out; the bend acts over half of the way."""
-    x, y, theta = odometry.measured.T
-    keep = 1 - calibration.scale[odometry.robot]
-    bend = calibration.yaw[odometry.robot] * odometry.path
-    return np.stack([keep * x + bend / 2 * y, keep * y - bend / 2 * x, theta - bend], axis=-1)
+    """(m, 3) odometry with scale and yaw rate taken out."""
+    scale, yaw = calibration.scale[odometry.robot], calibration.yaw[odometry.robot]
+    out = odometry.measured - yaw[:, None] * odometry.by_yaw
+    out[:, :2] -= scale[:, None] * odometry.measured[:, :2]
+    return np.asarray(out)
 
 
 def range_errors(
@@ -211,7 +264,7 @@ def range_errors(
     """Errors (m,), unit line of sight from i to j in w (m,), and both arms in w (m,); x + iy."""
     arm_i, arm_j = (
         np.exp(1j * poses[k, 2]) * (q[:, 0] + 1j * q[:, 1])
-        for k, q in ((ranges.i, ranges.q_i), (ranges.j, ranges.q_j))
+        for k, q in zip((ranges.i, ranges.j), ranges.arms(calibration), strict=True)
     )
     place = poses[:, 0] + 1j * poses[:, 1]
     sight = place[ranges.j] + arm_j - place[ranges.i] - arm_i

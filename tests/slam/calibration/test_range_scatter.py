@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from slam_scenes import BANDED, CLOCKS, NOISE, group_of, small_team
+from slam_scenes import BANDED, NOISE, group_of, small_team
 
 from drslamd.slam.calibration.range_scatter import PLAIN, PRIOR_RANGES, scatter_ratios
 from drslamd.slam.se2 import Array, Index
@@ -72,7 +72,7 @@ def test_a_pair_that_is_doubted_always_scatters_as_it_does(sent: float) -> None:
 def test_module_3_finds_how_much_the_ranges_of_each_pair_scatter(true: float) -> None:
     """0.10 m is configured; with the odometry of a drive they are told apart."""
     team = small_team(7, count=200, range_sigma=true, noise=NOISE)
-    group = group_of(team.graph, CLOCKS)
+    group = group_of(team.graph)
     estimate = BANDED.job(team.graph, group, None, {})()
     assert set(estimate.scatter) == {(0, 1), (0, 2), (1, 2)}
     count, prior = 200, PRIOR_RANGES

@@ -50,7 +50,7 @@ def team_of(*joined: tuple[Chain, Chain], breaks: tuple[Chain, ...] = ()) -> Pos
 def in_frame(graph: PoseGraph, members: set[Segment], frame: Segment) -> Group:
     known = {Segment(*c.chain, int(s)) for c in graph.chains.values() for s in c.keyframes.segment}
     assert members <= known
-    return Group(members, frame, {})
+    return Group(members, frame)
 
 
 # ---- groups ----
@@ -117,7 +117,7 @@ def exact(robots: int = 3) -> tuple[PoseGraph, Group, dict[int, Array]]:
     members = {Segment(*chain, 0) for chain in team.chains.values()}
     origin = inverted(team.truth[0][0])
     truth = {r: np.array([product(origin, p) for p in path]) for r, path in team.truth.items()}
-    return team.graph, Group(members, Segment(*team.chains[0], 0), {}), truth
+    return team.graph, Group(members, Segment(*team.chains[0], 0)), truth
 
 
 def as_estimate(group: Group, graph: PoseGraph, poses: dict[int, Array]) -> TeamEstimate:
@@ -167,7 +167,7 @@ def test_new_keyframes_follow_the_solved_ones_by_odometry() -> None:
 def test_a_new_frame_carries_all_poses_over() -> None:
     graph, group, truth = exact()
     before = as_estimate(group, graph, {r: p + [0.1, 0.1, 0.0] for r, p in truth.items()})
-    other = Group(group.members, Segment(*graph.chains[1].chain, 0), {})
+    other = Group(group.members, Segment(*graph.chains[1].chain, 0))
     start = placed(graph, other, before)
     # robot 1 is now at its own odometry, and nobody moved against it
     assert same_pose(start[other.frame][0], graph.chains[1].keyframes.poses[0], 1e-9)
@@ -200,7 +200,7 @@ def test_an_earlier_start_of_the_new_frame_s_robot_carries_nothing_over() -> Non
     before = as_estimate(group, graph, {r: p + [3.0, 3.0, 1.0] for r, p in truth.items()})
     old = before.trajectories[1]
     before.trajectories[1] = Trajectory(Chain(1, 1), old.n, old.poses + [9.0, 9.0, 0.0])
-    other = Group(group.members, Segment(*graph.chains[1].chain, 0), {})
+    other = Group(group.members, Segment(*graph.chains[1].chain, 0))
     start, afresh = placed(graph, other, before), placed(graph, other, None)
     for member, poses in start.items():
         assert np.array_equal(poses, afresh[member])
@@ -247,5 +247,5 @@ def test_keyframes_follow_the_nearest_that_is_known() -> None:
 def test_joints_name_the_segments_that_they_join() -> None:
     graph = team_of((A, B), breaks=(B,))
     graph.insert(A, GraphEntry(9, closures=(closure(5, 70, B, 70, (1, 0, 0)),)))
-    names = [(a, b) for _, a, b in team_frame.joints(graph)]
-    assert names == [(segment(A), segment(B, 0)), (segment(A), segment(B, 1))]
+    found = [(j.a, j.b, j.closures.number.tolist()) for j in team_frame.joints(graph)]
+    assert found == [(segment(A), segment(B, 0), [0]), (segment(A), segment(B, 1), [5])]

@@ -72,7 +72,7 @@ def test_scale_shortens_a_link_and_yaw_rate_bends_it_over_half_of_the_way() -> N
         np.array([[*chord[:2], turn], [*chord[:2], turn]]),
         np.tile(np.eye(3), (2, 1, 1)),
         robot=np.array([0, 1]),
-        path=np.array([way, way]),
+        by_yaw=np.tile([-way / 2 * chord[1], way / 2 * chord[0], way], (2, 1)),
     )
     known = Calibration(np.zeros(0), np.array([0.0, scale]), np.array([0.0, yaw]), np.zeros(1))
     right = corrected(odometry, known)

@@ -164,7 +164,7 @@ class _Member:
         self.back, self.exchange, self._robots = back, back.exchange, robots
 
     def begin(self, utime: int) -> Job | None:
-        return self.back.begin(self._robots, dict.fromkeys(self._robots, 0), self._robots, utime)
+        return self.back.begin(self._robots, self._robots, utime)
 
     def on_solution(self, result: TeamEstimate) -> list[PublicPoses]:
         return self.back.on_solution(result)

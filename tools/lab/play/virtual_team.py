@@ -9,6 +9,7 @@ import numpy as np
 
 from drslamd import report
 from drslamd.gossip import messages
+from drslamd.gossip.message_types import PoseState
 from drslamd.slam.tuning import DEFAULTS, Tuning
 from lab.play.playback import Hardware, equip, robot_config
 from lab.play.simulator import Clock, Member, Network, Simulator
@@ -120,7 +121,7 @@ def _live(member: Member) -> Path:
     for _, channel, payload in member.traces.sent:
         if messages.kind_of_channel(channel) == "POSE":
             message = messages.decode("POSE", payload)
-            if isinstance(message, messages.Pose) and message.state:
+            if isinstance(message, messages.Pose) and message.state == PoseState.LOCALISED:
                 t = member.clock.world(message.pose_utime) / 1e6
                 rows.append([t, *message.pose, message.frame])
     return live_path(rows)

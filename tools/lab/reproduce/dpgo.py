@@ -18,6 +18,7 @@ from scipy.sparse.linalg import spsolve
 from drslamd.conventions import ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import Keyframe
+from drslamd.slam.graph.thinning.chain_view import ChainView, whole
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.optimizer.factors import chain_links
 from drslamd.slam.optimizer.problem import BetweenFactors
@@ -39,14 +40,14 @@ class Graph:
     edges: ComplexFactors
 
 
-def chain(odometry: Array, robot: int) -> ChainData:
+def chain(odometry: Array, robot: int) -> ChainView:
     """Dead-reckoned poses (n, 3) as keyframes."""
     items = ChainData(Chain(robot, 1))
     items.model = RobotModel(NOISE)
     steps = np.array([TRANSLATION_STEP_M, TRANSLATION_STEP_M, ROTATION_STEP_RAD])
     for n, (x, y, theta) in enumerate(np.round(odometry / steps).astype(int).tolist()):
         items.add(Keyframe(n, 0, x, y, theta))
-    return items
+    return whole(items)
 
 
 def graph(odometry: dict[int, Array], kept: dict[tuple[int, int], Closures]) -> Graph:

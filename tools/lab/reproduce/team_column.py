@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from drslamd.gossip import messages
+from drslamd.gossip.message_types import PoseState
 from drslamd.slam import se2
 from lab.play import virtual_team
 from lab.play.simulator import Simulator
@@ -99,7 +100,7 @@ def published(tally: Tally, recording: Recording, simulator: Simulator) -> None:
             if messages.kind_of_channel(channel) != "POSE":
                 continue
             message = messages.decode("POSE", payload)
-            if not isinstance(message, messages.Pose) or not message.state:
+            if not isinstance(message, messages.Pose) or message.state != PoseState.LOCALISED:
                 continue
             t = np.array([member.clock.world(message.pose_utime) / 1e6])
             origin = recording.trails[message.frame].truth[0]

@@ -90,9 +90,9 @@ def build_problem(
     graph: PoseGraph, group: Group, previous: TeamEstimate | None, numbers: BandedOptimizer
 ) -> TeamProblem:
     """Number the group's poses by time and collect its factors."""
-    places = factors.numbering(graph, group.members, group.shift_us)
+    places = factors.numbering(graph, group.members)
     robots = sorted({s.robot for s in group.members})
-    chains = [graph.chains[robot] for robot in robots]
+    chains = [graph.view.chains[robot] for robot in robots]
     ranges, pairs = factors.ranges(graph, places)
     closures = factors.closures(graph, places)
     hints = replace(closures, covariance=closures.covariance + HINT * np.eye(3))

@@ -11,6 +11,7 @@ from drslamd.slam.optimizer.problem import (
     BetweenFactors,
     Calibration,
     Problem,
+    RangeFactors,
     corrected,
     pose_errors,
     range_errors,
@@ -109,18 +110,21 @@ class Equations:
             layout, np.hstack([poses[odometry.i], poses[odometry.j], sensors])
         )
         self._closures = _Assembly(layout, np.hstack([poses[closures.i], poses[closures.j]]))
-        shared = np.tile(layout.near_bias, (len(ranges), 1))
-        self._ranges = _Assembly(
-            layout,
-            np.column_stack([poses[ranges.i], poses[ranges.j], layout.bias[ranges.pair], shared]),
-        )
+        # only ranges that odometry has carried depend on its constants
+        carried = ranges.is_carried
+        self._ranges = [
+            (part, _Assembly(layout, _unknowns_of_ranges(layout, part)))
+            for part in (ranges.chosen(~carried), ranges.chosen(carried))
+            if len(part)
+        ]
 
     def at(self, poses: Array, calibration: Calibration) -> System:
         """Sum of J' W J and J' W e over all factors and priors."""
         system = System.empty(self.layout)
         self._add_odometry(system, poses, calibration)
         self._add_closures(system, poses)
-        self._add_ranges(system, poses, calibration)
+        for ranges, assembly in self._ranges:
+            self._add_ranges(system, ranges, assembly, poses, calibration)
         layout, priors = self.layout, self._problem.priors
         for unknowns, values, widths in (
             (layout.bias, calibration.bias, priors.bias),
@@ -140,13 +144,10 @@ class Equations:
     def _add_odometry(self, system: System, poses: Array, calibration: Calibration) -> None:
         odometry = self._problem.odometry
         error = pose_errors(poses, odometry, corrected(odometry, calibration))
-        x, y = odometry.measured[:, 0], odometry.measured[:, 1]
         jacobian = np.zeros((len(odometry), 3, 8))
         jacobian[:, :, :6] = _pose_jacobians(poses, odometry)
-        jacobian[:, 0, 6], jacobian[:, 1, 6] = x, y
-        jacobian[:, 0, 7] = -odometry.path / 2 * y
-        jacobian[:, 1, 7] = odometry.path / 2 * x
-        jacobian[:, 2, 7] = odometry.path
+        jacobian[:, :2, 6] = odometry.measured[:, :2]
+        jacobian[:, :, 7] = odometry.by_yaw
         self._odometry.add(system, error, jacobian, odometry.information)
 
     def _add_closures(self, system: System, poses: Array) -> None:
@@ -154,23 +155,57 @@ class Equations:
         error = pose_errors(poses, closures, closures.measured)
         self._closures.add(system, error, _pose_jacobians(poses, closures), closures.information)
 
-    def _add_ranges(self, system: System, poses: Array, calibration: Calibration) -> None:
-        ranges, model = self._problem.ranges, self._problem.model
+    def _add_ranges(
+        self,
+        system: System,
+        ranges: RangeFactors,
+        assembly: _Assembly,
+        poses: Array,
+        calibration: Calibration,
+    ) -> None:
+        model = self._problem.model
         error, u, arm_i, arm_j = range_errors(poses, ranges, calibration, model)
-        jacobian = np.ones((len(ranges), 1, 8))
-        jacobian[:, 0, 0], jacobian[:, 0, 1] = -u.real, -u.imag
-        jacobian[:, 0, 2] = u.real * arm_i.imag - u.imag * arm_i.real
-        jacobian[:, 0, 3], jacobian[:, 0, 4] = u.real, u.imag
-        jacobian[:, 0, 5] = u.imag * arm_j.real - u.real * arm_j.imag
-        jacobian[:, 0, 7] = model.near_range_shape(ranges.measured)
+        columns = np.ones((len(ranges), 8))
+        columns[:, 0], columns[:, 1] = -u.real, -u.imag
+        columns[:, 2] = u.real * arm_i.imag - u.imag * arm_i.real
+        columns[:, 3], columns[:, 4] = u.real, u.imag
+        columns[:, 5] = u.imag * arm_j.real - u.real * arm_j.imag
+        columns[:, 7] = model.near_range_shape(ranges.measured)
+        if len(ranges.carried.rows):
+            columns = np.hstack([columns, _by_constants(u, poses, ranges)])
+        jacobian = columns[:, None]
         # Cauchy's cost c^2 log(1 + (e / c)^2) by its weight; e and c in sigmas
         c = model.cauchy_sigmas
         scaled = (error / (c * ranges.sigma)) ** 2
         weight = 1 / (1 + scaled)
         information = (weight / ranges.sigma**2)[:, None, None]
-        self._ranges.add(system, error[:, None], jacobian, information)
+        assembly.add(system, error[:, None], jacobian, information)
         robust = float(np.sum(c**2 * np.log1p(scaled)))
         system.cost += robust - float(np.sum(weight * (error / ranges.sigma) ** 2))
+
+
+def _unknowns_of_ranges(layout: BandLayout, ranges: RangeFactors) -> Index:
+    """(m, 8) on which ranges depend, or (m, 12) where all of them are carried."""
+    shared = np.tile(layout.near_bias, (len(ranges), 1))
+    poses, bias = layout.poses, layout.bias[ranges.pair]
+    columns = [poses[ranges.i], poses[ranges.j], bias[:, None], shared]
+    if len(ranges.carried.rows):
+        constants = np.stack([layout.yaw, layout.scale], axis=-1)
+        columns.append(constants[ranges.carried.robots].reshape(-1, 4))
+    return np.hstack(columns)
+
+
+def _by_constants(sight: Array, poses: Array, ranges: RangeFactors) -> Array:
+    """(m, 4): derivative of errors by yaw rate and scale of the robots of i and of j.
+
+    Args:
+        sight: (m,) unit lines of sight in w, x + iy.
+        ranges: that are all carried.
+    """
+    moves, away = ranges.carried.moves, np.stack([ranges.i, ranges.j], axis=-1)
+    seen = sight[:, None] * np.exp(-1j * poses[away, 2]) * [1, -1]
+    by = moves[..., 0] * seen.real[..., None] + moves[..., 1] * seen.imag[..., None]
+    return np.asarray(by.reshape(-1, 4))
 
 
 def _pose_jacobians(poses: Array, factors: BetweenFactors) -> Array:

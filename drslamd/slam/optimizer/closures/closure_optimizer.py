@@ -47,8 +47,10 @@ class ClosureOptimizer:
         public: Mapping[int, PublicPoses],
     ) -> Job | None:
         """See `Optimizer.job`; public poses are not needed."""
-        places = factors.numbering(graph, group.members, group.shift_us)
-        chains = [graph.chains[robot].chain for robot in sorted({s.robot for s in group.members})]
+        places = factors.numbering(graph, group.members)
+        chains = [
+            graph.view.chains[robot].chain for robot in sorted({s.robot for s in group.members})
+        ]
         is_known = previous and {c.robot for c in chains} <= set(previous.trajectories)
         edges, is_closure = _edges(graph, places)
         problem = _ClosureProblem(
@@ -57,7 +59,7 @@ class ClosureOptimizer:
             is_closure=is_closure,
             chains=chains,
             gauge=factors.gauge_place(graph, group, places),
-            origin=graph.segment(group.frame).poses[0],
+            origin=graph.view.segment(group.frame).poses[0],
             start=factors.initial_poses(graph, group, previous, places) if is_known else None,
         )
         return partial(_solve, problem, group, self.believable)
@@ -86,7 +88,7 @@ def _edges(graph: PoseGraph, places: Numbering) -> tuple[ComplexFactors, NDArray
     """All edges, and which of them are closures."""
     parts = [ComplexFactors.of(factors.closures(graph, places))]
     for robot, place in places.place.items():
-        links = chain_links(graph.chains[robot], calibrated=False)
+        links = chain_links(graph.view.chains[robot], calibrated=False)
         numbered = BetweenFactors(place[links.i], place[links.j], links.measured, links.covariance)
         parts.append(ComplexFactors.of(numbered))
     edges = ComplexFactors.joined(parts)

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.conventions import Chain
-from drslamd.slam import se2
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
@@ -64,33 +63,21 @@ class LiftedNeighbours:
 
 def robots(graph: PoseGraph, own: Chain) -> set[int]:
     """With whom we share closures that are kept."""
-    return {
-        (pair.b if pair.a == own else pair.a).robot
-        for pair in graph.usable()
-        if own in (pair.a, pair.b) and any(c.kept for _, c in pair.closures.values())
-    }
+    return {closures.other.robot for closures in shared_closures(graph, own)}
 
 
 def shared_closures(graph: PoseGraph, own: Chain) -> list[SharedClosures]:
     """All of ours that are kept."""
     out = []
-    for pair in graph.usable():
-        kept = pair.kept_closures() if own in (pair.a, pair.b) else []
-        if not kept:
+    for pair in graph.view.pairs:
+        table = pair.closures
+        if own not in (pair.a, pair.b) or not len(table):
             continue
         leaves = pair.a == own
-        ends = np.array([(c.a_n, c.b_n) for c in kept]).T
-        covariance = se2.unpacked(np.array([c.covariance for c in kept]))
-        out.append(
-            SharedClosures(
-                other=pair.b if leaves else pair.a,
-                leaves=leaves,
-                mine=ends[0 if leaves else 1],
-                far=ends[1 if leaves else 0],
-                measured=np.array([c.a_T_b for c in kept]),
-                covariance=covariance,
-            )
-        )
+        a_n, b_n = table.a_n.astype(np.int64), table.b_n.astype(np.int64)
+        mine, far = (a_n, b_n) if leaves else (b_n, a_n)
+        other = pair.b if leaves else pair.a
+        out.append(SharedClosures(other, leaves, mine, far, table.a_T_b, table.covariance))
     return out
 
 

@@ -15,11 +15,11 @@ import numpy as np
 
 from drslamd.conventions import Chain, Segment
 from drslamd.slam import se2
-from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.estimate import Lifted, TeamEstimate, Trajectory
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
+from drslamd.slam.graph.thinning.chain_view import ChainView
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.factors import chain_links
@@ -105,12 +105,12 @@ class RbcdOptimizer:
         public: Mapping[int, PublicPoses],
     ) -> Job | None:
         """See `Optimizer.job`."""
-        data = graph.chains[self._own.robot]
+        data = graph.view.chains[self._own.robot]
         used = _in_group(data, group)
         keyframes = data.keyframes.chosen(used)
         shared = shared_closures(graph, self._own)
         own = OwnBlock(self._own, keyframes.n, keyframes.poses, _links(data, used), shared)
-        frame = Frame(group.frame, graph.segment(group.frame).poses[0])
+        frame = Frame(group.frame, graph.view.segment(group.frame).poses[0])
         before = previous.lifted if previous and previous.frame == group.frame else None
         begun = start(own, frame, before, public, self._rank)
         return partial(move, begun) if begun else None
@@ -179,13 +179,13 @@ def placed(
     return riemannian_descent.moved(rows[nearest], se2.between(odometry[at][nearest], odometry))
 
 
-def _in_group(data: ChainData, group: Group) -> Array:
+def _in_group(data: ChainView, group: Group) -> Array:
     """Which of our rows lie in segments of the group."""
     segments = [s.segment for s in group.members if s.chain == data.chain]
     return np.flatnonzero(np.isin(data.keyframes.segment, segments))
 
 
-def _links(data: ChainData, used: Array) -> BetweenFactors:
+def _links(data: ChainView, used: Array) -> BetweenFactors:
     """Our odometry between the rows `used`, numbered as they are."""
     links = chain_links(data, calibrated=False)
     place = np.full(len(data.keyframes), -1)

@@ -87,7 +87,7 @@ def test_the_pose_graph_of_gtsam_has_the_same_minimum_and_marginals() -> None:
         links.measured,
         links.covariance,
         np.zeros(len(links), dtype=int),
-        np.zeros(len(links)),
+        np.zeros((len(links), 3)),
     )
     # calibration that is known to be nothing
     known = np.array([1e-9])

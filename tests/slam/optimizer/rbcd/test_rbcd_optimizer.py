@@ -88,7 +88,7 @@ def a_round(
 def neighbours_of(
     team: SmallTeam, robot: int, public: Mapping[int, PublicPoses]
 ) -> LiftedNeighbours:
-    data = team.graph.chains[robot]
+    data = team.graph.view.chains[robot]
     return lifted_neighbours(team.graph, data, np.arange(COUNT), public, RANK)
 
 
@@ -126,7 +126,7 @@ def test_a_robot_is_placed_by_its_closures_with_one_who_is(
 ) -> None:
     """Whichever of the two made them."""
     members = {Segment(*team.chains[r], 0) for r in range(3)}
-    group = Group(members, Segment(*team.chains[3 - robot - other], 0), {})
+    group = Group(members, Segment(*team.chains[3 - robot - other], 0))
     public = replace(true_public(team, other), frame=group.frame.robot)
     found = a_round(team, robot, {other: public}, group=group)
     assert found is not None
@@ -288,7 +288,7 @@ def test_the_robot_of_the_frame_is_as_uncertain_as_its_odometry_since_the_origin
     found = a_round(team, 0, {})
     assert found is not None
     places = np.array(in_frame(team, 0))[:, :2]
-    links = chain_links(team.graph.chains[0], calibrated=False).covariance
+    links = chain_links(team.graph.view.chains[0], calibrated=False).covariance
     swings = np.sum((places[-1] - places[1:]) ** 2, axis=1)
     spread = np.sum((links[:, 0, 0] + links[:, 1, 1]) / 2 + swings * links[:, 2, 2] / 2)
     expected = np.diag([spread, spread, np.sum(links[:, 2, 2])])
