@@ -15,12 +15,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from drslamd import diagnosis
 from drslamd.broadcast import Broadcast
 from drslamd.config import Config
-from drslamd.conventions import GRID_US, MILLISECOND_US, SECOND_US, Chain
+from drslamd.conventions import MILLISECOND_US, SECOND_US, Chain
 from drslamd.events import (
     CanFrame,
     ChannelMessage,
@@ -52,7 +50,6 @@ from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, Job, Jobs
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.samples import Motion
 from drslamd.sensors.wheels.wheel_input import WheelInput
-from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.calibration.calibration_store import CalibrationStore
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
@@ -280,10 +277,7 @@ class Robot:
         effects = self._optimize(utime) if is_due else []
         would_move = exchange.is_waiting and not self.jobs.is_resting(OPTIMIZER, utime)
         at_rest = not would_move and not self.jobs.is_busy(OPTIMIZER)
-        return [*effects, *self._say(exchange.answers(utime, at_rest), utime)]
-
-    def _say(self, public: list[PublicPoses], utime: int) -> list[Effect]:
-        return [s for p in public if is_sayable(p) for s in self.team.send_public(p, utime)]
+        return [*effects, *self.broadcast.public(exchange.answers(utime, at_rest), utime)]
 
     def _on_job(self, event: JobDone) -> list[Effect]:
         job = self.jobs.finish(event)
@@ -293,7 +287,8 @@ class Robot:
         if job.pair is not None:
             job.pair.on_check(event.result)
             return []
-        public = self._say(self.back.on_solution(event.result), event.utime)
+        said = self.back.on_solution(event.result, event.utime)
+        public = self.broadcast.public(said, event.utime)
         self.calibration.update(self.back.estimate, self.own.robot, self.front.pairs)
         return [*self.broadcast.pose(self.whereabouts(event.utime), event.utime), *public]
 
@@ -301,16 +296,7 @@ class Robot:
 
     def pose(self) -> PoseNow | None:
         """Our latest pose in the frame of the team; None while we are not localised."""
-        solved = self.back.trajectory(self.own.robot)
-        track = self.front.reckoning.track
-        if solved is None or self.back.estimate is None or not len(track):
-            return None
-        last, now = int(solved.n[-1]), track.end - 1
-        if not track.covers(last, now):
-            return None
-        pose = se2.compose(solved.poses[-1], se2.between(track.at(last), track.at(now)))
-        covariance = self.back.estimate.covariances[self.own.robot]
-        return PoseNow(now * GRID_US, np.append(pose[:2], se2.wrap(pose[2])), covariance)
+        return self.back.pose_now(self.front.reckoning.track)
 
     def whereabouts(self, utime: int) -> Whereabouts:
         """What that pose is worth now."""

@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Set
 from typing import NamedTuple
 
+import numpy as np
+
 from drslamd.config import Config
-from drslamd.conventions import Chain, Segment
-from drslamd.slam import settings
+from drslamd.conventions import GRID_US, Chain, Segment
+from drslamd.slam import se2, settings
 from drslamd.slam.graph import team_frame
-from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
+from drslamd.slam.graph.estimate import PoseNow, TeamEstimate, Trajectory
 from drslamd.slam.graph.history import History
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
+from drslamd.slam.odometry.track import Track
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.rbcd import lifted_neighbours
 from drslamd.slam.optimizer.rbcd.pose_exchange import PoseExchange
@@ -68,6 +71,22 @@ class BackEnd:
         """The solved keyframes of a robot, in the frame of the team."""
         return self.estimate.trajectories.get(robot) if self.estimate else None
 
+    def pose_now(self, track: Track) -> PoseNow | None:
+        """Our latest pose in the frame of the team; None while we are not localised.
+
+        Args:
+            track: our odometry.
+        """
+        solved = self.trajectory(self._own.robot)
+        if solved is None or self.estimate is None or not len(track):
+            return None
+        last, now = int(solved.n[-1]), track.end - 1
+        if not track.covers(last, now):
+            return None
+        pose = se2.compose(solved.poses[-1], se2.between(track.at(last), track.at(now)))
+        covariance = self.estimate.covariances[self._own.robot]
+        return PoseNow(now * GRID_US, np.append(pose[:2], se2.wrap(pose[2])), covariance)
+
     def hear(self, origin: Chain, message: PublicPoses) -> None:
         """A peer said its public poses, or asks for ours."""
         if not self._takes_turns:
@@ -90,7 +109,7 @@ class BackEnd:
         """
         now = _Known(self._inserted, frozenset(present), self.exchange.news)
         if now == self._known and (self.estimate is None or self.estimate.converged):
-            self.exchange.rest()
+            self.exchange.rest(utime)
             return None
         if self._takes_turns and not self.exchange.begin(self._neighbours(talking), utime):
             return None
@@ -130,7 +149,7 @@ class BackEnd:
         robots = lifted_neighbours.robots(self.graph, self._own) & talking
         return [self.graph.chains[robot].chain for robot in robots]
 
-    def on_solution(self, result: TeamEstimate) -> list[PublicPoses]:
+    def on_solution(self, result: TeamEstimate, utime: int = 0) -> list[PublicPoses]:
         """Module 3 has answered; what must be said of it."""
         self.estimate = result = self._anchored(result)
         own = result.trajectories.get(self._own.robot)
@@ -138,4 +157,4 @@ class BackEnd:
             self.history.update(own)
         if result.lifted is None:
             return []
-        return self.exchange.moved(result.frame.chain, result.lifted)
+        return self.exchange.moved(result.frame.chain, result.lifted, utime)

@@ -109,6 +109,11 @@ class HeardPoses:
         """The last of its moves that is held completely, 0 of none."""
         return self.poses.round if self.poses else 0
 
+    @property
+    def lacks(self) -> bool:
+        """Is there a later one that is not held?"""
+        return self.newest > self.round
+
     def take(self, message: PublicPoses) -> bool:
         """Keep a part until all of them are here; older ones come too late.
 

@@ -22,7 +22,7 @@ from drslamd.slam.optimizer.problem import BetweenFactors
 from drslamd.slam.optimizer.rbcd import rbcd_optimizer, riemannian_descent
 from drslamd.slam.optimizer.rbcd.lifted_neighbours import SharedClosures
 from drslamd.slam.optimizer.rbcd.pose_exchange import PoseExchange
-from drslamd.slam.optimizer.rbcd.rbcd_optimizer import Frame, OwnBlock
+from drslamd.slam.optimizer.rbcd.rbcd_optimizer import AnchoredFrame, OwnBlock
 from lab.play.turns import CALM, EPOCH, Air, Turns
 from lab.recordings.recording import Array
 
@@ -98,7 +98,7 @@ def descend(graph: SplitGraph, most: int, air: Air = CALM, seed: int = 0) -> Des
 class BlockRobot:
     """One of the team; see `turns.Mover`."""
 
-    def __init__(self, own: OwnBlock, frame: Frame) -> None:
+    def __init__(self, own: OwnBlock, frame: AnchoredFrame) -> None:
         self.exchange = PoseExchange(own.chain)
         self.estimate: TeamEstimate | None = None
         self._own, self._frame = own, frame
@@ -108,7 +108,7 @@ class BlockRobot:
     def begin(self, utime: int) -> Job | None:
         news = self.exchange.news
         if self.estimate and self.estimate.converged and news == self._known:
-            self.exchange.rest()
+            self.exchange.rest(utime)
             return None
         if not self.exchange.begin(self._neighbours, utime):
             return None
@@ -121,10 +121,10 @@ class BlockRobot:
         self._known = news
         return partial(rbcd_optimizer.move, begun)
 
-    def on_solution(self, result: TeamEstimate) -> list[PublicPoses]:
+    def on_solution(self, result: TeamEstimate, utime: int) -> list[PublicPoses]:
         self.estimate = result
         assert result.lifted is not None
-        return self.exchange.moved(result.frame.chain, result.lifted)
+        return self.exchange.moved(result.frame.chain, result.lifted, utime)
 
     def hear(self, origin: Chain, message: PublicPoses) -> None:
         self.exchange.hear(origin, message)
@@ -133,7 +133,7 @@ class BlockRobot:
 def split(graph: SplitGraph) -> dict[int, BlockRobot]:
     """Robots for the parts of a graph, in the frame of the lowest one."""
     robots = np.unique(graph.robot).tolist()
-    frame = Frame(Segment(robots[0], EPOCH, 0), np.zeros(3))
+    frame = AnchoredFrame(Segment(robots[0], EPOCH, 0), np.zeros(3))
     return {robot: BlockRobot(_block(graph, robot), frame) for robot in robots}
 
 

@@ -166,8 +166,8 @@ class _Member:
     def begin(self, utime: int) -> Job | None:
         return self.back.begin(self._robots, self._robots, utime)
 
-    def on_solution(self, result: TeamEstimate) -> list[PublicPoses]:
-        return self.back.on_solution(result)
+    def on_solution(self, result: TeamEstimate, utime: int) -> list[PublicPoses]:
+        return self.back.on_solution(result, utime)
 
     def hear(self, origin: Chain, message: PublicPoses) -> None:
         self.back.hear(origin, message)

@@ -38,7 +38,7 @@ class Mover(Protocol):
     def begin(self, utime: int) -> Job | None:
         """Its time to move has come, or comes again because it waits."""
 
-    def on_solution(self, result: TeamEstimate) -> list[PublicPoses]: ...
+    def on_solution(self, result: TeamEstimate, utime: int) -> list[PublicPoses]: ...
 
     def hear(self, origin: Chain, message: PublicPoses) -> None: ...
 
@@ -90,7 +90,7 @@ class Turns:
                 at_rest = not mover.exchange.is_waiting and robot not in self._busy
                 self._send(robot, mover.exchange.answers(self._utime, at_rest))
             self._tick += 1
-        wants = any(mover.exchange.is_waiting for mover in self._movers.values())
+        wants = any(not mover.exchange.is_at_rest for mover in self._movers.values())
         return self.moves > before or bool(self._busy) or bool(self._due) or wants
 
     @property
@@ -113,7 +113,7 @@ class Turns:
     def _end(self, robot: int, result: TeamEstimate) -> None:
         self._busy.remove(robot)
         self.moves += 1
-        self._send(robot, self._movers[robot].on_solution(result))
+        self._send(robot, self._movers[robot].on_solution(result, self._utime))
 
     def _send(self, sender: int, said: list[PublicPoses]) -> None:
         for poses in said:

@@ -12,6 +12,8 @@ ours. The lowest number of all may always move, so nobody ever waits in a circle
 
 Who would move and lacks a neighbour's move asks; the neighbour says it again, or, if it has no
 reason to move, moves to where it is. One that lives and does not answer for long is left alone.
+So a move of the neighbours with a higher number also says that they hold ours; who does not hear
+one asks, and who learns by a question what it has missed asks back. Then there is silence.
 """
 
 from __future__ import annotations
@@ -35,11 +37,13 @@ ASK_LATER_US = SECOND_US
 """... which is rarer when nobody answers: no neighbour is in the frame yet."""
 REPEAT_US = 50 * MILLISECOND_US
 """Between two repetitions of what somebody lost: all that ask meanwhile hear the same one."""
+MOST_QUESTIONS = 30
+"""Who has not answered so many of them about one move does not know our frame, or anything."""
 LEAP = 2**24
 """A number goes up by no more at once, so that none from outside brings it to its limit of 2^62."""
-MATTERS = 1e-8
+MATTERS = 1e-10
 """Change of a pose, squared and in units of what closures tell of it, that is worth being said: a
-ten-thousandth of their sigma. Poses that a thousand closures hold then change the cost by 1e-5."""
+hundred-thousandth of their sigma, which is what 32 bits can say of a place 10 m away."""
 
 
 class PoseExchange:
@@ -63,6 +67,8 @@ class PoseExchange:
         """By keyframe: the move that its pose was last said with."""
         self._first = self._before = 0
         """The move before the first one in this frame, and that before the last one."""
+        self._news_in = self._told_at = self._questions = 0
+        """The last move that moved a pose, when it was said, and how often it was asked about."""
         self._blocked_since: dict[Chain, int] = {}
         self._asks_at = self._waits_since = 0
         self._lost: dict[Chain, int] = {}
@@ -121,9 +127,17 @@ class PoseExchange:
             self._asks_at, self._waits_since = utime + ASK_US, utime
         self.is_waiting = True
 
-    def rest(self) -> None:
-        """We have no reason to move."""
-        self.is_waiting = False
+    def rest(self, utime: int) -> None:
+        """We have no reason to move, unless we have missed one."""
+        if self._lacks_any():
+            self.wait(utime)
+        else:
+            self.is_waiting = False
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Will we be silent until we hear something?"""
+        return not self.is_waiting and not self._is_unheard()
 
     def _is_my_turn(self, chain: Chain) -> bool:
         """Does this neighbour have to wait for us, and do we know where it is?"""
@@ -131,9 +145,20 @@ class PoseExchange:
         if peer is None or peer.newest == 0:
             # it was in no frame yet; once we have moved it has something to be placed by
             return self.round == 0
-        return peer.round == peer.newest and (self.round, self._own) < (peer.round, chain)
+        return not peer.lacks and (self.round, self._own) < (peer.round, chain)
 
-    def moved(self, frame: Chain, lifted: Lifted) -> list[PublicPoses]:
+    def _lacks_any(self) -> bool:
+        """Do we know of a neighbour's move that we do not hold?"""
+        return any(self._heard[c].lacks for c in self._neighbours if c in self._heard)
+
+    def _is_unheard(self) -> bool:
+        """Is there a neighbour of which we do not know that it holds our poses?"""
+        if not self._news_in or self._questions == MOST_QUESTIONS:
+            return False
+        newest = (self._heard[c].newest if c in self._heard else 0 for c in self._neighbours)
+        return any(move <= self._news_in for move in newest)
+
+    def moved(self, frame: Chain, lifted: Lifted, utime: int) -> list[PublicPoses]:
         """What of our new poses must be said; nothing when they hardly moved."""
         if not len(lifted.carriers):
             return []
@@ -151,6 +176,8 @@ class PoseExchange:
         values = np.array([now.values[0], *(table[n] for n in now.keyframes)])
         self._said = replace(now, values=values)
         self._advance()
+        if news:
+            self._news_in, self._told_at, self._questions = self.round, utime, 0
         said = {**self._said_in, **dict.fromkeys(news, self.round)}
         self._said_in = {n: said[n] for n in now.keyframes}
         return [self._after(self._before)]
@@ -181,12 +208,15 @@ class PoseExchange:
         if self._said is not None and self._lost and utime - self._repeated_at >= REPEAT_US:
             out.append(self._after(min(self._lost.values())))
             self._lost, self._repeated_at = {}, utime
-        if self._said is not None and self._is_awaited and at_rest:
+        if self._said is not None and self._is_awaited and at_rest and not self._lacks_any():
             self._advance()
             out.append(self._after(self._before))
         if self.is_waiting and utime >= self._asks_at:
             is_long = utime - self._waits_since > PATIENCE_US
             self._asks_at = utime + (ASK_LATER_US if is_long else ASK_US)
+            out.append(self._question())
+        elif self._is_unheard() and utime - self._told_at >= ASK_LATER_US:
+            self._told_at, self._questions = utime, self._questions + 1
             out.append(self._question())
         return out
 

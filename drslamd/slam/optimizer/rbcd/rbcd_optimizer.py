@@ -62,7 +62,7 @@ class OwnBlock:
 
 
 @dataclass(frozen=True)
-class Frame:
+class AnchoredFrame:
     """The frame of the team: its segment, and where (3,) in it the pose is that anchors it."""
 
     segment: Segment
@@ -81,7 +81,7 @@ class Start:
 
     own: OwnBlock
     around: LiftedNeighbours
-    frame: Frame
+    frame: AnchoredFrame
     lifted: Array
     anchor: Array | None
     quiet: int
@@ -110,7 +110,7 @@ class RbcdOptimizer:
         keyframes = data.keyframes.chosen(used)
         shared = shared_closures(graph, self._own)
         own = OwnBlock(self._own, keyframes.n, keyframes.poses, _links(data, used), shared)
-        frame = Frame(group.frame, graph.view.segment(group.frame).poses[0])
+        frame = AnchoredFrame(group.frame, graph.view.segment(group.frame).poses[0])
         before = previous.lifted if previous and previous.frame == group.frame else None
         begun = start(own, frame, before, public, self._rank)
         return partial(move, begun) if begun else None
@@ -118,7 +118,7 @@ class RbcdOptimizer:
 
 def start(
     own: OwnBlock,
-    frame: Frame,
+    frame: AnchoredFrame,
     before: Lifted | None,
     public: Mapping[int, PublicPoses],
     rank: int,
@@ -136,7 +136,7 @@ def start(
     around = lifted_neighbours(own.shared, own.n, fitting, rank)
     owns = frame.segment.chain == own.chain
     anchor = None if owns else _anchor(fitting, frame.segment.robot)
-    lifted = placed(own.n, own.odometry, before, around, rank if owns else None)
+    lifted = placed_rows(own.n, own.odometry, before, around, rank if owns else None)
     if lifted is None or (anchor is None and not owns):
         return None
     same = before is not None and np.array_equal(before.n, own.n) and before.ends == len(around.n)
@@ -144,7 +144,7 @@ def start(
     return Start(own, around, frame, lifted, anchor, quiet)
 
 
-def placed(
+def placed_rows(
     n: Array, odometry: Array, before: Lifted | None, around: LiftedNeighbours, rank: int | None
 ) -> Array | None:
     """(k, 2 r) our keyframes: as they were, else by odometry from the nearest that is known, else
