@@ -19,8 +19,10 @@ from drslamd.slam.graph.estimate import Lifted, TeamEstimate
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
 from drslamd.slam.optimizer.rbcd.pose_exchange import (
+    ASK_LATER_US,
     ASK_US,
     LEAP,
+    MOST_QUESTIONS,
     PATIENCE_US,
     REPEAT_US,
     PoseExchange,
@@ -186,8 +188,12 @@ def test_who_waits_asks_what_it_lacks_and_again_until_it_has_it() -> None:
     assert asked.held == ((B.robot, 1), (C.robot, 0))
     assert exchange.answers(ASK_US + 1, at_rest=False) == []
     assert len(exchange.answers(2 * ASK_US, at_rest=False)) == 1
-    exchange.rest(0)
-    assert exchange.answers(9 * ASK_US, at_rest=False) == []
+    # that it has no reason to move itself does not help: it must hold what it knows of
+    exchange.rest(2 * ASK_US)
+    assert len(exchange.answers(3 * ASK_US, at_rest=False)) == 1
+    exchange.hear(B, said(4, since=1))
+    exchange.rest(3 * ASK_US)
+    assert not exchange.is_waiting
 
 
 def test_what_somebody_lacks_is_said_again_from_there_on_and_once_for_all() -> None:
@@ -210,11 +216,53 @@ def test_who_has_no_reason_to_move_passes_its_turn_on() -> None:
     assert exchange.begin([B], 0)
     moved(exchange, 1.0)
     exchange.hear(B, question(3, held=1))
-    assert exchange.answers(SECOND_US, at_rest=False) == []
-    (passed,) = exchange.answers(SECOND_US, at_rest=True)
-    assert (passed.keyframes, passed.since) == ((), 1)
-    assert exchange.round > 3 or exchange.round == 2
-    assert exchange.answers(2 * SECOND_US, at_rest=True) == []
+    # it would say that it holds a move that it only knows of
+    assert exchange.answers(0, at_rest=True) == []
+    exchange.hear(B, said(3))
+    assert exchange.answers(0, at_rest=False) == []
+    (passed,) = exchange.answers(0, at_rest=True)
+    assert (passed.keyframes, passed.since, passed.round) == ((), 1, 4)
+    assert exchange.is_at_rest
+    assert exchange.answers(9 * SECOND_US, at_rest=True) == []
+
+
+def test_who_does_not_know_that_its_last_move_was_heard_asks_each_second_for_a_while() -> None:
+    exchange = PoseExchange(A)
+    assert exchange.begin([B, C], 0)
+    moved(exchange, 1.0)
+    exchange.rest(0)
+    assert not exchange.is_at_rest
+    assert exchange.answers(ASK_LATER_US - 1, at_rest=True) == []
+    (asked,) = exchange.answers(ASK_LATER_US, at_rest=True)
+    assert asked.held == ((B.robot, 0), (C.robot, 0))
+    exchange.hear(B, said(2))
+    exchange.hear(C, said(1))
+    assert len(exchange.answers(2 * ASK_LATER_US, at_rest=True)) == 1
+    exchange.hear(C, said(2, since=1))
+    assert exchange.is_at_rest
+    assert exchange.answers(3 * ASK_LATER_US, at_rest=True) == []
+
+
+def test_nobody_asks_for_ever() -> None:
+    exchange = PoseExchange(A)
+    assert exchange.begin([B], 0)
+    moved(exchange, 1.0)
+    asked = [exchange.answers(k * ASK_LATER_US, at_rest=True) for k in range(1, 200)]
+    assert sum(len(messages) for messages in asked) == MOST_QUESTIONS
+    assert exchange.is_at_rest
+
+
+def test_who_learns_by_a_question_what_it_missed_asks_back() -> None:
+    exchange = PoseExchange(B)
+    assert exchange.begin([A], 0)
+    moved(exchange, 1.0)
+    exchange.hear(A, said(2))
+    exchange.rest(0)
+    assert exchange.is_at_rest
+    exchange.hear(A, question(5, held=1, of=B))
+    exchange.rest(0)
+    (asked,) = exchange.answers(ASK_US, at_rest=False)
+    assert asked.held == ((A.robot, 2),)
 
 
 def test_a_turn_that_is_passed_on_is_no_news_to_its_neighbours() -> None:

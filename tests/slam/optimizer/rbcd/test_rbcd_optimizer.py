@@ -7,14 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rbcd_scenes import CARRIERS, COUNT, RANK, in_frame, true_public
 from slam_scenes import (
     EXACT,
-    Array,
     SmallTeam,
-    closure,
     group_of,
-    inverted,
-    product,
     same_pose,
     small_team,
 )
@@ -27,50 +24,14 @@ from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer.factors import chain_links
 from drslamd.slam.optimizer.rbcd.rbcd_optimizer import (
     SETTLED,
-    LiftedNeighbours,
     RbcdOptimizer,
-    lifted_neighbours,
 )
-
-RANK = 3
-COUNT = 20
-CARRIERS = [5, 15]
-"""Keyframes of `small_team` that carry closures, by their place; of each pair of robots."""
 
 
 @pytest.fixture(scope="module")
 def team() -> SmallTeam:
     """Three robots with good wheels; closures are as wrong as they say, 5 cm."""
     return small_team(3, count=COUNT, noise=EXACT)
-
-
-def plain_lift(pose: Array, rank: int = RANK) -> Array:
-    """A planar pose in the first direction of the relaxation."""
-    row = np.zeros(2 * rank, dtype=complex)
-    row[0], row[rank] = np.exp(1j * pose[2]), complex(pose[0], pose[1])
-    return row
-
-
-def in_frame(team: SmallTeam, robot: int) -> list[Array]:
-    """True poses of a robot, seen from the first of robot 0."""
-    origin = inverted(team.truth[0][0])
-    return [product(origin, pose) for pose in team.truth[robot]]
-
-
-def true_public(
-    team: SmallTeam, robot: int, length: float = 1.0, rank: int = RANK, anchor: float = 1.0
-) -> PublicPoses:
-    """What a robot says that knows the truth.
-
-    Args:
-        length, anchor: of the rotations of its poses and of its origin; 1 is right.
-    """
-    numbers = tuple(int(team.n[robot][k]) for k in CARRIERS)
-    poses = [np.zeros(3), *(in_frame(team, robot)[k] for k in CARRIERS)]
-    values = np.array([plain_lift(pose, rank) for pose in poses])
-    values[0, :rank] *= anchor
-    values[1:, :rank] *= length
-    return PublicPoses(0, team.chains[0].epoch, rank, numbers, values)
 
 
 def a_round(
@@ -85,15 +46,8 @@ def a_round(
     return run() if run else None
 
 
-def neighbours_of(
-    team: SmallTeam, robot: int, public: Mapping[int, PublicPoses]
-) -> LiftedNeighbours:
-    data = team.graph.view.chains[robot]
-    return lifted_neighbours(team.graph, data, np.arange(COUNT), public, RANK)
-
-
 def said(estimate: TeamEstimate) -> PublicPoses:
-    """What a robot tells of its state, as `BackEnd.public_poses` does."""
+    """What a robot tells of its state."""
     state = estimate.lifted
     assert state is not None
     table = dict(zip(state.n.tolist(), state.rows, strict=True))
@@ -180,41 +134,6 @@ def test_only_segments_of_the_group_are_in_the_block() -> None:
 # neighbours
 
 
-def test_closures_lead_out_to_those_that_we_measured_and_in_from_those_that_measured_us(
-    team: SmallTeam,
-) -> None:
-    """The lower robot of a pair made its closures."""
-    around = neighbours_of(team, 1, {0: true_public(team, 0), 2: true_public(team, 2)})
-    assert around.carriers.tolist() == [int(team.n[1][k]) for k in CARRIERS]
-    assert around.arriving.j.tolist() == CARRIERS
-    assert around.leaving.i.tolist() == CARRIERS
-    for rows, robot in ((around.arriving.i, 0), (around.leaving.j, 2)):
-        assert [around.chains[r] for r in rows] == [team.chains[robot]] * 2
-        assert [int(around.n[r]) for r in rows] == [int(team.n[robot][k]) for k in CARRIERS]
-        expected = true_public(team, robot).values[1:]
-        assert np.array_equal(around.rows[rows], expected)
-
-
-def test_poses_that_carry_closures_to_somebody_unknown_are_public_all_the_same(
-    team: SmallTeam,
-) -> None:
-    around = neighbours_of(team, 1, {})
-    assert around.carriers.tolist() == [int(team.n[1][k]) for k in CARRIERS]
-    assert (len(around.leaving), len(around.arriving), len(around.rows)) == (0, 0, 0)
-
-
-@pytest.mark.parametrize(
-    ("length", "is_used"), [(1.009, True), (1.011, False), (0.991, True), (0.989, False)]
-)
-def test_a_rotation_whose_length_is_wrong_is_none(
-    team: SmallTeam, length: float, is_used: bool
-) -> None:
-    around = neighbours_of(team, 1, {0: true_public(team, 0, length)})
-    assert len(around.rows) == (2 if is_used else 0)
-    # with nobody else to be placed by, the robot waits
-    assert (a_round(team, 1, {0: true_public(team, 0, length)}) is not None) is is_used
-
-
 @pytest.mark.parametrize(
     ("anchor", "is_used"), [(1.009, True), (1.011, False), (0.991, True), (0.989, False)]
 )
@@ -224,7 +143,7 @@ def test_an_origin_whose_length_is_wrong_is_none(
     assert (a_round(team, 1, {0: true_public(team, 0, anchor=anchor)}) is not None) is is_used
 
 
-def test_poses_of_another_rank_are_not_listened_to(team: SmallTeam) -> None:
+def test_poses_of_a_higher_rank_are_not_listened_to(team: SmallTeam) -> None:
     wrong = true_public(team, 0, rank=RANK + 1)
     assert a_round(team, 1, {0: wrong}) is None
     right = {2: true_public(team, 2)}
@@ -234,12 +153,11 @@ def test_poses_of_another_rank_are_not_listened_to(team: SmallTeam) -> None:
     assert np.array_equal(plain.trajectories[1].poses, mixed.trajectories[1].poses)
 
 
-def test_a_closure_that_was_withdrawn_leads_nowhere() -> None:
-    team = small_team(3, count=COUNT, noise=EXACT)
-    gone = closure(0, int(team.n[0][5]), team.chains[1], int(team.n[1][5]), (0, 0, 0), kept=False)
-    team.graph.insert(team.chains[0], GraphEntry(9, closures=(gone,)))
-    around = neighbours_of(team, 1, {0: true_public(team, 0)})
-    assert [int(n) for n in around.n] == [int(team.n[0][15])]
+def test_poses_of_a_lower_rank_lie_in_its_directions(team: SmallTeam) -> None:
+    plain, flat = (a_round(team, 1, {0: true_public(team, 0, rank=k)}) for k in (RANK, 1))
+    assert plain is not None
+    assert flat is not None
+    assert np.array_equal(plain.trajectories[1].poses, flat.trajectories[1].poses)
 
 
 def origin_of(team: SmallTeam, public: Mapping[int, PublicPoses]) -> complex:
