@@ -138,7 +138,7 @@ def publics(draw: st.DrawFn) -> PublicPoses:
     real, imaginary = parts.astype(np.float32).astype(float)
     numbers = sorted(draw(st.sets(samples, min_size=count, max_size=count)))
     since, move = sorted(draw(st.tuples(rounds, rounds)))
-    parts = draw(st.integers(1, MAX_PUBLIC))
+    many = draw(st.integers(1, MAX_PUBLIC))
     return PublicPoses(
         draw(robots),
         draw(epochs),
@@ -147,8 +147,8 @@ def publics(draw: st.DrawFn) -> PublicPoses:
         real + 1j * imaginary,
         round=move,
         since=since,
-        part=draw(st.integers(0, parts - 1)),
-        parts=parts,
+        part=draw(st.integers(0, many - 1)),
+        parts=many,
         asks=draw(st.booleans()),
         held=tuple(draw(st.lists(st.tuples(robots, rounds), max_size=MAX_HELD))),
     )

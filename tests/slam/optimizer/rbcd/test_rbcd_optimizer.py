@@ -12,6 +12,8 @@ from slam_scenes import (
     EXACT,
     SmallTeam,
     group_of,
+    inverted,
+    product,
     same_pose,
     small_team,
 )
@@ -25,6 +27,7 @@ from drslamd.slam.optimizer.factors import chain_links
 from drslamd.slam.optimizer.rbcd.rbcd_optimizer import (
     SETTLED,
     RbcdOptimizer,
+    at_anchor,
 )
 
 
@@ -254,3 +257,55 @@ def test_alone_with_its_neighbours_a_block_costs_less_each_round_until_it_has_co
         before = after
     assert not flags[0]
     assert flags[-1]
+
+
+def test_while_nothing_new_is_measured_a_block_leans_further_and_further_out(
+    team: SmallTeam,
+) -> None:
+    public = {0: true_public(team, 0), 2: true_public(team, 2)}
+    first = a_round(team, 1, public)
+    assert first is not None
+    assert first.lifted is not None
+    assert first.lifted.quiet == 0
+    second = a_round(team, 1, public, first)
+    assert second is not None
+    assert second.lifted is not None
+    assert second.lifted.quiet == 1
+    # a neighbour more, and a keyframe less, are news
+    fewer = a_round(team, 1, {0: public[0]}, second)
+    assert fewer is not None
+    assert fewer.lifted is not None
+    assert fewer.lifted.quiet == 0
+
+
+def test_a_block_that_could_gain_hardly_anything_stays_where_it_is(team: SmallTeam) -> None:
+    public = {0: true_public(team, 0), 2: true_public(team, 2)}
+    found = a_round(team, 1, public)
+    while found is not None and not found.converged:
+        found = a_round(team, 1, public, found)
+    assert found is not None
+    again = a_round(team, 1, public, found)
+    assert again is not None
+    assert again.lifted is not None
+    assert found.lifted is not None
+    assert np.array_equal(again.lifted.rows, found.lifted.rows)
+
+
+def test_where_the_owner_of_the_frame_has_moved_everything_moves_with_it(team: SmallTeam) -> None:
+    public = true_public(team, 0)
+    found = a_round(team, 1, {0: public})
+    assert found is not None
+    turned = replace(public, values=public.values.copy())
+    turned.values[0, 0] = np.exp(0.3j)
+    turned.values[0, RANK] = 1.0 + 2.0j
+    carried = at_anchor(found, turned)
+    step = inverted(np.array([1.0, 2.0, 0.3]))
+    for robot, trajectory in found.trajectories.items():
+        for old, new in zip(trajectory.poses, carried.trajectories[robot].poses, strict=True):
+            assert same_pose(new, product(step, old))
+    assert carried.lifted is not None
+    assert np.array_equal(carried.lifted.anchor, turned.values[0])
+    # what is no pose, or was said already, changes nothing
+    turned.values[0, 0] = 2.0
+    assert at_anchor(found, turned) is found
+    assert at_anchor(found, public) is found
