@@ -24,9 +24,9 @@ from drslamd.slam.optimizer.rbcd.pose_exchange import PoseExchange
 from drslamd.slam.optimizer.rbcd.rbcd_optimizer import at_anchor
 from drslamd.slam.tuning import DEFAULTS, Tuning
 
-URGENT = 1e-2
+URGENT = 1e-4
 """Share of its cost that a move must bring for the next one to follow as soon as it is our turn:
-when a team has just met, and then for a second or two."""
+when a team has just met, and for some moves after each closure that says something new."""
 
 
 class _Known(NamedTuple):

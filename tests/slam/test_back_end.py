@@ -279,7 +279,7 @@ def test_without_a_relaxation_or_without_carriers_nothing_is_told(team: SmallTea
     assert back.on_solution(moved(0, ())) == []
 
 
-@pytest.mark.parametrize(("gain", "is_urgent"), [(0.011, True), (0.009, False)])
+@pytest.mark.parametrize(("gain", "is_urgent"), [(1.1e-4, True), (0.9e-4, False)])
 def test_a_move_that_brought_much_is_followed_at_once(
     team: SmallTeam, gain: float, is_urgent: bool
 ) -> None:

@@ -138,6 +138,7 @@ def test_what_comes_late_changes_nothing() -> None:
     heard = HeardPoses()
     assert heard.take(replace(said((40,), 5.0), round=5))
     assert not heard.take(replace(said((40,), 2.0), round=2))
+    assert heard.newest == 5
     assert not heard.take(replace(said((40,), 4.0), round=5))
     assert heard.poses is not None
     assert firsts(heard.poses) == {40: 5.0}

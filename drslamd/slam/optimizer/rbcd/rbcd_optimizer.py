@@ -41,8 +41,10 @@ MOST_LEAN = 0.9
 """How far past its minimum a block goes at most: where the team is stiff, halves what is missing
 in seven rounds; where it is not, still in fifteen."""
 HALF_LEAN = 4
-"""Moves after news until a block goes half of its way past its minimum. The first one goes to it:
-what goes past what is only just measured swings about it, and news come every second."""
+"""Moves until a block goes half of that past its minimum."""
+AFTER_NEWS = 2
+"""So many count when something new was measured: what goes far past what is only just measured
+swings about it, and news come every second."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,9 @@ def start(
     if lifted is None or (anchor is None and not owns):
         return None
     same = before is not None and np.array_equal(before.n, own.n) and before.ends == len(around.n)
-    quiet = before.quiet + 1 if before and same else 0
+    quiet = before.quiet + 1 if before else 0
+    if not same:
+        quiet = min(quiet, AFTER_NEWS)
     return Start(own, around, frame, lifted, anchor, quiet)
 
 

@@ -103,6 +103,16 @@ def test_a_move_of_which_a_part_is_missing_is_waited_for() -> None:
     assert exchange.begin([B], 0)
 
 
+def test_a_move_that_is_only_known_of_is_waited_for_too() -> None:
+    exchange = PoseExchange(A)
+    moved(exchange, 1.0)
+    exchange.hear(B, said(5))
+    exchange.hear(B, question(7, held=1))
+    assert not exchange.begin([B], 0)
+    exchange.hear(B, said(7, since=5))
+    assert exchange.begin([B], 0)
+
+
 def test_who_does_not_answer_for_long_is_left_alone() -> None:
     exchange = PoseExchange(A)
     moved(exchange, 1.0)

@@ -25,6 +25,7 @@ from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer.factors import chain_links
 from drslamd.slam.optimizer.rbcd.rbcd_optimizer import (
+    AFTER_NEWS,
     SETTLED,
     RbcdOptimizer,
     at_anchor,
@@ -263,19 +264,18 @@ def test_while_nothing_new_is_measured_a_block_leans_further_and_further_out(
     team: SmallTeam,
 ) -> None:
     public = {0: true_public(team, 0), 2: true_public(team, 2)}
-    first = a_round(team, 1, public)
-    assert first is not None
-    assert first.lifted is not None
-    assert first.lifted.quiet == 0
-    second = a_round(team, 1, public, first)
-    assert second is not None
-    assert second.lifted is not None
-    assert second.lifted.quiet == 1
-    # a neighbour more, and a keyframe less, are news
-    fewer = a_round(team, 1, {0: public[0]}, second)
+    found, moves = None, []
+    for _ in range(5):
+        found = a_round(team, 1, public, found)
+        assert found is not None
+        assert found.lifted is not None
+        moves.append(found.lifted.quiet)
+    assert moves == [0, 1, 2, 3, 4]
+    # a neighbour less is news
+    fewer = a_round(team, 1, {0: public[0]}, found)
     assert fewer is not None
     assert fewer.lifted is not None
-    assert fewer.lifted.quiet == 0
+    assert fewer.lifted.quiet == AFTER_NEWS
 
 
 def test_a_block_that_could_gain_hardly_anything_stays_where_it_is(team: SmallTeam) -> None:
