@@ -67,6 +67,8 @@ POLL_US = 10 * MILLISECOND_US
 """How finely the wheels that must be asked are asked; their driver knows its own rate."""
 REPEAT_US = 100 * MILLISECOND_US
 """Between two looks for log entries that somebody lacks."""
+TURN_US = 40 * MILLISECOND_US
+"""The same where robots take turns, and wait for each other."""
 SAVE_US = 60 * SECOND_US
 """Between two looks whether there is anything new to keep over a restart."""
 GOODBYES = 3
@@ -132,7 +134,7 @@ class Robot:
         """What comes round, and how often, us."""
         config = self.config
         periods: dict[Action, int] = {
-            self._repeat: REPEAT_US,
+            self._repeat: TURN_US if config.optimizer.algorithm == "rbcd" else REPEAT_US,
             self._send_status: SECOND_US,
             self._send_odometry: SECOND_US,
             self._extend_log: SECOND_US,

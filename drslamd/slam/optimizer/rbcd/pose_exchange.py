@@ -30,12 +30,12 @@ from drslamd.slam.se2 import Array
 
 PATIENCE_US = 5 * SECOND_US
 """A neighbour that lives and does not answer for so long has another trouble; at 50 % loss it was
-asked fifty times."""
-ASK_US = 100 * MILLISECOND_US
+asked a hundred times."""
+ASK_US = 40 * MILLISECOND_US
 """How long a turn is waited for until it is asked for, and asked again ..."""
 ASK_LATER_US = SECOND_US
 """... which is rarer when nobody answers: no neighbour is in the frame yet."""
-REPEAT_US = 50 * MILLISECOND_US
+REPEAT_US = 30 * MILLISECOND_US
 """Between two repetitions of what somebody lost: all that ask meanwhile hear the same one."""
 MOST_QUESTIONS = 30
 """Who has not answered so many of them about one move does not know our frame, or anything."""
