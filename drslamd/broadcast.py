@@ -29,6 +29,7 @@ from drslamd.gossip.team import Team
 from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.front_end import FrontEnd
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.se2 import Array
 from drslamd.whereabouts import Whereabouts
@@ -153,6 +154,11 @@ class Broadcast:
             return []
         self._pose, self._pose_said = (frame, where.state, found.pose), utime
         return [self._team.send(message, utime)]
+
+    def public(self, said: list[PublicPoses], utime: int) -> list[Effect]:
+        """Our lifted poses, with `rbcd`; such as nobody would take are left unsaid."""
+        sayable = (poses for poses in said if is_sayable(poses))
+        return [send for poses in sayable for send in self._team.send_public(poses, utime)]
 
     def _is_news(self, frame: Segment, state: PoseState, pose: Array, covariance: Array) -> bool:
         """Did the pose move by more than its own sigma since it was said?"""

@@ -168,6 +168,10 @@ def _graph(robot: Robot) -> dict[str, Any]:
                 for peer, bias in learned.bias.items()
             },
             "wheel_scale": {str(own): round(learned.scale.value, 5)},
+            "wheel_turn": {str(own): round(learned.turn.value, 5)},
+            "antenna_m": {
+                str(own): [round(learned.antenna_x.value, 4), round(learned.antenna_y.value, 4)]
+            },
         }
     return out
 

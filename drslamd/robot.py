@@ -53,21 +53,23 @@ from drslamd.sensors.wheels.wheel_input import WheelInput
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.calibration.calibration_store import CalibrationStore
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
-from drslamd.slam.doubt import doubt_of, doubted_partners
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.graph.estimate import PoseNow
 from drslamd.slam.graph.measurements import GraphEntry
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.peer_in_range import PeerInRange
-from drslamd.slam.pose_now import pose_now
 from drslamd.slam.settings import closure_method
 from drslamd.slam.tuning import DEFAULTS, Tuning
+from drslamd.standing import Standing
 from drslamd.timers import Action, Timers
-from drslamd.whereabouts import Whereabouts, whereabouts
+from drslamd.whereabouts import Whereabouts
 
 POLL_US = 10 * MILLISECOND_US
 """How finely the wheels that must be asked are asked; their driver knows its own rate."""
 REPEAT_US = 100 * MILLISECOND_US
 """Between two looks for log entries that somebody lacks."""
+TURN_US = 40 * MILLISECOND_US
+"""The same where robots take turns, and wait for each other."""
 SAVE_US = 60 * SECOND_US
 """Between two looks whether there is anything new to keep over a restart."""
 GOODBYES = 3
@@ -107,6 +109,7 @@ class Robot:
         self.front = FrontEnd(config, self.own, self.calibration.used, tuning)
         self.back = BackEnd(config, self.own, tuning)
         self.broadcast = Broadcast(config, self.team, self.front, self.back)
+        self.standing = Standing(config, self.own, self.front, self.back)
         self.outbox = Outbox(config.robot.id, config.gossip.max_bytes_per_s)
         self.health = Health()
         self.ports: dict[str, PortState] = {}
@@ -131,7 +134,7 @@ class Robot:
         """What comes round, and how often, us."""
         config = self.config
         periods: dict[Action, int] = {
-            self._repeat: REPEAT_US,
+            self._repeat: TURN_US if config.optimizer.algorithm == "rbcd" else REPEAT_US,
             self._send_status: SECOND_US,
             self._send_odometry: SECOND_US,
             self._extend_log: SECOND_US,
@@ -190,13 +193,19 @@ class Robot:
 
     def _on_message(self, event: Datagram | ChannelMessage) -> list[Effect]:
         received = self.team.receive(event)
-        if received is not None and isinstance(received.message, GraphEntry):
+        if received is None:
+            return []
+        if isinstance(received.message, GraphEntry):
             self.back.insert(received.origin, received.message)
+        elif isinstance(received.message, PublicPoses):
+            self.back.hear(received.origin, received.message)
+            return self._take_turn(event.utime)
         return []
 
     def _repeat(self, utime: int) -> list[Effect]:
         is_in_a_graph = self.back.estimate is not None or bool(self.neighbours(utime))
-        return list(self.team.repeats(utime)) if is_in_a_graph else []
+        repeats = list(self.team.repeats(utime)) if is_in_a_graph else []
+        return [*repeats, *self._take_turn(utime)]
 
     def _send_status(self, utime: int) -> list[Effect]:
         clock, where = self.uwb.system_offset_us(utime), self.whereabouts(utime)
@@ -219,7 +228,7 @@ class Robot:
     def _extend_log(self, utime: int) -> list[Effect]:
         """One entry of our log: where our wheels went, what we ranged, what module 2 kept."""
         neighbours = self.neighbours(utime)
-        is_own_doubted, is_any_doubted = self._is_doubted()
+        is_own_doubted, is_any_doubted = self.standing.is_doubted()
         keyframe = self.front.make_keyframe(is_own_doubted)
         ranges = self.front.sample_ranges(neighbours, self.back.graph, utime, is_any_doubted)
         closures = self.front.tell_closures()
@@ -235,12 +244,6 @@ class Robot:
             if neighbours:
                 sends.append(self.team.send_sealed(self.own.robot, sealed))
         return sends
-
-    def _is_doubted(self) -> tuple[bool, bool]:
-        """Does odometry of ours, or of anybody, say less than what was ranged?"""
-        estimate, off = self.back.estimate, self.front.watch.doubted
-        own = doubt_of(self.own.robot, estimate, self.front.watch.looked_at, off) is not None
-        return own, own or bool(doubted_partners(self.own.robot, estimate, off))
 
     # ---- the three modules ----
 
@@ -275,9 +278,18 @@ class Robot:
         """Module 3: the team's pose graph."""
         if self.jobs.is_busy(OPTIMIZER) or self.jobs.is_resting(OPTIMIZER, utime):
             return []
-        public = {k: peer.public for k, peer in self.team.peers.items() if peer.public}
-        run = self.back.begin(self.team.present(utime), public)
+        talking = set(self.team.living(utime))
+        run = self.back.begin(self.team.present(utime), talking, utime)
         return [self.jobs.begin(Job(OPTIMIZER), run)] if run else []
+
+    def _take_turn(self, utime: int) -> list[Effect]:
+        """With `rbcd`: move if it is our turn now, and say what others wait for."""
+        exchange = self.back.exchange
+        is_due = exchange.is_waiting or self.back.is_urgent
+        effects = self._optimize(utime) if is_due else []
+        would_move = exchange.is_waiting and not self.jobs.is_resting(OPTIMIZER, utime)
+        at_rest = not would_move and not self.jobs.is_busy(OPTIMIZER)
+        return [*effects, *self.broadcast.public(exchange.answers(utime, at_rest), utime)]
 
     def _on_job(self, event: JobDone) -> list[Effect]:
         job = self.jobs.finish(event)
@@ -290,35 +302,25 @@ class Robot:
         if job.pair is not None:
             job.pair.on_check(event.result)
             return []
-        self.back.on_solution(event.result)
+        said = self.back.on_solution(event.result, event.utime)
+        public = self.broadcast.public(said, event.utime)
         self.calibration.update(self.back.estimate, self.own.robot, self.front.pairs)
-        public = self.back.public_poses()
-        can_be_said = public is not None and is_sayable(public)
-        sends = self.team.send_public(public, event.utime) if public and can_be_said else []
-        return [*self.broadcast.pose(self.whereabouts(event.utime), event.utime), *sends]
+        return [*self.broadcast.pose(self.whereabouts(event.utime), event.utime), *public]
 
     # ---- what we know of ourselves ----
 
     def pose(self) -> PoseNow | None:
         """Our latest pose in the frame of the team; None while we are not localised."""
-        estimate = self.back.estimate
-        if estimate is None:
-            return None
-        return pose_now(
-            estimate, self.own.robot, self.front.reckoning.track, self.front.model.noise
-        )
+        return self.standing.pose()
 
     def whereabouts(self, utime: int) -> Whereabouts:
         """What that pose is worth now."""
-        most_mps = self.config.wheels.max_speed_mps
-        track, watch = self.front.reckoning.track, self.front.watch
-        doubt = doubt_of(self.own.robot, self.back.estimate, watch.looked_at, watch.doubted)
-        return whereabouts(self.pose(), track, most_mps, doubt, utime)
+        return self.standing.whereabouts(utime)
 
     def _check_health(self, utime: int) -> list[Effect]:
         self.team.forget_silent(utime)
-        estimate, graph = self.back.estimate, self.back.graph
-        self.front.watch_ranges(self.neighbours(utime), graph, estimate, utime)
+        self.front.watch_ranges(self.neighbours(utime), self.back.graph, self.back.estimate, utime)
+        self.back.exchange.keep({peer.chain for peer in self.team.peers.values()})
         notes: list[Effect] = []
         for key, sentence in diagnosis.conditions(self, utime):
             notes += self.health.set(key, sentence, utime)
@@ -326,8 +328,7 @@ class Robot:
         if above is None or self.team.is_own_id_used(utime):
             return notes
         # our own memory was lost, or a lie is believed
-        why = "peers know a later start of this robot and refuse this one"
-        return [*notes, Restart(above, why)]
+        return [*notes, Restart(above, "peers know a later start of this robot")]
 
     # ---- time passes, and ends ----
 

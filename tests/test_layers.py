@@ -26,6 +26,7 @@ RINGS = {
         "timers",
         "jobs",
         "whereabouts",
+        "standing",
         "broadcast",
         "conditions",
         "robot",

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 from drslamd.slam.doubt import Doubt, Reason
 from drslamd.slam.odometry.mounting import Fault, Repair
-from drslamd.slam.relative_pose.mounting_search import MountingSearch
+from drslamd.slam.relative_pose.mounting_search import MountingSearch, is_learned
 
 CHECK = {
     Fault.MIRRORED: (
@@ -23,11 +23,14 @@ CHECK = {
 """Of the wheels of a robot."""
 
 
-def mounting(own: int, peer: int, search: MountingSearch, peer_is_odd: bool) -> str | None:
+def mounting(
+    own: int, peer: int, search: MountingSearch, peer_is_odd: bool, has_learned: bool
+) -> str | None:
     """One sentence on a pair; None while nothing is wrong with it.
 
     Args:
         peer_is_odd: do we agree with other robots?
+        has_learned: does module 3 find the same track or scale?
     """
     case = search.found
     if case is None:
@@ -37,7 +40,7 @@ def mounting(own: int, peer: int, search: MountingSearch, peer_is_odd: bool) -> 
             f"ranges and odometry of robots {own} and {peer} contradict each other, and no usual "
             "mistake explains it; look at the wheels and the antennas of both"
         )
-    if not search.is_clear:
+    if not search.is_clear or (is_learned(case) and not has_learned):
         return None
     if case.b.fault is Fault.MIRRORED:
         whose = f"robot {peer}" if peer_is_odd else f"robot {own} or {peer}"

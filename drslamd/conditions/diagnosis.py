@@ -16,6 +16,7 @@ from drslamd.memory import Memory
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.wheels.wheel_input import WheelInput
 from drslamd.slam.back_end import BackEnd
+from drslamd.slam.calibration.window_calibration import has_learned
 from drslamd.slam.consistency.pair import PairTracker
 from drslamd.slam.doubt import doubted_partners
 from drslamd.slam.front_end import FrontEnd
@@ -107,13 +108,13 @@ def _doubted_partners(robot: Stages) -> Iterable[int]:
 
 def _mountings(robot: Stages) -> str | None:
     """What was found wrong with the wheels of whom, and whose windows nothing explains."""
-    own, pairs = robot.front.own.robot, robot.front.pairs
-    said = [
-        sentence
-        for peer, pair in pairs.items()
-        if (sentence := contradictions.mounting(own, peer, pair.search, _is_odd(pairs, peer)))
-    ]
-    return "; ".join(said) or None
+    own, pairs, estimate = robot.front.own.robot, robot.front.pairs, robot.back.estimate
+    said = []
+    for peer, pair in pairs.items():
+        found = pair.search.found
+        agrees = found is not None and has_learned(estimate, (own, peer), found)
+        said.append(contradictions.mounting(own, peer, pair.search, _is_odd(pairs, peer), agrees))
+    return "; ".join(sentence for sentence in said if sentence) or None
 
 
 def _is_odd(pairs: dict[int, PairTracker], peer: int) -> bool:

@@ -46,6 +46,8 @@ MAX_RANK = 20
 """Of the relaxation, as the configuration allows."""
 MAX_UWB_CLOCK_US = 2 * LAST_UTIME
 """A robot's clock minus LinkTrack's system_time, which wraps after 49.7 days."""
+LAST_ROUND = 2**62 - 1
+"""A robot's moves with `rbcd`; no lie brings an honest one there (`pose_exchange.LEAP`)."""
 MAX_PLACE_M = 1e6
 """From the origin of the team's frame: beyond two tracks end to end."""
 MAX_VARIANCE = 1e12

@@ -38,7 +38,7 @@ from drslamd.slam.graph.measurements import (
     Keyframe,
     RangeMeasurement,
 )
-from drslamd.slam.graph.public_poses import PublicPoses
+from drslamd.slam.graph.public_poses import MAX_HELD, MAX_PUBLIC, PublicPoses
 from drslamd.slam.robot_model import RobotModel
 
 MILLIMETRE_M = 1e-3
@@ -282,22 +282,52 @@ def _read_pose(raw: Any) -> Pose:
 
 def _fill_public(out: Any, m: PublicPoses) -> None:
     out.frame, out.frame_epoch, out.rank = m.frame, m.frame_epoch, m.rank
+    out.round, out.since, out.part, out.parts = m.round, m.since, m.part, m.parts
+    out.asks, out.n_held = int(m.asks), len(m.held)
+    out.held = [_filled_held(robot, held) for robot, held in m.held]
     out.n, out.keyframes = len(m.keyframes), list(m.keyframes)
     out.values = np.ascontiguousarray(m.values).view(float).ravel().tolist()
     out.n_values = len(out.values)
+
+
+def _filled_held(robot: int, held: int) -> Any:
+    out = lcmtypes.held_t()
+    out.id, out.round = robot, held
+    return out
 
 
 def _read_public(raw: Any) -> PublicPoses:
     bounded("rank", raw.rank, 1, bounds.MAX_RANK)
     if raw.n < 0 or raw.n_values != 4 * raw.rank * (raw.n + 1):
         raise ValueError("sizes that do not fit each other")
+    bounded("move", raw.round, 0, bounds.LAST_ROUND)
+    bounded("move before", raw.since, 0, raw.round)
+    bounded("parts", raw.parts, 1, MAX_PUBLIC)
+    bounded("part", raw.part, 0, raw.parts - 1)
+    bounded("neighbours", raw.n_held, 0, MAX_HELD)
     values = np.array(raw.values, dtype=float).view(complex).reshape(raw.n + 1, 2 * raw.rank)
-    frame, frame_epoch = bounds.robot(raw.frame), bounds.epoch(raw.frame_epoch)
-    keyframes = tuple(bounds.sample(n) for n in raw.keyframes)
-    public = PublicPoses(frame, frame_epoch, raw.rank, keyframes, values)
+    public = PublicPoses(
+        frame=bounds.robot(raw.frame),
+        frame_epoch=bounds.epoch(raw.frame_epoch),
+        rank=raw.rank,
+        keyframes=tuple(bounds.sample(n) for n in raw.keyframes),
+        values=values,
+        round=raw.round,
+        since=raw.since,
+        part=raw.part,
+        parts=raw.parts,
+        asks=bool(bounds.flag(raw.asks)),
+        held=tuple(_read_held(held) for held in raw.held),
+    )
+    if (np.diff(raw.keyframes) <= 0).any():
+        raise ValueError("keyframes out of order")
     if not bounds.is_sayable(public):
         raise ValueError("lifted pose that no team can reach")
     return public
+
+
+def _read_held(raw: Any) -> tuple[int, int]:
+    return bounds.robot(raw.id), bounded("move", raw.round, 0, bounds.LAST_ROUND)
 
 
 # ---- parts -------------------------------------------------------------------------------------

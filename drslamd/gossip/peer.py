@@ -17,7 +17,6 @@ from drslamd.gossip.message_types import (
     Status,
 )
 from drslamd.gossip.peer_clock import PeerClock
-from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.odometry.track import PEER_TRACK_SAMPLES, Track
 from drslamd.slam.peer_in_range import PeerInRange
 
@@ -58,7 +57,6 @@ class Peer:
         self.track = Track(PEER_TRACK_SAMPLES)
         self.status: Status | None = None
         self.pose: Pose | None = None
-        self.public: PublicPoses | None = None
         self.last_heard = utime
         self.received = 0
         self._status_counter = self._pose_counter = 0
@@ -112,10 +110,6 @@ class Peer:
         """Keep the latest pose."""
         if not _is_overtaken(counter, self._pose_counter):
             self._pose_counter, self.pose = counter, pose
-
-    def take_public(self, message: PublicPoses) -> None:
-        """Keep what the peer said last of each of its public poses."""
-        self.public = message.after(self.public)
 
     def extend_track(self, batch: OdometryBatch, utime: int) -> None:
         """Append what is new in a batch; one that leaves a gap waits for those before it."""

@@ -32,8 +32,8 @@ MODEL_EVERY = 64
 """Log entries between two that say what our sensors are like."""
 MEASUREMENTS_PER_ENTRY = 20
 """Keyframes, ranges and closures in one log entry; 20 closures with 20 peers are 1,280 bytes."""
-PUBLIC_ENVELOPE_BYTES = 57
-"""What a public_poses_t needs besides its poses."""
+PUBLIC_ENVELOPE_BYTES = 80
+"""What a public_poses_t needs besides its poses and what it holds of others."""
 UNVERIFIED_US = 10 * SECOND_US
 """How long after a message that does not fit the team key it is still spoken of."""
 _FINGERPRINTS = {kind: frozenset([value]) for kind, value in messages.FINGERPRINTS.items()}
@@ -97,12 +97,13 @@ class Team:
 
     def send_public(self, public: PublicPoses, utime: int) -> list[Send]:
         """Lifted poses, as many in one message as one datagram takes."""
-        # 4 bytes of number and 4 * rank floats for each, and the anchor's floats once
+        # 10 bytes for each that is held, 4 bytes of number and 4 * rank floats for each pose, and
+        # the anchor's floats once
         lifted = 16 * public.rank
-        at_once = (MAX_PAYLOAD - PUBLIC_ENVELOPE_BYTES - lifted) // (4 + lifted)
+        envelope = PUBLIC_ENVELOPE_BYTES + 10 * len(public.held) + lifted
         return [
-            self.send(public.part(first, first + at_once), utime)
-            for first in range(0, len(public.keyframes), at_once)
+            self.send(part, utime)
+            for part in public.split((MAX_PAYLOAD - envelope) // (4 + lifted))
         ]
 
     def append(self, entry: GraphEntry, utime: int) -> tuple[GraphEntry, bytes]:
@@ -253,8 +254,6 @@ class Team:
             peer.extend_track(message, utime)
         elif isinstance(message, Pose):
             peer.take_pose(message, header.counter)
-        else:
-            peer.take_public(message)
         return Received(origin, message)
 
     def _status(self, peer: Peer, status: Status, counter: int, utime: int) -> None:

@@ -90,9 +90,9 @@ class FrontEnd:
         self._range_sigma, self._bias_sigma = section.range_sigma_m, section.range_bias_sigma_m
         self._delta = section.delta
         self._nlos_db, self._epsilon = section.nlos_db, config.consistency.epsilon
-        self._tells_all = config.optimizer.algorithm != "banded"
+        self._has_ranges_in_graph = config.optimizer.algorithm == "banded"
         noise = known.narrowed(settings.odometry_noise(config.odometry))
-        self.model = settings.robot_model(config, noise)
+        self.model = known.mounted(settings.robot_model(config, noise))
         self.reckoning = DeadReckoning()
         self.ranges: dict[int, RangeBuffer] = {}
         self.pairs: dict[int, PairTracker] = {}
@@ -311,11 +311,13 @@ class FrontEnd:
         utime: int,
         is_doubted: bool = False,
     ) -> list[RangeMeasurement]:
-        """New distances for the graph.
+        """New distances for the graph, where module 3 knows what to do with them.
 
         Args:
             is_doubted: see `make_keyframe`; of who makes them or of any other.
         """
+        if not self._has_ranges_in_graph:
+            return []
         self.update_pairs(neighbours, graph, utime)
         found = [
             pair.sampler.sample(pair.ranges, a, b, pair.peer, is_doubted)
@@ -325,4 +327,4 @@ class FrontEnd:
 
     def tell_closures(self) -> list[ClosureMeasurement]:
         """Closures to tell the team, and to withdraw."""
-        return [c for pair in self.pairs.values() for c in pair.tell(self._tells_all)]
+        return [c for pair in self.pairs.values() for c in pair.tell(not self._has_ranges_in_graph)]

@@ -21,7 +21,6 @@ from drslamd.gossip import lc02
 from drslamd.gossip.message_types import Heard, LogState, Message, OdometryBatch, Status
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
-from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.robot_model import UNTOLD, RobotModel
 
@@ -63,15 +62,11 @@ def test_every_kind_reaches_the_peer_that_said_it() -> None:
     for kind in ("STATUS", "ODOMETRY", "POSE", "PUBLIC"):
         assert tell(team, seal, said[kind])
     peer = team.peers[3]
-    batch, public = said["ODOMETRY"], said["PUBLIC"]
-    assert isinstance(batch, OdometryBatch)
-    assert isinstance(public, PublicPoses)
+    assert isinstance(said["ODOMETRY"], OdometryBatch)
     assert peer.chain == Chain(3, 11)
     assert peer.status == said["STATUS"]
     assert peer.pose == said["POSE"]
     assert (peer.track.n0, peer.track.end) == (40, 43)
-    assert peer.public is not None
-    assert peer.public.keyframes == (40, 50)
     assert peer.received == 4
 
 

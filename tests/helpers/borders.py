@@ -152,7 +152,9 @@ def spoken(counter: int = 20) -> tuple[Header, dict[str, Message]]:
         "ODOMETRY": OdometryBatch(1_000, n, np.arange(9.0).reshape(3, 3)),
         "GRAPH": GraphEntry(4, UNTOLD, (Keyframe(n, 0, 1, 2, 3),), (place,), (closure,)),
         "POSE": Pose(PoseState.LOCALISED, 0, 1, 104 * SECOND, (1.25, -2.5, 3.0), COVARIANCE),
-        "PUBLIC": PublicPoses(0, 1, 2, (n, n + 5), np.ones((3, 4), dtype=complex)),
+        "PUBLIC": PublicPoses(
+            0, 1, 2, (n, n + 5), np.ones((3, 4), dtype=complex), round=5, since=4, held=((1, 3),)
+        ),
     }
 
 

@@ -89,7 +89,9 @@ def one_of_each_kind() -> list[Message]:
             (ClosureMeasurement(8, True, 40, peer, 41, (1.5, -2.5, 0.25), COVARIANCE, CORRECTED),),
         ),
         Pose(PoseState.LOCALISED, 3, 11, 4_000_000, (1.25, -2.5, 3.0), COVARIANCE),
-        PublicPoses(3, 11, 2, (40, 50), lifted),
+        PublicPoses(
+            3, 11, 2, (40, 50), lifted, round=9, since=7, part=1, parts=3, held=((4, 6), (9, 0))
+        ),
     ]
 
 

@@ -22,7 +22,7 @@ from drslamd.slam.graph.measurements import (
     Keyframe,
     RangeMeasurement,
 )
-from drslamd.slam.graph.public_poses import PublicPoses
+from drslamd.slam.graph.public_poses import MAX_HELD, MAX_PUBLIC, PublicPoses
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.robot_model import RobotModel
 
@@ -136,14 +136,31 @@ poses = st.builds(
 )
 
 
+rounds = st.integers(0, 2**62 - 1)
+
+
 @st.composite
 def publics(draw: st.DrawFn) -> PublicPoses:
     rank, count = draw(st.sampled_from([1, 2, 5, 20])), draw(st.integers(0, 4))
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     parts = rng.normal(0, draw(st.sampled_from([1e-9, 1.0, 1e5])), (2, count + 1, 2 * rank))
     real, imaginary = parts.astype(np.float32).astype(float)
-    numbers = tuple(draw(samples) for _ in range(count))
-    return PublicPoses(draw(robots), draw(epochs), rank, numbers, real + 1j * imaginary)
+    numbers = sorted(draw(st.sets(samples, min_size=count, max_size=count)))
+    since, move = sorted(draw(st.tuples(rounds, rounds)))
+    many = draw(st.integers(1, MAX_PUBLIC))
+    return PublicPoses(
+        draw(robots),
+        draw(epochs),
+        rank,
+        tuple(numbers),
+        real + 1j * imaginary,
+        round=move,
+        since=since,
+        part=draw(st.integers(0, many - 1)),
+        parts=many,
+        asks=draw(st.booleans()),
+        held=tuple(draw(st.lists(st.tuples(robots, rounds), max_size=MAX_HELD))),
+    )
 
 
 any_message: st.SearchStrategy[Message] = st.one_of(statuses, batches, entries, poses, publics())

@@ -103,7 +103,7 @@ class PairCalibration(NamedTuple):
         Args:
             found: what a search for mistakes found; it serves until module 3 has learned more.
         """
-        if found is not None and not _has_learned(estimate, (a, b), found):
+        if found is not None and not has_learned(estimate, (a, b), found):
             a_end, b_end = (EndCalibration.repaired(repair) for repair in found)
             return PairCalibration(a=a_end, b=b_end)
         if estimate is None or not estimate.converged:
@@ -118,7 +118,7 @@ class PairCalibration(NamedTuple):
         )
 
 
-def _has_learned(estimate: TeamEstimate | None, robots: tuple[int, int], found: Case) -> bool:
+def has_learned(estimate: TeamEstimate | None, robots: tuple[int, int], found: Case) -> bool:
     """Has module 3 gone most of the way to what was found?"""
     if estimate is None or not estimate.converged:
         return False

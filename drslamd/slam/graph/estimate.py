@@ -28,14 +28,24 @@ class Lifted:
 
     Attributes:
         n: (k,) its keyframes; rows: (k, 2 r) their lifted poses.
-        anchor: (2 r,) lifted pose that is the origin of the team's frame.
+        anchor: (2 r,) the lifted pose that anchors the frame of the team; origin: (3,) where in
+            that frame it is.
         carriers: (m,) keyframes that carry closures and are therefore public.
+        weights: (m, 2) how stiffly closures hold rotation and position of these, 1 and 1/m^2.
+        ends: how many closures were counted.
+        quiet: how many moves were made on the very same keyframes and closures.
+        gain: share of its cost that the last move brought, or would have.
     """
 
     n: Array
     rows: Array
     anchor: Array
+    origin: Array
     carriers: Array
+    weights: Array
+    ends: int
+    quiet: int
+    gain: float
 
 
 class Learned(NamedTuple):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -182,16 +182,6 @@ def closures(graph: PoseGraph, numbers: Numbering) -> BetweenFactors:
     i, j = np.concatenate(ends, axis=1)
     table = ClosureTable(np.concatenate(tables))
     return BetweenFactors(i, j, table.a_T_b, table.covariance)
-
-
-def between_factors(rows: Sequence[tuple[int, int, Sequence[float], Array]]) -> BetweenFactors:
-    """Factors out of (i, j, measured (3,), covariance (3, 3)), also of none."""
-    return BetweenFactors(
-        np.array([r[0] for r in rows], dtype=np.int64),
-        np.array([r[1] for r in rows], dtype=np.int64),
-        np.array([r[2] for r in rows], dtype=float).reshape(-1, 3),
-        np.array([r[3] for r in rows], dtype=float).reshape(-1, 3, 3),
-    )
 
 
 def ranges(graph: PoseGraph, numbers: Numbering) -> tuple[RangeFactors, list[tuple[int, int]]]:

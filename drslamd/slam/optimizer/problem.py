@@ -10,6 +10,7 @@ that number. Errors are defined here once, so that every optimiser minimises the
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -42,6 +43,18 @@ class BetweenFactors:
     def chosen(self, which: NDArray[np.bool_]) -> BetweenFactors:
         columns = (self.i, self.j, self.measured, self.covariance)
         return BetweenFactors(*(column[which] for column in columns))
+
+    @staticmethod
+    def none() -> BetweenFactors:
+        """Of no poses."""
+        at = np.zeros(0, dtype=np.int64)
+        return BetweenFactors(at, at, np.zeros((0, 3)), np.zeros((0, 3, 3)))
+
+    @staticmethod
+    def joined(parts: Iterable[BetweenFactors]) -> BetweenFactors:
+        """All factors of all parts, at least one."""
+        columns = ((e.i, e.j, e.measured, e.covariance) for e in parts)
+        return BetweenFactors(*(np.concatenate(column) for column in zip(*columns, strict=True)))
 
     @cached_property
     def information(self) -> Array:

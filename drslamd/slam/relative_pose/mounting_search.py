@@ -50,6 +50,9 @@ BETTER, UNLIKE = 100.0, 40.0
 the same robot must be worse. Of eighteen robots that count wrongly all begin near the truth after
 24 to 72 s; of fifteen healthy pairs none begins elsewhere than configured, and of six whose sight
 is blocked half of the time one does."""
+FITS = 0.7
+"""Chi-squared per degree of freedom of windows that a track or a scale really explains: it is 0.2 to
+0.6, because noise is allowed for generously; where sight is blocked it is more, whatever is tried."""
 INDIFFERENT = -5.0
 """Who drives straight for long is the same in a mirror: then what is configured is believed."""
 
@@ -151,12 +154,16 @@ class MountingSearch:
     def _refine(self, found: Case) -> bool:
         """Windows with the repair disagree: is it a little more, or less?"""
         total = np.sum([answer.costs for answer in self._answers], axis=0)
-        best = what_if.variants(found)[int(np.argmin(total))]
         if len(self._answers) < FEWEST_ASKED:
             return False
+        freedom = sum(answer.freedom for answer in self._answers)
         self._answers.clear()
-        self.found = best
-        return best != found
+        if total.min() > FITS * freedom:
+            # it was something else
+            self.found, self.is_clear, self.is_confirmed = None, False, False
+            return True
+        self.found = what_if.variants(found)[int(np.argmin(total))]
+        return self.found != found
 
 
 def is_as_configured(chi2: Array, is_mirror_told: bool) -> bool:
@@ -194,7 +201,7 @@ def winner(chi2: Array, freedom: float) -> tuple[Case | None, bool]:
     if not is_learned(case):
         return (case, True) if worse[0] >= WRONG and others >= CLEAR else (None, False)
     unlike = min(by for by, other in zip(worse, CASES, strict=True) if not _is_like(other, case))
-    is_start = worse[0] >= BETTER and unlike >= UNLIKE
+    is_start = level <= FITS and worse[0] >= BETTER and unlike >= UNLIKE
     return (case, bool(others >= UNLIKE)) if is_start else (None, False)
 
 

@@ -36,6 +36,7 @@ from drslamd.slam.optimizer.factors import (
     numbering,
     sensible,
 )
+from drslamd.slam.optimizer.problem import BetweenFactors
 from drslamd.slam.robot_model import RobotModel
 
 A, B, C = Chain(0, 5), Chain(1, 6), Chain(2, 7)
@@ -253,7 +254,8 @@ def test_withdrawn_closures_and_those_of_other_groups_are_no_edges() -> None:
 
 
 def test_no_items_are_no_edges() -> None:
-    assert factors.between_factors([]).covariance.shape == (0, 3, 3)
+    nothing = BetweenFactors.joined([BetweenFactors.none(), BetweenFactors.none()])
+    assert nothing.covariance.shape == (0, 3, 3)
 
 
 # mountings that are not as configured

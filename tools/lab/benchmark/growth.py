@@ -113,7 +113,7 @@ def _update(back: BackEnd) -> float:
     """ms of CPU for all that a robot does each second with the graph that it holds."""
     started = timing.now_ms()
     back.digest()
-    job = back.begin(set(range(ROBOTS)), {})
+    job = back.begin(set(range(ROBOTS)))
     if job is not None:
         back.on_solution(job())
     return timing.now_ms() - started

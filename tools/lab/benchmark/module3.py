@@ -194,7 +194,6 @@ def _descended(graph: Graph, lifted: Array, robot: Array, number: int) -> Array:
         len(mine),
     )
     out = lifted.copy()
-    out[mine] = riemannian_descent.rows(
-        riemannian_descent.descend(block, riemannian_descent.stacked(lifted[mine]))
-    )
+    descended, _ = riemannian_descent.descend(block, riemannian_descent.stacked(lifted[mine]))
+    out[mine] = riemannian_descent.rows(descended)
     return np.asarray(out)

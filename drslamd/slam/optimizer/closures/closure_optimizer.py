@@ -52,7 +52,7 @@ class ClosureOptimizer:
             graph.view.chains[robot].chain for robot in sorted({s.robot for s in group.members})
         ]
         is_known = previous and {c.robot for c in chains} <= set(previous.trajectories)
-        edges, is_closure = _edges(graph, places)
+        edges, is_closure = closure_edges(graph, places)
         problem = _ClosureProblem(
             places=places,
             edges=edges,
@@ -84,7 +84,7 @@ class _ClosureProblem:
     start: Array | None
 
 
-def _edges(graph: PoseGraph, places: Numbering) -> tuple[ComplexFactors, NDArray[np.bool_]]:
+def closure_edges(graph: PoseGraph, places: Numbering) -> tuple[ComplexFactors, NDArray[np.bool_]]:
     """All edges, and which of them are closures."""
     parts = [ComplexFactors.of(factors.closures(graph, places))]
     for robot, place in places.place.items():
