@@ -18,9 +18,11 @@ def found(case: Case | None, is_clear: bool = True) -> MountingSearch:
     return search
 
 
-def said(case: Case | None, is_clear: bool = True, peer_is_odd: bool = False) -> str | None:
+def said(
+    case: Case | None, is_clear: bool = True, peer_is_odd: bool = False, has_learned: bool = True
+) -> str | None:
     """Of robots 3 and 8, seen from robot 3."""
-    return contradictions.mounting(3, 8, found(case, is_clear), peer_is_odd)
+    return contradictions.mounting(3, 8, found(case, is_clear), peer_is_odd, has_learned)
 
 
 NARROW, SHORT = Repair(Fault.TRACK, turn=0.67), Repair(Fault.SCALE, 1.5, 1.5)
@@ -77,6 +79,13 @@ def test_a_scale_is_told_as_what_to_make_of_the_odometry() -> None:
     assert "wheels.counts_per_metre" in sentence
 
 
+def test_a_track_or_a_scale_is_told_once_module_3_finds_the_same_and_sides_at_once() -> None:
+    for case in (Case(b=NARROW), Case(a=SHORT)):
+        assert said(case, has_learned=False) is None
+    for case in (MIRROR, Case(b=SIDES[0])):
+        assert said(case, has_learned=False) == said(case)
+
+
 def test_robots_that_are_wrong_in_the_same_way_are_both_named() -> None:
     sentence = said(Case(SHORT, SHORT))
     assert sentence is not None
@@ -92,7 +101,7 @@ def test_what_no_mistake_explains_is_said_of_both(
     search = MountingSearch()
     for _ in range(MOST):
         search.on_verdict(Verdict.POOR_FIT)
-    sentence = contradictions.mounting(3, 8, search, False)
+    sentence = contradictions.mounting(3, 8, search, False, False)
     if not is_puzzled:
         assert sentence is None
         return

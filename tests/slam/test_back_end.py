@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 from slam_scenes import SmallTeam, closure, config, keyframes, same_pose, small_team, wander
 
-from drslamd.conventions import GRID_US, Chain, Segment
+from drslamd.conventions import Chain, Segment
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.graph.estimate import Lifted, TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
-from drslamd.slam.odometry.track import RESOLUTION, Track
 from drslamd.slam.optimizer.contract import Job
 
 EVERYBODY = {0, 1, 2}
@@ -289,21 +288,6 @@ def test_a_move_that_brought_much_is_followed_at_once(
     assert result.lifted is not None
     back.on_solution(replace(result, lifted=replace(result.lifted, gain=gain)))
     assert back.is_urgent is is_urgent
-
-
-def test_our_pose_now_is_the_newest_solved_one_carried_on_by_odometry(team: SmallTeam) -> None:
-    back, _ = back_end(team)
-    track = Track(100)
-    for k in range(4):
-        track.append(50 + k, np.array([0.1 * k, 0.0, 0.0]) / RESOLUTION)
-    assert back.pose_now(track) is None
-    own = Trajectory(team.chains[0], np.array([51]), np.array([[2.0, 3.0, np.pi / 2]]))
-    back.on_solution(TeamEstimate(Segment(0, 10, 0), {0: own}, {0: np.eye(3)}))
-    now = back.pose_now(track)
-    assert now is not None
-    assert now.utime == 53 * GRID_US
-    assert same_pose(now.pose, np.array([2.0, 3.2, np.pi / 2]))
-    assert np.array_equal(now.covariance, np.eye(3))
 
 
 def test_what_is_solved_is_thinned_and_what_was_said_is_held() -> None:

@@ -17,6 +17,7 @@ from drslamd.slam.relative_pose.mounting_search import (
     CLEAR,
     EXCLUDED,
     FEWEST_ASKED,
+    FITS,
     INDIFFERENT,
     MANY,
     MOST,
@@ -37,6 +38,10 @@ FAR = 1e4
 """Chi-squared of what does not fit at all."""
 FREEDOM = 100
 """Of all windows together."""
+FIT = 0.9 * FITS * FREEDOM
+"""Chi-squared of what fits them, noise being allowed for generously."""
+GOOD = 0.9 * FITS * 30
+"""Likewise, of one window of 33 measurements."""
 AS_IT_IS = Case()
 LEFT, RIGHT = Case(b=SIDES[0]), Case(b=SIDES[1])
 TRACK, SCALE = Case(b=TRACKS[0]), Case(b=SCALES[0])
@@ -73,9 +78,9 @@ def test_wheels_that_run_backwards_win_by_far_and_only_they(
 
 @pytest.mark.parametrize("rival", [MIRROR, RIGHT, TRACK, Case(a=SIDES[0])])
 def test_any_other_kind_makes_it_unclear(rival: Case) -> None:
-    known = {LEFT: 50.0, AS_IT_IS: 50.0 + WRONG + LITTLE}
-    assert winner(costs({**known, rival: 50.0 + CLEAR - LITTLE}), FREEDOM) == (None, False)
-    assert winner(costs({**known, rival: 50.0 + CLEAR + LITTLE}), FREEDOM) == (LEFT, True)
+    known = {LEFT: FIT, AS_IT_IS: FIT + WRONG + LITTLE}
+    assert winner(costs({**known, rival: FIT + CLEAR - LITTLE}), FREEDOM) == (None, False)
+    assert winner(costs({**known, rival: FIT + CLEAR + LITTLE}), FREEDOM) == (LEFT, True)
 
 
 @pytest.mark.parametrize(("level", "wins"), [(POOR_FIT - 0.01, True), (POOR_FIT + 0.01, False)])
@@ -97,7 +102,7 @@ def test_a_track_or_a_scale_is_begun_with_where_nothing_unlike_it_fits(
     best: Case, worse: float, unlike: float, is_begun: bool
 ) -> None:
     found, _ = winner(
-        costs({best: 50.0, AS_IT_IS: 50.0 + worse, Case(a=SIDES[1]): 50.0 + unlike}), FREEDOM
+        costs({best: FIT, AS_IT_IS: FIT + worse, Case(a=SIDES[1]): FIT + unlike}), FREEDOM
     )
     assert found == (best if is_begun else None)
 
@@ -114,11 +119,17 @@ def test_a_track_or_a_scale_is_begun_with_where_nothing_unlike_it_fits(
     ],
 )
 def test_tracks_and_scales_of_the_same_robots_are_alike(rival: Case, is_unlike: bool) -> None:
-    known = {TRACK: 50.0, AS_IT_IS: 50.0 + BETTER + LITTLE, rival: 50.0 + LITTLE}
+    known = {TRACK: FIT, AS_IT_IS: FIT + BETTER + LITTLE, rival: FIT + LITTLE}
     found, is_clear = winner(costs(known), FREEDOM)
     assert found == (None if is_unlike else TRACK)
     # another track is the same mistake, a scale is another one
     assert is_clear is (rival.kind == TRACK.kind)
+
+
+@pytest.mark.parametrize(("level", "is_begun"), [(FITS - 0.01, True), (FITS + 0.01, False)])
+def test_a_track_or_a_scale_must_fit_well_itself(level: float, is_begun: bool) -> None:
+    found, _ = winner(costs({SCALE: level * FREEDOM}), FREEDOM)
+    assert found == (SCALE if is_begun else None)
 
 
 def test_what_is_configured_wins_nothing() -> None:
@@ -155,17 +166,17 @@ def test_windows_must_exclude_wheels_that_run_backwards_and_find_no_other_mistak
     case: Case, by: float, is_told: bool, confirms: bool
 ) -> None:
     """A robot that hardly drove is the same in a mirror, and is not asked about that."""
-    assert is_as_configured(costs({AS_IT_IS: 50.0, case: 50.0 + by}), is_told) is confirms
+    assert is_as_configured(costs({AS_IT_IS: FIT, case: FIT + by}), is_told) is confirms
 
 
 def test_a_pair_is_confirmed_once_and_for_all() -> None:
     for best in (LEFT, TRACK):
         search = MountingSearch()
         assert not search.is_confirmed
-        assert not ask(search, {AS_IT_IS: 30.0}, rest=30.0 + EXCLUDED)
+        assert not ask(search, {AS_IT_IS: GOOD}, rest=GOOD + EXCLUDED)
         assert search.is_confirmed
         for _ in range(MOST_ASKED):
-            assert not ask(search, {best: 30.0})
+            assert not ask(search, {best: GOOD})
         assert search.is_confirmed
         assert search.found is None
 
@@ -181,18 +192,18 @@ def test_the_newest_windows_together_exclude_what_one_alone_does_not() -> None:
     """Each says a little more than a third of what is asked for."""
     search, each = MountingSearch(), EXCLUDED / FEWEST_ASKED + LITTLE
     for asked in range(1, FEWEST_ASKED + 1):
-        ask(search, {AS_IT_IS: 30.0, LEFT: 30.0 + each})
+        ask(search, {AS_IT_IS: GOOD, LEFT: GOOD + each})
         assert search.is_confirmed is (asked == FEWEST_ASKED)
     later = MountingSearch()
     # what came before them does not count
     for _ in range(FEWEST_ASKED):
-        ask(later, {AS_IT_IS: 30.0, LEFT: 30.0})
+        ask(later, {AS_IT_IS: GOOD, LEFT: GOOD})
     for asked in range(1, FEWEST_ASKED + 1):
-        ask(later, {AS_IT_IS: 30.0, LEFT: 30.0 + each})
+        ask(later, {AS_IT_IS: GOOD, LEFT: GOOD + each})
         assert later.is_confirmed is (asked == FEWEST_ASKED)
     vague = MountingSearch()
     for _ in range(MOST_ASKED - 1):
-        ask(vague, {AS_IT_IS: 30.0, LEFT: 30.0 + each - 2 * LITTLE})
+        ask(vague, {AS_IT_IS: GOOD, LEFT: GOOD + each - 2 * LITTLE})
     assert not vague.is_confirmed
 
 
@@ -204,7 +215,7 @@ def test_who_is_the_same_in_a_mirror_for_long_is_believed_as_configured(
     worth = FEWEST_ASKED + (MOST_ASKED - FEWEST_ASKED) / SHARED
     search = MountingSearch()
     for asked in range(1, MOST_ASKED + 1):
-        ask(search, {AS_IT_IS: 30.0, MIRROR: 30.0 + by / worth})
+        ask(search, {AS_IT_IS: GOOD, MIRROR: GOOD + by / worth})
         assert search.is_confirmed is (confirms and asked == MOST_ASKED)
     assert search.found is None
 
@@ -217,7 +228,7 @@ def test_a_mistake_is_found_after_windows_enough_and_what_was_before_is_forgotte
     for _ in range(RECENT):
         search.on_verdict(Verdict.POOR_FIT)
     for asked in range(1, FEWEST_ASKED + 1):
-        assert ask(search, {LEFT: 30.0}) is (asked == FEWEST_ASKED)
+        assert ask(search, {LEFT: GOOD}) is (asked == FEWEST_ASKED)
         assert search.found == (LEFT if asked == FEWEST_ASKED else None)
     assert search.is_clear
     # of wheels that run backwards nothing is believed
@@ -229,7 +240,7 @@ def test_a_mistake_is_found_after_windows_enough_and_what_was_before_is_forgotte
 def test_with_a_track_or_a_scale_the_pair_is_believed() -> None:
     search = MountingSearch()
     for _ in range(FEWEST_ASKED):
-        ask(search, {TRACK: 30.0, SCALE: 30.0 + LITTLE})
+        ask(search, {TRACK: GOOD, SCALE: GOOD + LITTLE})
     assert search.found == TRACK
     assert search.is_confirmed
     assert not search.is_clear
@@ -242,7 +253,7 @@ def test_all_windows_decide_and_those_beyond_the_third_count_for_less() -> None:
     assert each * (FEWEST_ASKED + 2 / SHARED) < WRONG
     search = MountingSearch()
     for asked in range(1, 7):
-        ask(search, {LEFT: 30.0, AS_IT_IS: 30.0 + each})
+        ask(search, {LEFT: GOOD, AS_IT_IS: GOOD + each})
         assert (search.found == LEFT) is (asked == 6)
 
 
@@ -258,14 +269,14 @@ def test_degrees_of_freedom_are_those_of_measurements_less_the_three_of_a_pose()
 # a mistake that was found is refined
 
 
-def of_variants(found: Case, best: Case) -> Array:
-    return np.array([20.0 if case == best else 50.0 for case in variants(found)])
+def of_variants(found: Case, best: Case, chi2: float = GOOD) -> Array:
+    return np.array([chi2 if case == best else chi2 + 30 for case in variants(found)])
 
 
 def begun() -> MountingSearch:
     search = MountingSearch()
     for _ in range(FEWEST_ASKED):
-        ask(search, {TRACK: 30.0})
+        ask(search, {TRACK: GOOD})
     assert search.cases == variants(TRACK)
     return search
 
@@ -283,6 +294,20 @@ def test_a_mistake_is_refined_by_as_many_windows_as_found_it() -> None:
     assert not changed
     assert search.found == better
     assert search.is_confirmed
+
+
+@pytest.mark.parametrize(("level", "stays"), [(FITS - 0.01, True), (FITS + 0.01, False)])
+def test_a_mistake_with_which_windows_do_not_fit_after_all_was_none(
+    level: float, stays: bool
+) -> None:
+    search = begun()
+    for asked in range(1, FEWEST_ASKED + 1):
+        changed = search.on_costs(of_variants(TRACK, TRACK, 30 * level), 33, True)
+        assert changed is (asked == FEWEST_ASKED and not stays)
+    assert search.found == (TRACK if stays else None)
+    assert search.is_confirmed is stays
+    assert search.is_clear is stays
+    assert search.cases == (variants(TRACK) if stays else CASES)
 
 
 # when it is asked
@@ -328,7 +353,7 @@ def test_what_was_found_is_asked_about_again_only_where_it_can_be_refined_and_do
 ) -> None:
     search = MountingSearch()
     for _ in range(FEWEST_ASKED):
-        ask(search, {found: 30.0})
+        ask(search, {found: GOOD})
     assert search.found == found
     for _ in range(poor):
         search.on_verdict(Verdict.POOR_FIT)
