@@ -52,7 +52,7 @@ the same robot must be worse. Of eighteen robots that count wrongly all begin ne
 is blocked half of the time one does."""
 FITS = 0.7
 """Chi-squared per degree of freedom of windows that a track or a scale really explains: it is 0.2
-to 0.6, because noise is allowed for generously; where sight is blocked it is more, whatever is
+to 0.6, because noise is allowed for generously. Where sight is blocked it is more, whatever is
 tried."""
 INDIFFERENT = -5.0
 """Who drives straight for long is the same in a mirror: then what is configured is believed."""
