@@ -59,7 +59,7 @@ class Broadcast:
         self._odometry_said: deque[tuple[int, int]] = deque(maxlen=BATCHES)
         """When batches were said, and one past the last sample of each."""
 
-    # ---- heartbeat ----
+    # heartbeat
 
     def heartbeat(
         self, neighbours: list[PeerInRange], uwb_clock: int | None, state: PoseState, utime: int
@@ -109,7 +109,7 @@ class Broadcast:
             logs=self._team.logs.next_states(),
         )
 
-    # ---- odometry ----
+    # odometry
 
     def odometry(self, neighbours: list[PeerInRange], utime: int) -> list[Effect]:
         """Short-term odometry, for peers whose windows need it (paper III-C)."""
@@ -135,7 +135,7 @@ class Broadcast:
         is_lost = bool(known) and peer.wanted_n < known[-1]
         return peer.wanted_n if is_lost or not said else said[-1][1]
 
-    # ---- pose ----
+    # pose
 
     def pose(self, where: Whereabouts, utime: int) -> list[Effect]:
         """Where we are, when that is news."""

@@ -167,7 +167,7 @@ class Daemon:
         self._pace.lags.append((now - self._due) / MILLISECOND_US)
         self.handle(Tick(now))
 
-    # ---- effects ----
+    # effects
 
     def _write(self, effect: Write) -> None:
         if effect.port != "wheels" or not isinstance(self._wheels, SerialPort):
@@ -228,7 +228,7 @@ class Daemon:
 
         self._worker.submit(partial(self._store.save, effect.state), done)
 
-    # ---- life ----
+    # life
 
     def _start(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         task = asyncio.ensure_future(work)

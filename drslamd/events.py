@@ -25,7 +25,7 @@ class PortCondition(Enum):
     LOST = "lost"
 
 
-# ---- events ----------------------------------------------------------------------------------
+# events
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ Event = Union[
     Stop,
 ]
 
-# ---- effects ---------------------------------------------------------------------------------
+# effects
 
 
 @dataclass(frozen=True)

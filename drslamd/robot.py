@@ -157,7 +157,7 @@ class Robot:
         effects, outbox = self._handlers[type(event)](event), self.outbox
         return [e for e in effects if not isinstance(e, Send) or outbox.passes(e, event.utime)]
 
-    # ---- sensors ----
+    # sensors
 
     def _on_serial(self, event: SerialData) -> list[Effect]:
         if event.port == "uwb":
@@ -184,7 +184,7 @@ class Robot:
         data = self.wheels.poll(utime)
         return [Write("wheels", data)] if data else []
 
-    # ---- the team ----
+    # the team
 
     def _on_network(self, event: NetworkState) -> list[Effect]:
         self.network = event
@@ -223,7 +223,7 @@ class Robot:
         peers = (peer.neighbour(self.own, utime) for peer in self.team.living(utime).values())
         return [peer for peer in peers if peer.ranges_to_us or peer.uwb_id in mine]
 
-    # ---- our log ----
+    # our log
 
     def _extend_log(self, utime: int) -> list[Effect]:
         """One entry of our log: where our wheels went, what we ranged, what module 2 kept."""
@@ -245,7 +245,7 @@ class Robot:
                 sends.append(self.team.send_sealed(self.own.robot, sealed))
         return sends
 
-    # ---- the three modules ----
+    # the three modules
 
     def _relative_poses(self, utime: int) -> list[Effect]:
         """Module 1: a window of ranges and both odometries, for each pair that we own."""
@@ -307,7 +307,7 @@ class Robot:
         self.calibration.update(self.back.estimate, self.own.robot, self.front.pairs)
         return [*self.broadcast.pose(self.whereabouts(event.utime), event.utime), *public]
 
-    # ---- what we know of ourselves ----
+    # what we know of ourselves
 
     def pose(self) -> PoseNow | None:
         """Our latest pose in the frame of the team; None while we are not localised."""
@@ -330,7 +330,7 @@ class Robot:
         # our own memory was lost, or a lie is believed
         return [*notes, Restart(above, "peers know a later start of this robot")]
 
-    # ---- time passes, and ends ----
+    # time passes, and ends
 
     def _on_tick(self, event: Tick) -> list[Effect]:
         due = self.timers.take_due(event.utime)

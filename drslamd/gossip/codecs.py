@@ -57,7 +57,7 @@ class Codec(NamedTuple):
     read: Callable[[Any], Any]
 
 
-# ---- status ------------------------------------------------------------------------------------
+# status
 
 
 def _fill_status(out: Any, m: Status) -> None:
@@ -101,7 +101,7 @@ def _read_heard(raw: Any) -> Heard:
     )
 
 
-# ---- odometry ----------------------------------------------------------------------------------
+# odometry
 
 
 def _fill_odometry(out: Any, m: OdometryBatch) -> None:
@@ -127,7 +127,7 @@ def _read_odometry(raw: Any) -> OdometryBatch:
     return OdometryBatch(raw.segment_start, raw.n0, steps)
 
 
-# ---- graph -------------------------------------------------------------------------------------
+# graph
 
 
 def _fill_graph(out: Any, m: GraphEntry) -> None:
@@ -257,7 +257,7 @@ def _read_closure(c: Any, peers: list[Chain]) -> ClosureMeasurement:
     )
 
 
-# ---- poses -------------------------------------------------------------------------------------
+# poses
 
 
 def _fill_pose(out: Any, m: Pose) -> None:
@@ -330,7 +330,7 @@ def _read_held(raw: Any) -> tuple[int, int]:
     return bounds.robot(raw.id), bounded("move", raw.round, 0, bounds.LAST_ROUND)
 
 
-# ---- parts -------------------------------------------------------------------------------------
+# parts
 
 
 def _filled(kind: type[Any], values: Any) -> Any:

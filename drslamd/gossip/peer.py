@@ -170,7 +170,7 @@ def _is_overtaken(counter: int, latest: int) -> bool:
     return 0 <= latest - counter < REORDERED
 
 
-# ---- whose is a UWB module? ----
+# whose is a UWB module?
 
 
 def carrier(peers: Collection[Peer], uwb_id: int) -> int | None:

@@ -87,7 +87,7 @@ class Team:
         self.starts = Starts(self.own, seal.epochs)
         self._last_refused: dict[SealFault | StartFault, tuple[int, str]] = {}
 
-    # ---- outgoing ----
+    # outgoing
 
     def send(self, message: Message, utime: int) -> Send:
         """Seal a message."""
@@ -175,7 +175,7 @@ class Team:
             if peer.clock.delay_us is not None
         )
 
-    # ---- incoming ----
+    # incoming
 
     def receive(self, event: Datagram | ChannelMessage) -> Received | None:
         """Judge one datagram; whatever is wrong with it is counted by its reason."""
@@ -276,7 +276,7 @@ class Team:
         """Does this start run out of numbers for its messages or its log?"""
         return self.seal.is_spent or self._next_seq >= LAST_SEQ
 
-    # ---- who is there ----
+    # who is there
 
     def living(self, utime: int) -> dict[int, Peer]:
         """Peers that are alive and hear us."""

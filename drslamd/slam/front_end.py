@@ -99,7 +99,7 @@ class FrontEnd:
         self.watch = RangeWatch(section.range_sigma_m, tuning.ranges)
         self._keyframes = KeyframeSelector()
 
-    # ---- sensors ----
+    # sensors
 
     def on_motion(self, motion: Motion) -> None:
         self.reckoning.add(self._known.corrected(motion))
@@ -128,7 +128,7 @@ class FrontEnd:
         """See `KeyframeSelector.next`."""
         return self._keyframes.next(self.reckoning.track, is_doubted)
 
-    # ---- pairs ----
+    # pairs
 
     def watch_ranges(
         self,
@@ -196,7 +196,7 @@ class FrontEnd:
                 out.append(Measurable(pair, a, b))
         return out
 
-    # ---- module 1 ----
+    # module 1
 
     def module1(
         self,
@@ -280,7 +280,7 @@ class FrontEnd:
             out.append(WhatIfJob(pair, found, run))
         return out
 
-    # ---- module 2 ----
+    # module 2
 
     def module2(
         self, graph: PoseGraph, estimate: TeamEstimate | None
@@ -302,7 +302,7 @@ class FrontEnd:
                 out.append((pair, job))
         return out
 
-    # ---- what goes into our log ----
+    # what goes into our log
 
     def sample_ranges(
         self,

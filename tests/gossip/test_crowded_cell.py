@@ -59,7 +59,7 @@ def test_forty_robots_know_that_they_are_heard_hold_all_logs_and_do_not_crowd_th
     assert max(air.bytes_sent.values()) <= 8 * 1361 + (4 + relayed) * 70
 
 
-# ---- heartbeats --------------------------------------------------------------------------------
+# heartbeats
 
 
 def a_broadcast(team: Team, ranged: set[int]) -> Broadcast:

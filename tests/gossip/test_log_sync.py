@@ -74,7 +74,7 @@ def test_of_a_robot_that_was_never_heard_nothing_is_known() -> None:
     assert LogSync(5).next_states() == ()
 
 
-# ---- bounds ------------------------------------------------------------------------------------
+# bounds
 
 
 def test_the_oldest_entries_go_when_a_log_is_full(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -165,7 +165,7 @@ def test_a_boast_about_a_log_is_no_reason_to_count_to_it() -> None:
     assert repeated(logs, T0 + 2 * SECOND) == [said(OWNER, 0)]
 
 
-# ---- words that are not true -------------------------------------------------------------------
+# words that are not true
 
 
 LAST = 2**31 - 1
@@ -224,7 +224,7 @@ def test_a_log_of_which_the_owner_knows_nothing_begins_anew() -> None:
     assert logs.add(OWNER, 0, said(OWNER, 0), T0)
 
 
-# ---- what is said of it ------------------------------------------------------------------------
+# what is said of it
 
 
 def test_a_status_names_our_own_log_first() -> None:

@@ -24,7 +24,7 @@ def own_log(entries: int) -> tuple[LogState, ...]:
     return (LogState(*CHAIN, 0, entries, entries),)
 
 
-# ---- loss --------------------------------------------------------------------------------------
+# loss
 
 
 def loss_after(messages: list[str], lost: set[int]) -> float:
@@ -80,7 +80,7 @@ def test_a_peer_that_lies_about_its_log_has_some_loss_and_breaks_nothing() -> No
         assert 0.0 <= peer.loss <= 1.0
 
 
-# ---- life --------------------------------------------------------------------------------------
+# life
 
 
 def test_a_peer_lives_for_five_seconds_after_its_last_message() -> None:
@@ -194,7 +194,7 @@ def test_a_status_and_a_pose_far_ahead_of_all_others_overtake_nothing(
     assert (peer.pose is pose) == taken
 
 
-# ---- odometry ----------------------------------------------------------------------------------
+# odometry
 
 
 def steps(first: int, count: int) -> Array:
@@ -279,7 +279,7 @@ def test_a_batch_that_ends_a_minute_before_the_track_begins_it_anew(late: int, a
     assert peer.track.end == (1_150 - late if anew else 1_150)
 
 
-# ---- what the front end learns -----------------------------------------------------------------
+# what the front end learns
 
 
 def test_a_neighbour_carries_what_the_peer_said() -> None:

@@ -69,7 +69,7 @@ def is_within_the_claim(talk: Conversation) -> bool:
     return talk.error() <= talk.found().uncertainty_us
 
 
-# ---- from messages -----------------------------------------------------------------------------
+# from messages
 
 
 def test_before_the_first_message_nothing_is_known() -> None:
@@ -162,7 +162,7 @@ def test_a_peer_that_no_longer_hears_us_is_known_one_way_again() -> None:
     assert talk.found().source == "one way"
 
 
-# ---- from LinkTrack's system_time --------------------------------------------------------------
+# from LinkTrack's system_time
 
 OWN_MINUS_SYSTEM = 77_000_123
 

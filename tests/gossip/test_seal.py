@@ -25,7 +25,7 @@ def counters(*values: int, once: bool = True) -> list[bool]:
     ]
 
 
-# ---- the tag -----------------------------------------------------------------------------------
+# the tag
 
 
 def test_a_message_of_the_team_is_opened_with_its_header() -> None:
@@ -87,7 +87,7 @@ def test_the_tag_covers_the_channel() -> None:
         assert opened(receiver, (other, payload)) is SealFault.WRONG_TAG
 
 
-# ---- the order of judgement --------------------------------------------------------------------
+# the order of judgement
 
 
 def test_a_message_shorter_than_its_header_is_refused() -> None:
@@ -177,7 +177,7 @@ def test_faults_are_named_in_the_order_of_their_cost() -> None:
         assert opened(receiver, (channel, payload)) is fault
 
 
-# ---- replay ------------------------------------------------------------------------------------
+# replay
 
 
 def test_a_message_is_accepted_once() -> None:
@@ -225,7 +225,7 @@ def test_the_largest_counter_is_the_last_one() -> None:
     assert counters(*last, LAST_COUNTER - 1024) == [True] * 3 + [False]
 
 
-# ---- nothing is remembered of what is not proven -----------------------------------------------
+# nothing is remembered of what is not proven
 
 
 def test_a_forged_huge_counter_does_not_move_the_window() -> None:
@@ -253,7 +253,7 @@ def test_a_forged_later_epoch_does_not_lock_the_robot_out() -> None:
     assert receiver.epochs == {3: 4}
 
 
-# ---- epochs ------------------------------------------------------------------------------------
+# epochs
 
 
 def test_a_new_epoch_begins_a_new_window_and_ends_the_old_one() -> None:
@@ -287,7 +287,7 @@ def test_the_windows_of_two_robots_are_apart() -> None:
     assert isinstance(opened(receiver, forged(a_status(), robot=4, counter=7)), Header)
 
 
-# ---- our own id --------------------------------------------------------------------------------
+# our own id
 
 
 def test_our_own_messages_come_back_as_own() -> None:

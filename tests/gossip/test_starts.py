@@ -31,7 +31,7 @@ def says(team: Team, message: Message, epoch: int, utime: int = T0, counter: int
     return team.receive(event) is not None
 
 
-# ---- who speaks --------------------------------------------------------------------------------
+# who speaks
 
 
 @pytest.mark.parametrize("message", [a_status(), an_entry(0, 1)], ids=["status", "entry"])
@@ -69,7 +69,7 @@ def test_a_message_that_says_nonsense_begins_no_start() -> None:
     assert says(team, a_status(), 5, T0 + 10 * SECOND, counter=2)
 
 
-# ---- how high ----------------------------------------------------------------------------------
+# how high
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_a_start_beyond_all_clocks_is_spoken_of() -> None:
     assert "10.0.0.7" in sentence
 
 
-# ---- our own start -----------------------------------------------------------------------------
+# our own start
 
 
 def claims(

@@ -42,7 +42,7 @@ def hearing(*chains: Chain, logs: tuple[LogState, ...] = (), uwb_id: int = 7) ->
     return a_status(tuple(Heard(*chain, 0) for chain in chains), logs, uwb_id=uwb_id)
 
 
-# ---- what comes in -----------------------------------------------------------------------------
+# what comes in
 
 
 def test_a_datagram_and_the_message_in_it_are_heard_alike() -> None:
@@ -125,7 +125,7 @@ def test_a_status_that_was_overtaken_is_no_reason_to_repeat_anything() -> None:
     assert team.repeats(T0) == []
 
 
-# ---- what goes out -----------------------------------------------------------------------------
+# what goes out
 
 
 def test_a_message_goes_out_sealed_on_the_channel_of_its_robot() -> None:
@@ -172,7 +172,7 @@ def test_what_a_peer_lacks_is_repeated_as_it_was_sealed() -> None:
     assert (send.channel, send.payload) == ("DRSLAM_GRAPH_001", payload)
 
 
-# ---- who is there ------------------------------------------------------------------------------
+# who is there
 
 
 def test_the_living_are_those_that_are_heard_and_hear_us() -> None:
@@ -251,7 +251,7 @@ def test_a_peer_is_forgotten_after_ten_silent_minutes_and_its_log_is_not() -> No
     assert team.logs.epoch(3) == 1
 
 
-# ---- UWB modules and clocks --------------------------------------------------------------------
+# UWB modules and clocks
 
 
 def test_a_module_belongs_to_the_robot_that_says_so() -> None:
@@ -320,7 +320,7 @@ def test_what_a_silent_peer_said_of_its_radio_clock_is_not_taken_for_fresh() -> 
     assert offset.source == "messages"
 
 
-# ---- our own id and epoch ----------------------------------------------------------------------
+# our own id and epoch
 
 
 def test_a_robot_that_lost_its_memory_learns_its_last_epoch_after_any_silence() -> None:
@@ -343,7 +343,7 @@ def test_relays_of_our_own_log_from_another_start_do_not_look_like_another_robot
     assert dict(team.refused) == {"of another start of this robot, repeated by a peer": 2}
 
 
-# ---- sentences ---------------------------------------------------------------------------------
+# sentences
 
 
 WRONG_TAG = (

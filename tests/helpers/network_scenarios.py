@@ -132,7 +132,7 @@ async def the_group_on_an_interface_that_others_joined_is_not_heard() -> None:
         assert ear.messages == [("DRSLAM_POSE_001", b"on wlan0")]
 
 
-# ---- with the lcm package ----------------------------------------------------------------------
+# with the lcm package
 
 
 def route_to_the_group() -> None:

@@ -86,7 +86,7 @@ def same_pose(a: Array, b: Array, tolerance: float = 1e-9) -> bool:
     )
 
 
-# ---- paths -------------------------------------------------------------------------------------
+# paths
 
 
 def wander(rng: np.random.Generator, count: int, step_m: float = 0.05) -> Array:
@@ -147,7 +147,7 @@ def curved_window(
     return window_of(a, b, bias, a_antenna, b_antenna, step_s)
 
 
-# ---- items -------------------------------------------------------------------------------------
+# items
 
 
 def keyframes(
@@ -193,7 +193,7 @@ def model_of(
     return RobotModel(noise, *antenna, height)
 
 
-# ---- a small team with a graph -----------------------------------------------------------------
+# a small team with a graph
 
 
 @dataclass

@@ -133,7 +133,7 @@ def test_two_keys_are_different(tmp_path: Path) -> None:
     assert read_key(str(tmp_path / "a")) != read_key(str(tmp_path / "b"))
 
 
-# ---- a file that a stranger wrote --------------------------------------------------------------
+# a file that a stranger wrote
 
 
 def loaded(tmp_path: Path, content: str | bytes) -> tuple[dict[str, Any], str]:
@@ -268,7 +268,7 @@ def test_a_save_that_failed_leaves_nothing_behind(
     assert list(tmp_path.iterdir()) == []
 
 
-# ---- a new epoch -------------------------------------------------------------------------------
+# a new epoch
 
 
 def test_a_new_epoch_is_kept_with_what_is_known(tmp_path: Path) -> None:
@@ -286,7 +286,7 @@ def test_thirty_new_epochs_grow_strictly(tmp_path: Path) -> None:
     assert epochs == sorted(set(epochs))
 
 
-# ---- every value of the file, at every border --------------------------------------------------
+# every value of the file, at every border
 
 WHOLE: dict[str, Any] = {
     "schema": 1,

@@ -133,7 +133,7 @@ class PairTracker:
         self._kept_before: set[int] = set()
         self._number = 0
 
-    # ---- module 1 ----
+    # module 1
 
     def count(self, verdict: str) -> None:
         """Remember what became of a window."""
@@ -173,7 +173,7 @@ class PairTracker:
             self._checked, self.connected, self.kept = None, False, ()
             self._is_obsolete = self._is_busy
 
-    # ---- module 2 ----
+    # module 2
 
     def begin_check(
         self,
@@ -288,7 +288,7 @@ class PairTracker:
         now = {m.number for m in self.kept}
         return {number for number in self._kept_before | now if number >= oldest}
 
-    # ---- what the team hears ----
+    # what the team hears
 
     def tell(self, every: bool) -> list[ClosureMeasurement]:
         """Take what the team must hear: closures that are now kept, those that no longer are.

@@ -83,7 +83,7 @@ def gauge_segment(group: set[Segment], living: set[int]) -> Segment | None:
     return min((s for s in group if s.robot in living), default=None)
 
 
-# ---- where the optimiser starts ----------------------------------------------------------------
+# where the optimiser starts
 
 
 def placed(

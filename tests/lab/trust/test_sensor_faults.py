@@ -34,7 +34,7 @@ def driven(trail: Trail) -> Array:
     return np.column_stack([np.hypot(step[:, 0], step[:, 1]), step[:, 2]])
 
 
-# ---- wheels ----
+# wheels
 
 
 def test_wheels_that_slip_say_by_half_more_in_the_share_that_is_stated() -> None:
@@ -68,7 +68,7 @@ def test_wheels_that_slip_leave_truth_and_ranges() -> None:
         assert np.array_equal(slipped.trails[robot].truth, trail.truth)
 
 
-# ---- ranges ----
+# ranges
 
 
 def test_sight_is_blocked_in_the_share_of_time_and_for_as_long_as_is_stated() -> None:

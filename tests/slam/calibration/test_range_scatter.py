@@ -88,7 +88,7 @@ def test_module_3_finds_how_much_the_ranges_of_each_pair_scatter(true: float) ->
     assert list(estimate.scatter.values()) == pytest.approx([expected] * 3, rel=0.2)
 
 
-# ---- of ranges that are no outliers ----
+# of ranges that are no outliers
 
 
 def inlier_ratios(errors: Array, sigmas: Array, pair: Index, pairs: int) -> Array:

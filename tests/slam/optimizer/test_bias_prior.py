@@ -149,7 +149,7 @@ def test_by_weight_the_curvature_is_that_of_a_square_with_the_same_pull(own: Arr
     assert PRIOR.team_curvature(0.3, WEIGHT) * 0.3 == pytest.approx(PRIOR.team_pull(0.3))
 
 
-# ---- what it is for ----
+# what it is for
 
 
 def test_while_all_pairs_agree_each_is_held_tightly() -> None:

@@ -43,7 +43,7 @@ TEAM_S = 60.0
 MOST_OF_A_CORE = 0.5
 
 
-# ---- hours -------------------------------------------------------------------------------------
+# hours
 
 
 def by_hours(quick: bool) -> Iterator[Row]:
@@ -178,7 +178,7 @@ def _config(robot: int) -> Config:
     )
 
 
-# ---- team size ---------------------------------------------------------------------------------
+# team size
 
 
 def by_team_size(quick: bool) -> Iterator[Row]:

@@ -58,7 +58,7 @@ class Case:
         return run
 
 
-# ---- worlds ----
+# worlds
 
 SLIPS = Cause(WHEELS, r"slip|odometry")
 UNSEEN = Cause(RANGES, r"blocked|sight|scatter")
@@ -100,7 +100,7 @@ def _worlds() -> list[Case]:
     ]
 
 
-# ---- mountings ----
+# mountings
 
 BOTH = frozenset({"wheels.reverse_left", "wheels.reverse_right"})
 SWAP = frozenset({"wheels.swap_channels"})

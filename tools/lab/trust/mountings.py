@@ -67,7 +67,7 @@ class Mounting:
 
 HEALTHY = Mounting()
 
-# ---- what counters say ----
+# what counters say
 
 
 def both_reversed(t: Array, left: Array, right: Array) -> tuple[Array, Array]:

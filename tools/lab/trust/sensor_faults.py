@@ -32,7 +32,7 @@ SWING_M = (0.04, 0.10)
 """From the shortest to the longest that the bias of one module becomes when it turns."""
 
 
-# ---- wheels ----
+# wheels
 
 
 def slipping(rng: np.random.Generator, recording: Recording) -> Recording:
@@ -62,7 +62,7 @@ def _chained(start: Array, steps: Array) -> Array:
     return out
 
 
-# ---- ranges ----
+# ranges
 
 
 def blocked(rng: np.random.Generator, recording: Recording) -> Recording:

@@ -60,20 +60,20 @@ def _driven(**model: float) -> World:
     return World(replace(LONGER, odometry=OdometryModel(**model)))
 
 
-# ---- as modelled, but robots see each other from few sides ----
+# as modelled, but robots see each other from few sides
 
 CORRIDOR = World(replace(LONGER, width=40.0, height=2.6))
 LINE = World(LONGER, paths.in_line)
 PATROL = World(replace(RECORDED, robots=2, seconds=PATROL_S), paths.lanes)
 
-# ---- constants beyond what is configured ----
+# constants beyond what is configured
 
 FAR_BIASES = _ranged(bias=1.0)
 WRONG_SCALES = _driven(scale=0.20)
 CARPET = _driven(yaw_deg_per_m=1.0)
 BENT = _driven(yaw_deg_per_m=10.0)
 
-# ---- noise of another kind ----
+# noise of another kind
 
 SLOW_BIASES = _ranged(slow_s=30.0)
 HEAVY_TAILS = World(LONGER, faults=(sensor_faults.heavy_tailed,))

@@ -28,7 +28,7 @@ def test_a_large_team_shares(robots: int, seconds: int) -> None:
     assert recent_s(robots, 150) == seconds // 2
 
 
-# ---- stretches of time ----
+# stretches of time
 
 
 @pytest.mark.parametrize(("step", "is_whole"), [(18, True), (19, False)])
@@ -71,7 +71,7 @@ def test_cells_nest_and_no_time_grows_young(recent: int) -> None:
                     assert 16 * step - (second // cell + 1) * cell >= recent * 2 ** (level - 1)
 
 
-# ---- ages ----
+# ages
 
 
 def at(step: float) -> int:

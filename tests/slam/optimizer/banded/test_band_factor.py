@@ -146,7 +146,7 @@ def test_the_inverse_is_selected_however_many_poses_there_are(poses: int, reach:
         assert np.allclose(found[d, : n - d], np.diag(inverse, -d), atol=1e-12)
 
 
-# ---- where there is no solution ----
+# where there is no solution
 
 
 def test_a_band_that_is_not_positive_definite_has_no_factor() -> None:

@@ -54,7 +54,7 @@ def loose(problem: Problem) -> Problem:
     return replace(problem, ranges=no_ranges(), pairs=0)
 
 
-# ---- the minimum ----
+# the minimum
 
 
 def test_with_mountings_in_doubt_the_solution_is_that_of_a_dense_solver_too() -> None:
@@ -262,7 +262,7 @@ def test_where_nobody_can_say_who_is_wrong_poses_stay_and_their_covariances_grow
     assert np.linalg.eigvalsh(grown)[0] > -1e-6
 
 
-# ---- calibration and robustness ----
+# calibration and robustness
 
 
 def test_bias_scale_and_yaw_rate_are_found() -> None:
@@ -365,7 +365,7 @@ def test_angles_come_back_wrapped() -> None:
         assert same_pose(ours, theirs, 1e-3)
 
 
-# ---- when there is no solution, or not enough time ----
+# when there is no solution, or not enough time
 
 
 @pytest.mark.parametrize("most", [0, 1, 2])

@@ -48,7 +48,7 @@ def far_edges() -> Problem:
     return replace(problem, closures=pose_edges(rng, problem.initial, far, (0.05, 0.05, 0.03)))
 
 
-# ---- squares, and what could be checked ----
+# squares, and what could be checked
 
 
 def mounted() -> Problem:
@@ -120,7 +120,7 @@ def test_ratios_are_held_at_one_by_one_degree_of_freedom() -> None:
     assert ratio == pytest.approx([10 / 3, 1.0, 3.0, 1.2])
 
 
-# ---- outliers ----
+# outliers
 
 
 def errs(sigmas: Array, pair: Array | None = None) -> tuple[Problem, Point]:
@@ -149,7 +149,7 @@ def test_shares_of_outliers_are_those_of_each_pair() -> None:
     assert outlier_share(problem, point).tolist() == [0.25, 1.0, 0.0]
 
 
-# ---- runs ----
+# runs
 
 
 def run_of(wrong: str) -> list[Run]:

@@ -207,7 +207,7 @@ def test_equations_of_another_belief_share_where_all_stands_and_are_the_same_as_
     assert shared.cost(point, THRESHOLD) < first.cost(point, THRESHOLD)
 
 
-# ---- what may be claimed, and what weighs ----
+# what may be claimed, and what weighs
 
 
 def far_or_small(kind: str) -> Problem:
@@ -238,7 +238,7 @@ def test_what_the_factors_weigh_is_the_same_with_the_priors_of_the_estimate() ->
     assert close(dense(system, equations.layout), expected, 1e-4)
 
 
-# ---- where things stand ----
+# where things stand
 
 
 def test_poses_at_the_border_change_nothing() -> None:

@@ -80,7 +80,7 @@ def levels(problem: Problem, variance: Array) -> Array:
     return out
 
 
-# ---- faults ----
+# faults
 
 
 @pytest.mark.parametrize("seed", [1, 2, 7])
@@ -144,7 +144,7 @@ def test_the_end_is_as_exact_as_every_other_solution() -> None:
     assert np.abs(again.poses - found.point.poses).max() < 1e-6
 
 
-# ---- ranges that are wrong for long ----
+# ranges that are wrong for long
 
 
 def beside(seed: int, first: int, metres: float = 1.0) -> Problem:
@@ -212,7 +212,7 @@ def test_who_contradicts_two_others_or_one_for_long_is_wrong_himself(
     assert odometry_levels._is_one_robot(found) is is_one
 
 
-# ---- the pieces ----
+# the pieces
 
 
 @pytest.mark.parametrize("off", [-1, 0])
