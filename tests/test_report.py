@@ -284,4 +284,6 @@ def test_of_the_graph_the_group_its_keyframes_and_what_was_learned_are_said() ->
         "converged": False,
         "range_bias_m": {"1-2": 0.1235},
         "wheel_scale": {"2": 0.02},
+        "wheel_turn": {"2": 0.0},
+        "antenna_m": {"2": [0.0, 0.0]},
     }
