@@ -76,6 +76,7 @@ def test_a_localised_robot_says_where_it_is_every_second(team: VirtualTeam) -> N
     assert np.diff(times[times > 30]).max() < 1.2
 
 
+@pytest.mark.slow
 def test_at_ten_solutions_a_second_a_pose_is_said_when_it_is_news() -> None:
     team = VirtualTeam(EASY, extra="[optimizer]\nrate_hz = 10.0\n")
     team.run(40.0)

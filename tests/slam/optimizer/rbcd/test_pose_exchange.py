@@ -349,6 +349,7 @@ airs = st.builds(
 )
 
 
+@pytest.mark.slow
 @given(st.integers(0, 1_000), st.sampled_from(SHAPES), airs, st.sampled_from([0.3, 1.0, 3.0]))
 @settings(derandomize=True, max_examples=40, deadline=None)
 def test_no_move_lets_the_cost_of_the_team_rise_whatever_is_lost_or_late(
