@@ -268,7 +268,13 @@ def test_of_a_pair_windows_and_closures_are_counted(count: int, is_connected: bo
 
 
 def test_of_the_graph_the_group_its_keyframes_and_what_was_learned_are_said() -> None:
-    learned = SensorCalibration(Learned(0.02, 0.01), Learned(), {1: Learned(0.12345, 0.01)})
+    learned = SensorCalibration(
+        scale=Learned(0.02, 0.01),
+        bias={1: Learned(0.12345, 0.01)},
+        turn=Learned(0.3, 0.02),
+        antenna_x=Learned(0.12346, 0.02),
+        antenna_y=Learned(-0.2, 0.02),
+    )
     scene = RobotScene(robot=2, kept=learned)
     for peer, count in ((1, 2), (4, 3)):
         frames = tuple(Keyframe(10 * k, 0, k, 0, 0) for k in range(count))
@@ -284,6 +290,6 @@ def test_of_the_graph_the_group_its_keyframes_and_what_was_learned_are_said() ->
         "converged": False,
         "range_bias_m": {"1-2": 0.1235},
         "wheel_scale": {"2": 0.02},
-        "wheel_turn": {"2": 0.0},
-        "antenna_m": {"2": [0.0, 0.0]},
+        "wheel_turn": {"2": 0.3},
+        "antenna_m": {"2": [0.1235, -0.2]},
     }
