@@ -18,7 +18,7 @@ one asks, and who learns by a question what it has missed asks back. Then there 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Set
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import replace
 
 import numpy as np
@@ -65,6 +65,8 @@ class PoseExchange:
         self._said: PublicPoses | None = None
         self._said_in: dict[int, int] = {}
         """By keyframe: the move that its pose was last said with."""
+        self._weights: dict[int, Array] = {}
+        """By keyframe: how stiffly closures hold it, or did when it last carried any."""
         self._first = self._before = 0
         """The move before the first one in this frame, and that before the last one."""
         self._news_in = self._told_at = self._questions = 0
@@ -162,14 +164,17 @@ class PoseExchange:
         """What of our new poses must be said; nothing when they hardly moved."""
         if not len(lifted.carriers):
             return []
-        now = public_poses(frame, lifted)
+        now = public_poses(frame, lifted, self._said_in)
         if self._said is None or (now.frame, now.frame_epoch) != (
             self._said.frame,
             self._said.frame_epoch,
         ):
             self._said, self._said_in, self._first = None, {}, self.round
+            self._weights = {}
+            now = public_poses(frame, lifted)
         before = self._said.table() if self._said else {}
-        news = _news(now, before, lifted.weights)
+        self._weights.update(zip(lifted.carriers.tolist(), lifted.weights, strict=True))
+        news = _news(now, before, self._weights)
         if not news and not self._is_awaited:
             return []
         table = {**before, **now.chosen(news).table()}
@@ -180,6 +185,7 @@ class PoseExchange:
             self._news_in, self._told_at, self._questions = self.round, utime, 0
         said = {**self._said_in, **dict.fromkeys(news, self.round)}
         self._said_in = {n: said[n] for n in now.keyframes}
+        self._weights = {n: self._weights[n] for n in now.keyframes}
         return [self._after(self._before)]
 
     def _advance(self) -> None:
@@ -236,19 +242,21 @@ class PoseExchange:
         )
 
 
-def public_poses(frame: Chain, lifted: Lifted) -> PublicPoses:
-    """All of our poses that carry closures."""
-    rows = lifted.rows[np.searchsorted(lifted.n, lifted.carriers)]
-    values = np.concatenate([lifted.anchor[None], rows])
-    keyframes = tuple(int(n) for n in lifted.carriers)
+def public_poses(frame: Chain, lifted: Lifted, said: Iterable[int] = ()) -> PublicPoses:
+    """All of our poses that carry closures, and those that we said when they did: others hold
+    them, and a closure that is kept again is used at once, with the pose that they hold."""
+    chosen = np.isin(lifted.n, lifted.carriers) | np.isin(lifted.n, list(said))
+    values = np.concatenate([lifted.anchor[None], lifted.rows[chosen]])
+    keyframes = tuple(int(n) for n in lifted.n[chosen])
     return PublicPoses(frame.robot, frame.epoch, len(lifted.anchor) // 2, keyframes, values)
 
 
-def _news(now: PublicPoses, before: dict[int, Array], weights: Array) -> list[int]:
+def _news(now: PublicPoses, before: dict[int, Array], weights: Mapping[int, Array]) -> list[int]:
     """Keyframes that moved since they were said by more than matters, or were not said."""
     out = []
-    for n, row, (turn, place) in zip(now.keyframes, now.values[1:], weights, strict=True):
+    for n, row in zip(now.keyframes, now.values[1:], strict=True):
         if n in before:
+            turn, place = weights[n]
             change = np.abs(row - before[n]) ** 2
             if turn * change[: now.rank].sum() + place * change[now.rank :].sum() <= MATTERS:
                 continue
