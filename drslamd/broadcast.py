@@ -15,21 +15,24 @@ import numpy as np
 from drslamd.config import Config
 from drslamd.conventions import SECOND_US, Segment
 from drslamd.events import Effect
+from drslamd.gossip.bounds import is_sayable
 from drslamd.gossip.message_types import (
     MAX_BATCH,
     NOTHING_WANTED,
     UNKNOWN_CLOCK,
     OdometryBatch,
     Pose,
+    PoseState,
     Status,
 )
 from drslamd.gossip.team import Team
 from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.front_end import FrontEnd
-from drslamd.slam.graph.estimate import PoseNow
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.se2 import Array
+from drslamd.whereabouts import Whereabouts
 
 QUIET_US = 3 * SECOND_US
 """Between heartbeats of a robot that is localised, lacks nothing and hears the same as before."""
@@ -51,31 +54,32 @@ class Broadcast:
         self._team, self._front, self._back = team, front, back
         self._news: object = None
         self._status_said = self._pose_said = -QUIET_US
-        self._pose: tuple[Segment, Array] | None = None
-        """What was said last, and in whose frame."""
+        self._pose: tuple[Segment, PoseState, Array] | None = None
+        """What was said last: in whose frame, what it was worth, and the pose."""
         self._odometry_said: deque[tuple[int, int]] = deque(maxlen=BATCHES)
         """When batches were said, and one past the last sample of each."""
 
-    # ---- heartbeat ----
+    # heartbeat
 
     def heartbeat(
-        self, neighbours: list[PeerInRange], uwb_clock: int | None, utime: int
+        self, neighbours: list[PeerInRange], uwb_clock: int | None, state: PoseState, utime: int
     ) -> list[Effect]:
         """Our status, unless it says what it said a second ago.
 
         Args:
             uwb_clock: our clock minus LinkTrack's system_time, us, where that is known.
+            state: what our pose is worth.
         """
         self._team.compare_radio_clocks(uwb_clock, utime)
         estimate, team = self._back.estimate, self._team
         frame = None if estimate is None else estimate.frame.robot
-        news = frame, self._ranged(utime), team.audible(utime)
+        news = frame, state, self._ranged(utime), team.audible(utime)
         lacks = team.lacks_odometry() or team.logs.lacks_any()
         quiet = estimate is not None and not lacks and news == self._news
         if quiet and utime - self._status_said < QUIET_US - SOONER_US:
             return []
         self._news, self._status_said = news, utime
-        return [team.send(self.make_status(neighbours, uwb_clock, utime), utime)]
+        return [team.send(self.make_status(neighbours, uwb_clock, state, utime), utime)]
 
     def _ranged(self, utime: int) -> Set[int]:
         """Robots that we measure ranges to."""
@@ -86,6 +90,7 @@ class Broadcast:
         self,
         neighbours: list[PeerInRange],
         uwb_clock: int | None,
+        state: PoseState,
         utime: int,
         leaving: bool = False,
     ) -> Status:
@@ -93,7 +98,7 @@ class Broadcast:
         estimate = self._back.estimate
         heard = self._team.next_heard(utime, self._front.needed(neighbours, utime))
         return Status(
-            state=int(estimate is not None),
+            state=state,
             frame=estimate.frame.robot if estimate else self._team.own.robot,
             leaving=leaving,
             uwb_id=self._config.uwb_id,
@@ -104,7 +109,7 @@ class Broadcast:
             logs=self._team.logs.next_states(),
         )
 
-    # ---- odometry ----
+    # odometry
 
     def odometry(self, neighbours: list[PeerInRange], utime: int) -> list[Effect]:
         """Short-term odometry, for peers whose windows need it (paper III-C)."""
@@ -115,40 +120,50 @@ class Broadcast:
         n0 = max(track.n0, track.segment_start, track.end - MAX_BATCH, min(wants))
         if n0 >= track.end:
             return []
-        self._odometry_said.append((utime, track.end))
         batch = OdometryBatch(track.segment_start, n0, track.steps(n0, track.end - n0))
+        if not is_sayable(batch):
+            return []
+        self._odometry_said.append((utime, track.end))
         return [self._team.send(batch, utime)]
 
     def _lacked(self, peer: PeerInRange) -> int:
         """First sample to say to a peer: what we said counts as heard until it should know."""
+        if peer.wanted_n > self._front.reckoning.track.end:
+            return 0  # what it holds was never ours
         said = self._odometry_said
         known = [end for at, end in said if at + ON_THE_AIR_US < peer.wanted_at]
         is_lost = bool(known) and peer.wanted_n < known[-1]
         return peer.wanted_n if is_lost or not said else said[-1][1]
 
-    # ---- pose ----
+    # pose
 
-    def pose(self, found: PoseNow | None, utime: int) -> list[Effect]:
+    def pose(self, where: Whereabouts, utime: int) -> list[Effect]:
         """Where we are, when that is news."""
-        estimate = self._back.estimate
+        estimate, found = self._back.estimate, where.pose
         if estimate is None or found is None:
             return []
-        pose_utime, pose, covariance = found
         soon = utime - self._pose_said < POSE_US - SOONER_US
-        if soon and not self._is_news(estimate.frame, pose, covariance):
+        if soon and not self._is_news(estimate.frame, where.state, found.pose, found.covariance):
             return []
-        self._pose, self._pose_said = (estimate.frame, pose), utime
-        x, y, theta = pose.tolist()
-        frame = estimate.frame
+        frame, covariance = estimate.frame, se2.packed(found.covariance)
+        x, y, theta = found.pose.tolist()
         message = Pose(
-            1, frame.robot, frame.epoch, pose_utime, (x, y, theta), se2.packed(covariance)
+            where.state, frame.robot, frame.epoch, found.utime, (x, y, theta), covariance
         )
+        if not is_sayable(message):
+            return []
+        self._pose, self._pose_said = (frame, where.state, found.pose), utime
         return [self._team.send(message, utime)]
 
-    def _is_news(self, frame: Segment, pose: Array, covariance: Array) -> bool:
+    def public(self, said: list[PublicPoses], utime: int) -> list[Effect]:
+        """Our lifted poses, with `rbcd`; such as nobody would take are left unsaid."""
+        sayable = (poses for poses in said if is_sayable(poses))
+        return [send for poses in sayable for send in self._team.send_public(poses, utime)]
+
+    def _is_news(self, frame: Segment, state: PoseState, pose: Array, covariance: Array) -> bool:
         """Did the pose move by more than its own sigma since it was said?"""
-        if self._pose is None or self._pose[0] != frame:
+        if self._pose is None or self._pose[:2] != (frame, state):
             return True
-        moved = pose - self._pose[1]
+        moved = pose - self._pose[2]
         moved[2] = se2.wrap(moved[2])
         return bool((moved**2 > np.diag(covariance)).any())

@@ -24,8 +24,15 @@ GRID_HZ = 10
 """Rate of the odometry grid on which the paper counts tau (section IV-A: odometry at 10 Hz)."""
 GRID_US = SECOND_US // GRID_HZ
 
+LAST_N = 2**31 - 2
+"""The last sample of the grid that messages can name: one past it still fits their 32 bits."""
+LAST_UTIME = LAST_N * GRID_US
+"""Its time. No clock that began with its robot shows more: 6.8 years."""
+
 MAX_ROBOT_ID = 254
 """LinkTrack keeps 255 for "no entry" (protocol sheet, NodeFrame2)."""
+ROBOT_NAMES = frozenset(str(robot) for robot in range(MAX_ROBOT_ID + 1))
+"""Ids as keys of a JSON object."""
 
 TRANSLATION_STEP_M = 1e-4
 """Resolution of every position that is sent: 0.1 mm, far below the noise of any wheel."""

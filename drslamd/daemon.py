@@ -18,7 +18,7 @@ from typing import Any
 import structlog
 
 from drslamd import report
-from drslamd.config import Config, ConfigError, DbcSection, SerialWheelSection
+from drslamd.config import Config
 from drslamd.conventions import MILLISECOND_US, SECOND_US
 from drslamd.events import (
     Effect,
@@ -27,6 +27,7 @@ from drslamd.events import (
     Note,
     Restart,
     Save,
+    SaveDone,
     Send,
     Solve,
     Stop,
@@ -34,22 +35,22 @@ from drslamd.events import (
     Write,
 )
 from drslamd.gossip.seal import team_key
-from drslamd.io.can_bus import CanBus, require_python_can
-from drslamd.io.clock import Clock, MonotonicClock, wall_epoch
-from drslamd.io.liblcm import Liblcm, require_lcm
-from drslamd.io.multicast import Multicast
+from drslamd.io.clock import Clock, MonotonicClock
 from drslamd.io.pace import Pace
 from drslamd.io.serial_port import SerialPort
-from drslamd.io.state_store import StateStore, next_epoch, read_key
+from drslamd.io.state_store import StateStore, read_key
 from drslamd.io.status_socket import StatusSocket
 from drslamd.io.systemd import Notifier
-from drslamd.io.transport import Transport
 from drslamd.io.worker import Finished, Worker
+from drslamd.parts import dbc_text, make_transport, make_wheels
 from drslamd.robot import Robot
 from drslamd.slam.calibration.sensor_calibration import SensorCalibration
 
 JOB_STUCK_US = 20 * SECOND_US
 """A computation that takes longer is no progress, and the watchdog is not fed."""
+RESTARTS_APART_US = 30 * SECOND_US
+"""Between two restarts in one process, twice as long after each: a robot that is lied to about its
+own past still has a present."""
 SERVICE_RUNTIME = Path("/run/drslamd")
 """RuntimeDirectory= of systemd/drslamd@.service."""
 
@@ -69,16 +70,17 @@ class Daemon:
         secret = None if config.team.insecure else read_key(config.team.key_file)
         self._store = StateStore(state_dir(config), config.robot.id)
         state = self._store.load()
-        self._start_faults = [self._store.fault]
-        epochs = {int(robot): int(epoch) for robot, epoch in state.get("epochs", {}).items()}
+        self._load_fault = self._store.fault
+        epochs = {int(robot): epoch for robot, epoch in state.get("epochs", {}).items()}
         kept = SensorCalibration.of_state(state.get("calibration", {}))
-        self._new_robot = partial(Robot, config, team_key(secret), dbc_text=_dbc_text(config))
-        self.robot = self._new_robot(next_epoch(state, wall_epoch()), epochs, kept)
-        # the new epoch is on disk before anything is sent under it
-        self._store.save(self.robot.state())
-        self._start_faults.append(self._store.fault)
-        self._transport = self._make_transport()
-        self._wheels = self._make_wheels()
+        self._new_robot = partial(Robot, config, team_key(secret), dbc_text=dbc_text(config))
+        last = {"epochs": epochs, "calibration": kept.state()}
+        self.robot = self._new_robot(self._store.begin(last, state.get("epoch", 0)), epochs, kept)
+        self._ends: Robot | None = None
+        """The robot in whose place another one is about to begin."""
+        self._may_restart_at, self._restart_apart = 0, RESTARTS_APART_US
+        self._transport = make_transport(config, self._clock, self.handle)
+        self._wheels = make_wheels(config, self._clock, self.handle)
         self._uwb = SerialPort("uwb", config.uwb.port, config.uwb.baud, self._clock, self.handle)
         self._pace = Pace()
         questions: dict[str, Callable[[], Any]] = {
@@ -118,8 +120,9 @@ class Daemon:
         log.info("daemon.start", robot=self._config.robot.id, epoch=self.robot.own.epoch)
         if self._config.team.insecure:
             log.warning("team.insecure", remedy="make a key with: drslamd keygen")
-        for what in filter(None, self._start_faults):
-            log.warning("state.fault", what=what)
+        if self._load_fault:
+            log.warning("state.fault", what=self._load_fault)
+        self.handle(SaveDone(self._clock.now(), self._store.fault))
         parts = (self._transport.run(), self._uwb.run(), self._wheels.run(), self._feed_watchdog())
         tasks = [self._start(part) for part in parts]
         fault = await self._status.open()
@@ -164,7 +167,7 @@ class Daemon:
         self._pace.lags.append((now - self._due) / MILLISECOND_US)
         self.handle(Tick(now))
 
-    # ---- effects ----
+    # effects
 
     def _write(self, effect: Write) -> None:
         if effect.port != "wheels" or not isinstance(self._wheels, SerialPort):
@@ -190,27 +193,42 @@ class Daemon:
         self._worker.submit(effect.run, done)
 
     def _restart(self, effect: Restart) -> None:
-        """A new robot in the place of the old one; ports and network stay as they are."""
-        old = self.robot
-        self.robot = self._new_robot(effect.epoch, old.team.seal.epochs, old.calibration.latest)
-        for state in (*old.ports.values(), old.network):
-            if state is not None:
-                self.handle(state)
-        self._save(Save(self.robot.state()))
-
-    def _save(self, effect: Save) -> None:
-        # a sync can take a tenth of a second on an SD card; the worker has the patience
-        before = self._store.fault
+        """A new robot in the place of the old one, as soon as its epoch is kept."""
+        old, now = self.robot, self._clock.now()
+        if now < self._may_restart_at:
+            return
+        self._ends, self._may_restart_at = old, now + self._restart_apart
+        self._restart_apart *= 2
+        log.warning("epoch.restart", epoch=old.own.epoch, above=effect.above, why=effect.why)
 
         def done(finished: Finished) -> None:
             if finished.error is not None:
                 raise finished.error
-            if self._store.fault and self._store.fault != before:
-                log.warning("state.fault", what=self._store.fault)
+            self._succeed(old, finished.result)
+
+        self._worker.submit(partial(self._store.begin, old.memory.state(), effect.above), done)
+
+    def _succeed(self, old: Robot, epoch: int) -> None:
+        """Begin again under a new epoch; ports and network stay as they are."""
+        self.robot = self._new_robot(epoch, old.team.seal.epochs, old.calibration.latest)
+        for state in (*old.ports.values(), old.network):
+            if state is not None:
+                self.handle(state)
+        self.handle(SaveDone(self._clock.now(), self._store.fault))
+
+    def _save(self, effect: Save) -> None:
+        # a sync can take a tenth of a second on an SD card; the worker has the patience
+        if self.robot is self._ends:
+            return  # the epoch of its successor is on the disk, or will be
+
+        def done(finished: Finished) -> None:
+            if finished.error is not None:
+                raise finished.error
+            self.handle(SaveDone(self._clock.now(), self._store.fault))
 
         self._worker.submit(partial(self._store.save, effect.state), done)
 
-    # ---- life ----
+    # life
 
     def _start(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         task = asyncio.ensure_future(work)
@@ -273,43 +291,12 @@ class Daemon:
         self._worker.stop()
         log.info("daemon.stop", robot=self._config.robot.id)
 
-    # ---- parts ----
-
-    def _make_transport(self) -> Transport:
-        section = self._config.gossip
-        if section.provider == "liblcm":
-            require_lcm()
-            return Liblcm(section, self._clock, self.handle)
-        return Multicast(section, self._clock, self.handle)
-
-    def _make_wheels(self) -> SerialPort | CanBus:
-        section = self._config.wheels
-        if isinstance(section, SerialWheelSection):
-            return SerialPort("wheels", section.port, section.baud, self._clock, self.handle)
-        require_python_can()
-        return CanBus(section.can, self._clock, self.handle)
-
 
 def _note(note: Note) -> None:
     log.log(_LEVELS[note.level.value], note.event, **note.fields)
 
 
 _LEVELS = {"info": 20, "warning": 30}
-
-
-def _dbc_text(config: Config) -> str:
-    """
-    Raises:
-        ConfigError: the file cannot be read.
-    """
-    if not isinstance(config.wheels, DbcSection):
-        return ""
-    path = Path(config.wheels.dbc_file)
-    try:
-        return path.read_text()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not a text file"
-        raise ConfigError([f"wheels.dbc_file = {str(path)!r}: {reason}"]) from None
 
 
 def state_dir(config: Config) -> Path:

@@ -25,7 +25,7 @@ class PortCondition(Enum):
     LOST = "lost"
 
 
-# ---- events ----------------------------------------------------------------------------------
+# events
 
 
 @dataclass(frozen=True)
@@ -103,6 +103,14 @@ class JobDone:
 
 
 @dataclass(frozen=True)
+class SaveDone:
+    """The result of a `Save` effect: why nothing could be kept, empty when it was."""
+
+    utime: int
+    fault: str = ""
+
+
+@dataclass(frozen=True)
 class Stop:
     """The daemon is about to end."""
 
@@ -110,10 +118,19 @@ class Stop:
 
 
 Event = Union[
-    SerialData, CanFrame, PortState, Datagram, ChannelMessage, NetworkState, Tick, JobDone, Stop
+    SerialData,
+    CanFrame,
+    PortState,
+    Datagram,
+    ChannelMessage,
+    NetworkState,
+    Tick,
+    JobDone,
+    SaveDone,
+    Stop,
 ]
 
-# ---- effects ---------------------------------------------------------------------------------
+# effects
 
 
 @dataclass(frozen=True)
@@ -150,9 +167,10 @@ class Save:
 
 @dataclass(frozen=True)
 class Restart:
-    """Forget everything and begin again under this epoch."""
+    """Forget everything and begin again under an epoch above this one; said until it is done."""
 
-    epoch: int
+    above: int
+    why: str
 
 
 class Level(Enum):

@@ -17,6 +17,7 @@ from drslamd.slam.relative_pose.window_request import WindowRequest
 RELATIVE_POSE = "relative_pose"
 CONSISTENCY = "consistency"
 OPTIMIZER = "optimizer"
+WHAT_IF = "what_if"
 
 REST = 4
 """How many times as long as it computed a module rests."""

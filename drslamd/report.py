@@ -12,6 +12,7 @@ import numpy as np
 
 from drslamd.conventions import GRID_US, SECOND_US
 from drslamd.events import PortCondition
+from drslamd.gossip.message_types import PoseState
 from drslamd.gossip.peer import Peer
 from drslamd.robot import Robot
 from drslamd.slam.consistency.pair import PairTracker
@@ -33,28 +34,33 @@ def status(robot: Robot, utime: int) -> dict[str, Any]:
         "uwb": _uwb(robot, utime),
         "wheels": _wheels(robot, utime),
         "network": _network(robot, utime),
-        "peers": {str(k): _peer(robot, p, utime) for k, p in sorted(robot.team.peers.items())},
+        "peers": _peers(robot, utime),
         "pairs": {str(k): _pair(pair) for k, pair in sorted(robot.front.pairs.items())},
         "graph": _graph(robot),
     }
 
 
 def _pose(robot: Robot, utime: int) -> dict[str, Any]:
-    estimate, found = robot.back.estimate, robot.pose()
-    if estimate is None or found is None:
-        return {"state": "not localised"}
-    pose_utime, pose, covariance = found
+    estimate, where = robot.back.estimate, robot.whereabouts(utime)
+    if estimate is None or where.pose is None:
+        return {"state": state_name(where.state)}
+    _, pose, covariance = where.pose
     spread = np.linalg.eigvalsh(covariance[:2, :2])[-1]
     return {
-        "state": "localised",
+        "state": state_name(where.state),
         "frame": estimate.frame.robot,
-        "age_s": age_s(utime, pose_utime),
+        "age_s": round(where.age_us / SECOND_US, 3),
         "x_m": round(float(pose[0]), 4),
         "y_m": round(float(pose[1]), 4),
         "theta_deg": round(math.degrees(float(pose[2])), 3),
         "sigma_m": round(math.sqrt(float(spread)), 4),
         "sigma_deg": round(math.degrees(math.sqrt(float(covariance[2, 2]))), 3),
     }
+
+
+def state_name(state: PoseState) -> str:
+    """Its word: localised, doubtful, stale, not localised."""
+    return state.name.lower().replace("_", " ")
 
 
 def _port(robot: Robot, name: str) -> dict[str, Any]:
@@ -107,10 +113,16 @@ def _network(robot: Robot, utime: int) -> dict[str, Any]:
         "refused": dict(team.refused),
         "own_echo_age_s": age_s(utime, team.last_echo),
         "log_entries_repeated": team.logs.repeats.repeated,
+        "unsayable": team.unsayable,
     }
 
 
-def _peer(robot: Robot, peer: Peer, utime: int) -> dict[str, Any]:
+def _peers(robot: Robot, utime: int) -> dict[str, Any]:
+    own_hash, peers = robot.back.digest(), sorted(robot.team.peers.items())
+    return {str(k): _peer(robot, peer, utime, own_hash) for k, peer in peers}
+
+
+def _peer(robot: Robot, peer: Peer, utime: int, own_hash: int) -> dict[str, Any]:
     offset = peer.clock.offset(utime)
     return {
         "epoch": peer.chain.epoch,
@@ -123,9 +135,10 @@ def _peer(robot: Robot, peer: Peer, utime: int) -> dict[str, Any]:
         "clock_uncertainty_ms": None if offset is None else round(offset.uncertainty_us / 1e3, 3),
         "clock_source": None if offset is None else offset.source,
         "uwb_id": peer.status.uwb_id if peer.status else None,
+        "pose": state_name(peer.status.state) if peer.status else None,
         "localised": bool(peer.status and peer.status.state),
         "frame": peer.status.frame if peer.status and peer.status.state else None,
-        "same_graph": bool(peer.status and peer.status.graph_hash == robot.back.digest()),
+        "same_graph": bool(peer.status and peer.status.graph_hash == own_hash),
         "log_entries_lacking": robot.team.logs.lacking(peer.chain.robot),
     }
 
@@ -143,7 +156,7 @@ def _graph(robot: Robot) -> dict[str, Any]:
     estimate, learned, own = robot.back.estimate, robot.calibration.latest, robot.own.robot
     out: dict[str, Any] = {
         "group": sorted({segment.robot for segment in robot.back.group}),
-        "keyframes": {str(k): len(c.keyframes) for k, c in sorted(robot.back.graph.chains.items())},
+        "keyframes": {str(k): len(c.keyframes) for k, c in robot.back.graph.view.chains.items()},
     }
     if estimate is not None:
         out |= {
@@ -155,6 +168,10 @@ def _graph(robot: Robot) -> dict[str, Any]:
                 for peer, bias in learned.bias.items()
             },
             "wheel_scale": {str(own): round(learned.scale.value, 5)},
+            "wheel_turn": {str(own): round(learned.turn.value, 5)},
+            "antenna_m": {
+                str(own): [round(learned.antenna_x.value, 4), round(learned.antenna_y.value, 4)]
+            },
         }
     return out
 

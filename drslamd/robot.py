@@ -15,12 +15,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
-from drslamd import diagnosis
 from drslamd.broadcast import Broadcast
+from drslamd.conditions import diagnosis
+from drslamd.conditions.health import Health
 from drslamd.config import Config
-from drslamd.conventions import GRID_US, MILLISECOND_US, SECOND_US, Chain
+from drslamd.conventions import MILLISECOND_US, SECOND_US, Chain
 from drslamd.events import (
     CanFrame,
     ChannelMessage,
@@ -35,36 +34,42 @@ from drslamd.events import (
     PortState,
     Restart,
     Save,
+    SaveDone,
     Send,
     SerialData,
     Stop,
     Tick,
     Write,
 )
+from drslamd.gossip.bounds import is_sayable
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
-from drslamd.health import Health
-from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, Job, Jobs
+from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, WHAT_IF, Job, Jobs
+from drslamd.memory import Memory
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.samples import Motion
 from drslamd.sensors.wheels.wheel_input import WheelInput
-from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.calibration.calibration_store import CalibrationStore
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.graph.estimate import PoseNow
 from drslamd.slam.graph.measurements import GraphEntry
+from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.settings import closure_method
 from drslamd.slam.tuning import DEFAULTS, Tuning
+from drslamd.standing import Standing
 from drslamd.timers import Action, Timers
+from drslamd.whereabouts import Whereabouts
 
 POLL_US = 10 * MILLISECOND_US
 """How finely the wheels that must be asked are asked; their driver knows its own rate."""
 REPEAT_US = 100 * MILLISECOND_US
 """Between two looks for log entries that somebody lacks."""
+TURN_US = 40 * MILLISECOND_US
+"""The same where robots take turns, and wait for each other."""
 SAVE_US = 60 * SECOND_US
 """Between two looks whether there is anything new to keep over a restart."""
 GOODBYES = 3
@@ -104,13 +109,14 @@ class Robot:
         self.front = FrontEnd(config, self.own, self.calibration.used, tuning)
         self.back = BackEnd(config, self.own, tuning)
         self.broadcast = Broadcast(config, self.team, self.front, self.back)
+        self.standing = Standing(config, self.own, self.front, self.back)
         self.outbox = Outbox(config.robot.id, config.gossip.max_bytes_per_s)
         self.health = Health()
         self.ports: dict[str, PortState] = {}
         self.network: NetworkState | None = None
         self.jobs = Jobs()
         self.timers = Timers(self._periods())
-        self._saved_epochs = dict(epochs)
+        self.memory = Memory(self.own, self.team.seal, self.calibration)
         self._handlers: dict[type[Any], Callable[[Any], list[Effect]]] = {
             SerialData: self._on_serial,
             CanFrame: self._on_can,
@@ -120,6 +126,7 @@ class Robot:
             NetworkState: self._on_network,
             Tick: self._on_tick,
             JobDone: self._on_job,
+            SaveDone: self._on_saved,
             Stop: self._on_stop,
         }
 
@@ -127,11 +134,12 @@ class Robot:
         """What comes round, and how often, us."""
         config = self.config
         periods: dict[Action, int] = {
-            self._repeat: REPEAT_US,
+            self._repeat: TURN_US if config.optimizer.algorithm == "rbcd" else REPEAT_US,
             self._send_status: SECOND_US,
             self._send_odometry: SECOND_US,
             self._extend_log: SECOND_US,
             self._relative_poses: round(SECOND_US / config.relative_pose.rate_hz),
+            self._what_if: SECOND_US,
             self._consistency: round(SECOND_US / config.consistency.rate_hz),
             self._optimize: round(SECOND_US / config.optimizer.rate_hz),
             self._check_health: SECOND_US,
@@ -149,7 +157,7 @@ class Robot:
         effects, outbox = self._handlers[type(event)](event), self.outbox
         return [e for e in effects if not isinstance(e, Send) or outbox.passes(e, event.utime)]
 
-    # ---- sensors ----
+    # sensors
 
     def _on_serial(self, event: SerialData) -> list[Effect]:
         if event.port == "uwb":
@@ -176,7 +184,7 @@ class Robot:
         data = self.wheels.poll(utime)
         return [Write("wheels", data)] if data else []
 
-    # ---- the team ----
+    # the team
 
     def _on_network(self, event: NetworkState) -> list[Effect]:
         self.network = event
@@ -185,17 +193,26 @@ class Robot:
 
     def _on_message(self, event: Datagram | ChannelMessage) -> list[Effect]:
         received = self.team.receive(event)
-        if received is not None and isinstance(received.message, GraphEntry):
+        if received is None:
+            return []
+        if isinstance(received.message, GraphEntry):
             self.back.insert(received.origin, received.message)
+        elif isinstance(received.message, PublicPoses):
+            self.back.hear(received.origin, received.message)
+            return self._take_turn(event.utime)
         return []
 
     def _repeat(self, utime: int) -> list[Effect]:
         is_in_a_graph = self.back.estimate is not None or bool(self.neighbours(utime))
-        return list(self.team.repeats(utime)) if is_in_a_graph else []
+        repeats = list(self.team.repeats(utime)) if is_in_a_graph else []
+        return [*repeats, *self._take_turn(utime)]
 
     def _send_status(self, utime: int) -> list[Effect]:
-        clock = self.uwb.system_offset_us(utime)
-        return self.broadcast.heartbeat(self.neighbours(utime), clock, utime)
+        clock, where = self.uwb.system_offset_us(utime), self.whereabouts(utime)
+        status = self.broadcast.heartbeat(self.neighbours(utime), clock, where.state, utime)
+        # solutions come with news; that a pose grew old or doubtful is said without any
+        is_odd = where.is_old or where.doubt
+        return [*status, *(self.broadcast.pose(where, utime) if is_odd else [])]
 
     def _send_odometry(self, utime: int) -> list[Effect]:
         return self.broadcast.odometry(self.neighbours(utime), utime)
@@ -206,16 +223,19 @@ class Robot:
         peers = (peer.neighbour(self.own, utime) for peer in self.team.living(utime).values())
         return [peer for peer in peers if peer.ranges_to_us or peer.uwb_id in mine]
 
-    # ---- our log ----
+    # our log
 
     def _extend_log(self, utime: int) -> list[Effect]:
         """One entry of our log: where our wheels went, what we ranged, what module 2 kept."""
         neighbours = self.neighbours(utime)
-        keyframe = self.front.make_keyframe()
-        ranges = self.front.sample_ranges(neighbours, self.back.graph, utime)
+        is_own_doubted, is_any_doubted = self.standing.is_doubted()
+        keyframe = self.front.make_keyframe(is_own_doubted)
+        ranges = self.front.sample_ranges(neighbours, self.back.graph, utime, is_any_doubted)
         closures = self.front.tell_closures()
         if not (keyframe or ranges or closures):
             return []
+        if self.team.is_spent or (keyframe and not is_sayable(keyframe)):
+            return [Restart(self.own.epoch, "it has used up the numbers of its messages")]
         sends: list[Effect] = []
         keyframes = (keyframe,) if keyframe else ()
         for entry in self.team.entries(self.front.model, keyframes, ranges, closures):
@@ -225,7 +245,7 @@ class Robot:
                 sends.append(self.team.send_sealed(self.own.robot, sealed))
         return sends
 
-    # ---- the three modules ----
+    # the three modules
 
     def _relative_poses(self, utime: int) -> list[Effect]:
         """Module 1: a window of ranges and both odometries, for each pair that we own."""
@@ -240,84 +260,91 @@ class Robot:
             if not self.jobs.is_busy(RELATIVE_POSE, window.pair)
         ]
 
+    def _what_if(self, utime: int) -> list[Effect]:
+        """Where windows disagree again and again: which mistake in the mountings explains them?"""
+        if self.jobs.is_busy(WHAT_IF) or self.jobs.is_resting(WHAT_IF, utime):
+            return []
+        asked = self.front.what_if(self.neighbours(utime), self.back.graph, utime)
+        return [self.jobs.begin(Job(WHAT_IF, w.pair, w.request), w.run) for w in asked]
+
     def _consistency(self, utime: int) -> list[Effect]:
         """Module 2: which of a pair's closures belong together."""
         return [
             self.jobs.begin(Job(CONSISTENCY, pair), run)
-            for pair, run in self.front.module2(self.back.graph)
+            for pair, run in self.front.module2(self.back.graph, self.back.estimate)
         ]
 
     def _optimize(self, utime: int) -> list[Effect]:
         """Module 3: the team's pose graph."""
         if self.jobs.is_busy(OPTIMIZER) or self.jobs.is_resting(OPTIMIZER, utime):
             return []
-        public = {k: peer.public for k, peer in self.team.peers.items() if peer.public}
-        run = self.back.begin(self.team.present(utime), self.team.shifts(utime), public)
+        talking = set(self.team.living(utime))
+        run = self.back.begin(self.team.present(utime), talking, utime)
         return [self.jobs.begin(Job(OPTIMIZER), run)] if run else []
+
+    def _take_turn(self, utime: int) -> list[Effect]:
+        """With `rbcd`: move if it is our turn now, and say what others wait for."""
+        exchange = self.back.exchange
+        is_due = exchange.is_waiting or self.back.is_urgent
+        effects = self._optimize(utime) if is_due else []
+        would_move = exchange.is_waiting and not self.jobs.is_resting(OPTIMIZER, utime)
+        at_rest = not would_move and not self.jobs.is_busy(OPTIMIZER)
+        return [*effects, *self.broadcast.public(exchange.answers(utime, at_rest), utime)]
 
     def _on_job(self, event: JobDone) -> list[Effect]:
         job = self.jobs.finish(event)
+        if job.module == WHAT_IF and job.pair is not None and job.request is not None:
+            job.pair.on_costs(job.request, *event.result)
+            return []
         if job.pair is not None and job.request is not None:
             job.pair.on_estimate(job.request, event.result)
             return []
         if job.pair is not None:
             job.pair.on_check(event.result)
             return []
-        self.back.on_solution(event.result)
+        said = self.back.on_solution(event.result, event.utime)
+        public = self.broadcast.public(said, event.utime)
         self.calibration.update(self.back.estimate, self.own.robot, self.front.pairs)
-        public = self.back.public_poses()
-        sends = self.team.send_public(public, event.utime) if public else []
-        return [*self.broadcast.pose(self.pose(), event.utime), *sends]
+        return [*self.broadcast.pose(self.whereabouts(event.utime), event.utime), *public]
 
-    # ---- what we know of ourselves ----
+    # what we know of ourselves
 
     def pose(self) -> PoseNow | None:
         """Our latest pose in the frame of the team; None while we are not localised."""
-        solved = self.back.trajectory(self.own.robot)
-        track = self.front.reckoning.track
-        if solved is None or self.back.estimate is None or not len(track):
-            return None
-        last, now = int(solved.n[-1]), track.end - 1
-        if not track.covers(last, now):
-            return None
-        pose = se2.compose(solved.poses[-1], se2.between(track.at(last), track.at(now)))
-        covariance = self.back.estimate.covariances[self.own.robot]
-        return PoseNow(now * GRID_US, np.append(pose[:2], se2.wrap(pose[2])), covariance)
+        return self.standing.pose()
+
+    def whereabouts(self, utime: int) -> Whereabouts:
+        """What that pose is worth now."""
+        return self.standing.whereabouts(utime)
 
     def _check_health(self, utime: int) -> list[Effect]:
         self.team.forget_silent(utime)
+        self.front.watch_ranges(self.neighbours(utime), self.back.graph, self.back.estimate, utime)
+        self.back.exchange.keep({peer.chain for peer in self.team.peers.values()})
         notes: list[Effect] = []
         for key, sentence in diagnosis.conditions(self, utime):
             notes += self.health.set(key, sentence, utime)
-        return [*notes, *self._restart_if_superseded(utime)]
-
-    def _restart_if_superseded(self, utime: int) -> list[Effect]:
-        """Peers know a later start of ours, so our own memory was lost: begin above it."""
         above = self.team.superseded_by
         if above is None or self.team.is_own_id_used(utime):
-            return []
-        fields = {"epoch": self.own.epoch, "known_to_peers": above}
-        return [Note(Level.WARNING, "epoch.superseded", fields), Restart(above + 1)]
+            return notes
+        # our own memory was lost, or a lie is believed
+        return [*notes, Restart(above, "peers know a later start of this robot")]
 
-    # ---- time passes, and ends ----
+    # time passes, and ends
 
     def _on_tick(self, event: Tick) -> list[Effect]:
         due = self.timers.take_due(event.utime)
         return [effect for action in due for effect in action(event.utime)]
 
-    def state(self) -> dict[str, Any]:
-        """What must outlive this start."""
-        state = {"epoch": self.own.epoch, "epochs": self.team.seal.epochs}
-        return {**state, "calibration": self.calibration.latest.state()}
-
     def _save(self, utime: int) -> list[Effect]:
-        if self.team.seal.epochs == self._saved_epochs and not self.calibration.is_news():
-            return []
-        self.calibration.on_saved()
-        self._saved_epochs = dict(self.team.seal.epochs)
-        return [Save(self.state())]
+        return list(self.memory.save())
+
+    def _on_saved(self, event: SaveDone) -> list[Effect]:
+        self.memory.fault = event.fault
+        return []
 
     def _on_stop(self, event: Stop) -> list[Effect]:
-        goodbye = self.broadcast.make_status([], None, event.utime, leaving=True)
+        state = self.whereabouts(event.utime).state
+        goodbye = self.broadcast.make_status([], None, state, event.utime, leaving=True)
         sends = [self.team.send(goodbye, event.utime) for _ in range(GOODBYES)]
-        return [*sends, Save(self.state())]
+        return [*sends, Save(self.memory.state())]

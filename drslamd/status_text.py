@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+UNSURE = ("stale", "doubtful")
+"""States of the pose of a peer that are worth a word."""
+
 
 def lines(s: dict[str, Any]) -> list[str]:
     """Text lines of one status answer."""
@@ -12,14 +15,14 @@ def lines(s: dict[str, Any]) -> list[str]:
     if s["insecure"]:
         out.append("INSECURE: no team key, anybody on the network can forge messages")
     out += [f"! {sentence}" for sentence in s["problems"]]
-    if pose["state"] == "localised":
+    if "frame" in pose:
         out.append(
-            f"localised in the frame of robot {pose['frame']}: x {pose['x_m']:.2f} m, "
+            f"{pose['state']} in the frame of robot {pose['frame']}: x {pose['x_m']:.2f} m, "
             f"y {pose['y_m']:.2f} m, {pose['theta_deg']:.1f} deg "
             f"(sigma {pose['sigma_m']:.2f} m, {pose['sigma_deg']:.1f} deg)"
         )
     else:
-        out.append("not localised")  # the problems above say why
+        out.append(pose["state"])  # the problems above say why
     out += _sensor("uwb", s["uwb"]) + _ranges(s["uwb"]) + _sensor("wheels", s["wheels"])
     network = s["network"]
     out.append(
@@ -66,6 +69,7 @@ def _peer(robot: str, peer: dict[str, Any]) -> str:
     words = [
         "alive" if peer["alive"] else "SILENT",
         "" if peer["hears_us"] else "does not hear us",
+        f"its pose is {peer['pose']}" if peer["pose"] in UNSURE else "",
         f"heard {peer['age_s']:.1f} s ago",
         f"loss {100 * peer['loss']:.0f} %",
         clock,

@@ -32,7 +32,7 @@ COMPUTING_S = 0.1
 WAITING_S = 0.5
 TASK_GRACE_S = 0.5
 
-_INSTALLED = sysconfig.get_path("purelib")
+_INSTALLED = os.path.realpath(sysconfig.get_path("purelib"))
 _PACKAGE = str(REPOSITORY / "drslamd")
 _loop_faults: list[str] = []
 

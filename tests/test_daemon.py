@@ -1,73 +1,19 @@
-"""The wiring of one process: clock, restarts, computations. Nothing here is started."""
+"""The wiring of one process: clock, computations, faults. Nothing here is started."""
 
 from __future__ import annotations
 
-import asyncio
-import json
 import threading
 import time
-from collections.abc import Awaitable, Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from daemon_scenes import Stepped, configured, heard_by, until, with_worker
 
-from drslamd.config import Config, ConfigError, parse
 from drslamd.conventions import MILLISECOND_US, SECOND_US
 from drslamd.daemon import Daemon
-from drslamd.events import (
-    Effect,
-    Event,
-    JobDone,
-    NetworkState,
-    PortCondition,
-    PortState,
-    Restart,
-    Send,
-    Solve,
-    Tick,
-    Write,
-)
+from drslamd.events import Event, JobDone, Restart, Send, Solve, Tick, Write
 from drslamd.io.clock import MonotonicClock
-from drslamd.slam.calibration.sensor_calibration import UNLEARNED
-from drslamd.slam.graph.estimate import Learned
-
-CONFIG = """
-[robot]
-id = 1
-[team]
-insecure = true
-[uwb]
-port = "/dev/none"
-[wheels]
-source = "kobuki"
-port = "/dev/none"
-[daemon]
-log_level = "error"
-"""
-DBC_WHEELS = """
-source = "dbc"
-dbc_file = "DBC"
-measures = "wheel_speeds"
-left = "A.B"
-right = "A.C"
-track_m = 0.5
-"""
-
-
-class Stepped:
-    """A clock that stands until it is moved."""
-
-    def __init__(self) -> None:
-        self.utime = 1_000_000_000
-
-    def now(self) -> int:
-        return self.utime
-
-
-def configured(tmp_path: Path, more: str = "") -> Config:
-    return parse(f'{CONFIG}state_dir = "{tmp_path / "state"}"\n{more}')
 
 
 @pytest.fixture
@@ -81,39 +27,7 @@ def daemon(tmp_path: Path, clock: Stepped) -> Daemon:
     return Daemon(configured(tmp_path), clock)
 
 
-def heard_by(daemon: Daemon) -> list[Event]:
-    """What the robot that the daemon has now is told from now on; it answers nothing."""
-    heard: list[Event] = []
-
-    def handle(event: Event) -> list[Effect]:
-        heard.append(event)
-        return []
-
-    daemon.robot.handle = handle  # type: ignore[method-assign]
-    return heard
-
-
-def with_worker(daemon: Daemon, scene: Callable[[], Awaitable[None]]) -> None:
-    """Play a scene in a loop, with the thread for computations and without the ports."""
-
-    async def run() -> None:
-        daemon._worker.start()
-        try:
-            await asyncio.wait_for(scene(), 10)
-        finally:
-            daemon._worker.stop()
-            if daemon._timer is not None:
-                daemon._timer.cancel()
-
-    asyncio.run(run())
-
-
-async def until(what: Callable[[], object]) -> None:
-    while not what():
-        await asyncio.sleep(0.002)
-
-
-# ---- the clock ---------------------------------------------------------------------------------
+# the clock
 
 
 def test_the_clock_of_a_daemon_is_one_that_nobody_can_set(
@@ -174,7 +88,7 @@ def test_how_late_the_loop_was_is_in_the_status(
     assert daemon._picture()["loop_lag_ms"] == {"median": late_ms, "p99": late_ms}
 
 
-# ---- computations and restarts -----------------------------------------------------------------
+# computations and restarts
 
 
 def test_a_result_comes_back_as_an_event_with_its_times(daemon: Daemon, clock: Stepped) -> None:
@@ -202,63 +116,19 @@ def test_what_an_old_robot_had_asked_for_is_not_told_to_the_new_one(daemon: Daem
     heard: list[Event] = []
 
     async def scene() -> None:
+        daemon._perform(Restart(old.own.epoch + 5, "test"))
         daemon._perform(Solve(7, "optimizer", lambda: may_end.wait(10)))
-        daemon._perform(Restart(old.own.epoch + 5))
+        await until(lambda: daemon.robot is not old)
         heard.extend(heard_by(daemon))
         may_end.set()
         await until(lambda: not daemon._jobs_waiting)
 
     with_worker(daemon, scene)
-    assert daemon.robot is not old
     assert heard == heard_by_old == []
     assert daemon._picture()["ms"] == {}
 
 
-def test_a_restart_takes_ports_network_and_knowledge_along(
-    daemon: Daemon, clock: Stepped, tmp_path: Path
-) -> None:
-    states: list[PortState | NetworkState] = [
-        PortState(clock.utime, "uwb", PortCondition.OPEN),
-        PortState(clock.utime, "wheels", PortCondition.BUSY, "in use"),
-        NetworkState(clock.utime, True, "lo"),
-    ]
-    old = daemon.robot
-    epoch = old.own.epoch + 5
-    learned = replace(UNLEARNED, scale=Learned(0.05, 0.01))
-
-    async def scene() -> None:
-        for state in states:
-            daemon.handle(state)
-        old.calibration.latest = learned
-        old.team.seal.epochs[9] = 123
-        daemon._perform(Restart(epoch))
-        await until(lambda: kept(tmp_path)["epoch"] == epoch)
-
-    with_worker(daemon, scene)
-    new = daemon.robot
-    assert (new.own.robot, new.own.epoch) == (1, epoch)
-    assert new.ports == {"uwb": states[0], "wheels": states[1]}
-    assert new.network == states[2]
-    assert new.team.seal.epochs == {9: 123}
-    assert new.calibration.latest == learned
-    assert kept(tmp_path)["epochs"] == {"9": 123}
-
-
-def kept(tmp_path: Path) -> dict[str, Any]:
-    state: dict[str, Any] = json.loads((tmp_path / "state" / "robot-1.json").read_text())
-    return state
-
-
-def test_an_epoch_is_on_disk_before_anything_is_sent_under_it(tmp_path: Path) -> None:
-    epochs = []
-    for _ in range(3):
-        daemon = Daemon(configured(tmp_path))
-        assert kept(tmp_path)["epoch"] == daemon.robot.own.epoch
-        epochs.append(daemon.robot.own.epoch)
-    assert epochs == sorted(set(epochs))
-
-
-# ---- what goes wrong inside --------------------------------------------------------------------
+# what goes wrong inside
 
 
 def test_a_fault_of_ours_ends_it_and_no_event_is_handled_after_it(daemon: Daemon) -> None:
@@ -292,19 +162,3 @@ def test_the_line_for_systemd_says_where_it_stands_and_what_is_wrong(daemon: Dae
     daemon.robot.health.set("uwb", "no bytes", 0)
     daemon.robot.health.set("wheels", "no motion", 0)
     assert daemon._one_line() == "not localised, 0 peers; no bytes; no motion"
-
-
-@pytest.mark.parametrize(
-    ("content", "sentence"), [(None, "No such file or directory"), (b"\xff\xfe", "not a text file")]
-)
-def test_a_dbc_file_that_cannot_be_read_is_one_sentence(
-    tmp_path: Path, content: bytes | None, sentence: str
-) -> None:
-    path = tmp_path / "base.dbc"
-    if content is not None:
-        path.write_bytes(content)
-    before, _, rest = CONFIG.partition('source = "kobuki"\nport = "/dev/none"\n')
-    text = before + DBC_WHEELS.replace("DBC", str(path)) + rest
-    with pytest.raises(ConfigError) as caught:
-        Daemon(parse(f'{text}state_dir = "{tmp_path}"\n'))
-    assert caught.value.faults == [f"wheels.dbc_file = '{path}': {sentence}"]

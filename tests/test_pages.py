@@ -47,7 +47,7 @@ OURS = re.compile(
 """A command line of one of our programs."""
 
 
-# ---- TOML --------------------------------------------------------------------------------------
+# TOML
 
 
 def is_toml(block: str) -> bool:
@@ -144,7 +144,7 @@ def test_a_wrong_key_in_running_text_would_be_seen(span: str, wrong: bool) -> No
     assert wrong_keys(read("page", f"It says `{span}`, so there.")) == ([span] if wrong else [])
 
 
-# ---- command lines -----------------------------------------------------------------------------
+# command lines
 
 
 class Refused(Exception):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from robot_scenes import T0, RobotScene, sends
 from drslamd import report
 from drslamd.conventions import Segment
 from drslamd.events import ChannelMessage, NetworkState, PortCondition, PortState, SerialData
-from drslamd.gossip.message_types import Heard, LogState
+from drslamd.gossip.message_types import Heard, LogState, PoseState
 from drslamd.slam.calibration.sensor_calibration import SensorCalibration
 from drslamd.slam.closure_method import AGREEMENT
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
@@ -216,6 +217,7 @@ def test_of_a_peer_its_clock_its_state_and_what_lacks_of_its_log_are_said() -> N
             "clock_uncertainty_ms": 5.3,
             "clock_source": "messages",
             "uwb_id": 44,
+            "pose": "not localised",
             "localised": False,
             "frame": None,
             "same_graph": False,
@@ -227,12 +229,12 @@ def test_of_a_peer_its_clock_its_state_and_what_lacks_of_its_log_are_said() -> N
 def test_a_peer_that_is_localised_is_said_in_whose_frame_and_whether_it_holds_the_same() -> None:
     scene = RobotScene()
     digest = scene.robot.back.digest()
-    status = a_status((Heard(0, 1, 0),))
+    status = a_status((Heard(0, 1, 0),), uwb_id=4)
     for same in (True, False):
-        told = type(status)(1, 7, False, 4, status.uwb_clock_us, digest + (not same), status.heard)
+        told = replace(status, state=PoseState.LOCALISED, graph_hash=digest + (not same))
         scene.hear(4, told)
         found = section(scene, "peers")["4"]
-        assert (found["localised"], found["frame"], found["same_graph"]) == (True, 7, same)
+        assert (found["localised"], found["frame"], found["same_graph"]) == (True, 3, same)
 
 
 def test_a_peer_that_fell_silent_is_not_alive_and_of_its_clock_little_is_known() -> None:
@@ -250,6 +252,7 @@ def test_a_peer_that_fell_silent_is_not_alive_and_of_its_clock_little_is_known()
 @pytest.mark.parametrize(("count", "is_connected"), [(4, False), (5, True)])
 def test_of_a_pair_windows_and_closures_are_counted(count: int, is_connected: bool) -> None:
     scene, pair = RobotScene(), OwnedPair(AGREEMENT)
+    pair.confirm()
     pair.answer(10)
     pair.see(MIRRORED, 1)
     pair.see(BESIDE, count, first=20)
@@ -265,7 +268,13 @@ def test_of_a_pair_windows_and_closures_are_counted(count: int, is_connected: bo
 
 
 def test_of_the_graph_the_group_its_keyframes_and_what_was_learned_are_said() -> None:
-    learned = SensorCalibration(Learned(0.02, 0.01), Learned(), {1: Learned(0.12345, 0.01)})
+    learned = SensorCalibration(
+        scale=Learned(0.02, 0.01),
+        bias={1: Learned(0.12345, 0.01)},
+        turn=Learned(0.3, 0.02),
+        antenna_x=Learned(0.12346, 0.02),
+        antenna_y=Learned(-0.2, 0.02),
+    )
     scene = RobotScene(robot=2, kept=learned)
     for peer, count in ((1, 2), (4, 3)):
         frames = tuple(Keyframe(10 * k, 0, k, 0, 0) for k in range(count))
@@ -281,4 +290,6 @@ def test_of_the_graph_the_group_its_keyframes_and_what_was_learned_are_said() ->
         "converged": False,
         "range_bias_m": {"1-2": 0.1235},
         "wheel_scale": {"2": 0.02},
+        "wheel_turn": {"2": 0.3},
+        "antenna_m": {"2": [0.1235, -0.2]},
     }

@@ -51,6 +51,7 @@ def peer() -> dict[str, Any]:
     return {
         "alive": True,
         "hears_us": True,
+        "pose": "localised",
         "age_s": 0.42,
         "loss": 0.25,
         "clock_offset_ms": -7200.5,
@@ -130,6 +131,19 @@ def test_why_a_robot_is_not_localised_is_said_once_and_by_the_problems() -> None
         f"! {reason}",
         "not localised",
     ]
+
+
+@pytest.mark.parametrize("state", ["stale", "doubtful"])
+def test_a_pose_that_is_not_sure_is_called_so_here_and_at_the_peers(state: str) -> None:
+    (line,) = news("pose", "state", state)
+    assert line.startswith(f"{state} in the frame of robot 0: x 1.00 m, y -2.00 m")
+    (line,) = news("peers", "1", "pose", state)
+    assert line.startswith(f"peer 1: alive, its pose is {state}, heard 0.4 s ago")
+
+
+@pytest.mark.parametrize("state", ["localised", "not localised", None])
+def test_of_other_poses_of_peers_nothing_is_said(state: str | None) -> None:
+    assert news("peers", "1", "pose", state) == []
 
 
 def test_without_a_reason_none_is_made_up() -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from drslamd.conventions import Chain
 from drslamd.gossip.log_repeats import LogRepeats
 from drslamd.gossip.message_types import MAX_LOGS, LogState
-from drslamd.gossip.replicated_log import ReplicatedLog
+from drslamd.gossip.replicated_log import AHEAD, ReplicatedLog
 
 
 class LogSync:
@@ -29,6 +29,12 @@ class LogSync:
             self._logs[origin.robot] = ReplicatedLog(origin.epoch)
             return True
         return origin.epoch == log.epoch
+
+    def is_near(self, origin: Chain, seq: int) -> bool:
+        """Is an entry so near to what is known of its log that it may be taken?"""
+        log = self._logs.get(origin.robot)
+        known = log.newest if log is not None and log.epoch == origin.epoch else 0
+        return seq < known + AHEAD
 
     def add(self, origin: Chain, seq: int, sealed: bytes, utime: int) -> bool:
         """Take one entry; False when it is not new.
@@ -58,7 +64,7 @@ class LogSync:
             others = (others[start:] + others[:start])[:room]
             self._turn = start + room
         return tuple(
-            LogState(robot, log.epoch, log.first, log.complete, log.newest)
+            LogState(robot, log.epoch, log.start, log.complete, log.newest)
             for robot, log in ((robot, self._logs[robot]) for robot in named + others)
         )
 
@@ -69,7 +75,7 @@ class LogSync:
     def lacking(self, robot: int) -> int:
         """Entries of a robot's log that we know of and do not hold."""
         log = self._logs.get(robot)
-        return log.newest - log.first - len(log.sealed) if log else 0
+        return log.lacking if log else 0
 
     def lacks_any(self) -> bool:
         """Do we know of entries, of anybody's, that we do not hold?"""
@@ -80,15 +86,18 @@ class LogSync:
         for theirs in states:
             log = self._logs.get(theirs.id)
             if log is not None and theirs.epoch == log.epoch:
-                self._learn(log, theirs, sender)
+                self._learn(log, theirs, is_owner=theirs.id == sender)
         named = {state.id: state for state in states}
         left_out = self._logs.keys() - named if len(states) == MAX_LOGS else set()
         self.repeats.on_status(sender, named, left_out, utime)
 
-    def _learn(self, log: ReplicatedLog, theirs: LogState, sender: int) -> None:
+    def _learn(self, log: ReplicatedLog, theirs: LogState, is_owner: bool) -> None:
         if theirs.id == self._robot:
             return
-        log.newest = max(log.newest, theirs.newest)
-        if theirs.id == sender and theirs.first > log.complete:
-            # the owner itself no longer holds what we lack
-            log.forget_before(theirs.first)
+        if not is_owner:
+            log.on_hearsay(theirs.newest)
+        elif theirs.newest < log.first:
+            # all that we hold lies beyond what its owner has made: it is somebody else's
+            self._logs[theirs.id] = ReplicatedLog(log.epoch)
+        else:
+            log.on_owner(theirs.first, theirs.newest)

@@ -6,6 +6,7 @@ Those that belong to the pose graph (`GraphEntry`, `PublicPoses`) are in `drslam
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Union
 
 from drslamd.slam.graph.measurements import GraphEntry
@@ -24,6 +25,19 @@ MAX_LOGS = 28
 """Logs named in one status; whoever holds more names them in turn."""
 MAX_BATCH = 150
 """Odometry samples in one message: 15 s, 955 bytes."""
+
+
+class PoseState(IntEnum):
+    """What a robot says of its own pose, in `status_t` and `pose_t`."""
+
+    NOT_LOCALISED = 0
+    """It is in no frame; a pose that is sent with it says nothing."""
+    LOCALISED = 1
+    """The pose is at most a second old and its covariance is meant."""
+    DOUBTFUL = 2
+    """There is a pose, but what was measured contradicts it."""
+    STALE = 3
+    """The last pose, as uncertain as the way that may have been driven since without odometry."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +68,7 @@ class LogState:
 
 @dataclass(frozen=True)
 class Status:
-    state: int
+    state: PoseState
     frame: int
     leaving: bool
     uwb_id: int
@@ -76,7 +90,7 @@ class OdometryBatch:
 
 @dataclass(frozen=True)
 class Pose:
-    state: int
+    state: PoseState
     frame: int
     frame_epoch: int
     pose_utime: int

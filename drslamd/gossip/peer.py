@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Set
+from collections.abc import Collection, Set
 from dataclasses import dataclass
 
-from drslamd.conventions import GRID_US, SECOND_US, Chain
+from drslamd.conventions import GRID_HZ, GRID_US, SECOND_US, Chain
 from drslamd.gossip.message_types import (
     MAX_BATCH,
     MAX_HEARD,
@@ -17,7 +17,6 @@ from drslamd.gossip.message_types import (
     Status,
 )
 from drslamd.gossip.peer_clock import PeerClock
-from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.odometry.track import PEER_TRACK_SAMPLES, Track
 from drslamd.slam.peer_in_range import PeerInRange
 
@@ -26,6 +25,12 @@ SILENCE_US = 5 * SECOND_US
 peer stays silent so long in 3 % of cases."""
 GAP_US = 8 * SECOND_US
 """What of its odometry is not said again for so long will not be."""
+STRAGGLER = 60 * GRID_HZ
+"""Samples, a minute of them. Batches are not so late: one that ends so far before the end of the
+track shows that the track is not its robot's, and begins it anew."""
+REORDERED = 64
+"""Messages of one robot that may overtake one of its own, seconds of the busiest. What is further
+behind is not late: a false message was ahead of it."""
 LOSS_STATUSES = 30
 """Heartbeats over which the loss is counted: the last half minute or so."""
 REMEMBERED_US = 40 * SECOND_US
@@ -52,7 +57,6 @@ class Peer:
         self.track = Track(PEER_TRACK_SAMPLES)
         self.status: Status | None = None
         self.pose: Pose | None = None
-        self.public: PublicPoses | None = None
         self.last_heard = utime
         self.received = 0
         self._status_counter = self._pose_counter = 0
@@ -78,7 +82,7 @@ class Peer:
 
     def take_status(self, status: Status, counter: int, own: Chain, utime: int) -> bool:
         """Keep the latest status; False when this one was overtaken by a later one."""
-        if counter <= self._status_counter:
+        if _is_overtaken(counter, self._status_counter):
             return False
         self._status_counter, self.status = counter, status
         # entries of its log have counters too, but are not heard from the peer alone
@@ -104,15 +108,13 @@ class Peer:
 
     def take_pose(self, pose: Pose, counter: int) -> None:
         """Keep the latest pose."""
-        if counter > self._pose_counter:
+        if not _is_overtaken(counter, self._pose_counter):
             self._pose_counter, self.pose = counter, pose
-
-    def take_public(self, message: PublicPoses) -> None:
-        """Keep what the peer said last of each of its public poses."""
-        self.public = message.after(self.public)
 
     def extend_track(self, batch: OdometryBatch, utime: int) -> None:
         """Append what is new in a batch; one that leaves a gap waits for those before it."""
+        if batch.n0 + len(batch.steps) <= self.track.end - STRAGGLER:
+            self.track = Track(PEER_TRACK_SAMPLES)
         track = self.track
         if batch.n0 > max(track.end, batch.segment_start) and len(batch.steps) < MAX_BATCH:
             self._gap_since = utime if self._gap_since is None else self._gap_since
@@ -131,8 +133,12 @@ class Peer:
 
     def is_alive(self, utime: int) -> bool:
         """Heard of late, and not on its way out."""
+        return self.speaks(utime, SILENCE_US)
+
+    def speaks(self, utime: int, within_us: int) -> bool:
+        """Heard within this time, and not on its way out."""
         leaving = self.status is not None and self.status.leaving
-        return utime - self.last_heard < SILENCE_US and not leaving
+        return utime - self.last_heard < within_us and not leaving
 
     def hears(self, own: Chain) -> bool:
         """Has it said that it hears this very start of ours? A replayed recording cannot."""
@@ -157,3 +163,36 @@ class Peer:
             of_us.heard.wanted_n if of_us else NOTHING_WANTED,
             of_us.utime if of_us else utime,
         )
+
+
+def _is_overtaken(counter: int, latest: int) -> bool:
+    """Was a message made before the latest one that we have of its kind?"""
+    return 0 <= latest - counter < REORDERED
+
+
+# whose is a UWB module?
+
+
+def carrier(peers: Collection[Peer], uwb_id: int) -> int | None:
+    """The robot that carries this UWB module, None when it is not (yet) known."""
+    claimants = [p for p in peers if p.status and p.status.uwb_id == uwb_id]
+    latest = max((peer.last_heard for peer in claimants), default=0)
+    # a module may have moved from a robot that is silent now to one that speaks
+    robots = [p.chain.robot for p in claimants if latest - p.last_heard < SILENCE_US]
+    return robots[0] if len(robots) == 1 else None
+
+
+def shared_module(peers: Collection[Peer], utime: int) -> str | None:
+    """One sentence when two robots claim one module."""
+    claims: dict[int, list[int]] = {}
+    for peer in sorted(peers, key=lambda peer: peer.chain):
+        if peer.status is not None and peer.is_alive(utime):
+            claims.setdefault(peer.status.uwb_id, []).append(peer.chain.robot)
+    for uwb_id, robots in sorted(claims.items()):
+        if len(robots) > 1:
+            names = " and ".join(map(str, robots))
+            return (
+                f"robots {names} all claim UWB module {uwb_id}, so its ranges cannot be "
+                "used; give every robot the uwb.id of its own module"
+            )
+    return None

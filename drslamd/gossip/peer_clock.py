@@ -81,7 +81,8 @@ class PeerClock:
         radio = self._by_radio(-incoming, echo, utime)
         if radio is not None:
             return Offset(radio, RADIO_UNCERTAINTY_US, "LinkTrack system_time")
-        uncertainty = max(0, (echo + incoming) // 2) + DRIFT_US + max(0, utime - said) // AGEING
+        # both ways together take no less than no time: what is below that is as wrong as it says
+        uncertainty = abs(echo + incoming) // 2 + DRIFT_US + max(0, utime - said) // AGEING
         return Offset((echo - incoming) // 2, uncertainty, "messages")
 
     def _by_radio(self, least: int, most: int, utime: int) -> int | None:

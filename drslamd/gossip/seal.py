@@ -2,10 +2,11 @@
 
 The tag is a keyed BLAKE2b over channel and message with the tag field zero. The key is derived
 from the team key and the origin, so a relay can hand a message on but not change it. A message is
-judged in the order of cost, and nothing is remembered of it before its tag is proven:
+judged in the order of cost, and nothing is remembered of it before its tag is proven and all else
+in it was found good (`Seal.accept`):
 
-    length, type, version, origin, own echo, epoch not older than the last one, counter not seen,
-    tag; and a proven message under our own id that we did not send is another robot's.
+    length, type, version, origin, time, own echo, epoch not older than the last one, counter not
+    seen, tag; and a proven message under our own id that we did not send is another robot's.
 
 Without a team key the tag is made with a key that everybody knows; it then only finds damage.
 """
@@ -18,7 +19,8 @@ from dataclasses import dataclass
 from enum import Enum
 from hashlib import blake2b
 
-from drslamd.conventions import MAX_ROBOT_ID
+from drslamd.conventions import LAST_UTIME, MAX_ROBOT_ID
+from drslamd.gossip.epochs import FIRST_EPOCH
 from drslamd.gossip.lc02 import MAX_PAYLOAD
 from drslamd.gossip.replay_window import ReplayWindow
 
@@ -32,7 +34,9 @@ _HEADER = struct.Struct(f">8sbhqiq{TAG_BYTES}s")
 _TAG_AT = _HEADER.size - TAG_BYTES
 _PUBLIC_KEY = b"drslamd without a team key      "
 
-FIRST_EPOCH = 0
+LAST_COUNTER = 2**31 - 1
+SPENT_COUNTER = LAST_COUNTER - 100_000
+"""A start that has sent so many messages, three a second for 22 years, needs another epoch soon."""
 
 
 class SealFault(Enum):
@@ -41,6 +45,7 @@ class SealFault(Enum):
     UNKNOWN_TYPE = "unknown message type"
     WRONG_VERSION = "other version of the messages"
     BAD_ORIGIN = "origin is no robot id"
+    BAD_TIME = "made at a time that no clock shows"
     OWN = "own message"
     OWN_ID_USED = "another robot uses this id"
     OLD_EPOCH = "from before a restart of its origin"
@@ -99,6 +104,11 @@ class Seal:
         self._windows: dict[int, ReplayWindow] = {}
         self._counter = 0
 
+    @property
+    def is_spent(self) -> bool:
+        """Will this epoch soon have no more counters?"""
+        return self._counter > SPENT_COUNTER
+
     def header(self, utime: int) -> Header:
         """The header of our next message."""
         self._counter += 1
@@ -112,24 +122,31 @@ class Seal:
     def open(
         self, channel: str, message: bytes, fingerprints: frozenset[bytes], once: bool = True
     ) -> Header | SealFault:
-        """Judge one message; only an accepted one is remembered.
+        """Judge one message and remember it, when nothing else is to be found good in it.
+
+        Args: as of `judge`.
+        """
+        verdict = self.judge(channel, message, fingerprints, once)
+        if isinstance(verdict, Header):
+            self.accept(verdict, once)
+        return verdict
+
+    def accept(self, header: Header, once: bool = True) -> None:
+        """Remember a message that was judged good: from now on its start is the present one."""
+        window = self._window(header)
+        self.epochs[header.origin], self._windows[header.origin] = header.epoch, window
+        if once:
+            window.commit(header.counter)
+
+    def judge(
+        self, channel: str, message: bytes, fingerprints: frozenset[bytes], once: bool = True
+    ) -> Header | SealFault:
+        """Who made a message, or why it is not to be heard.
 
         Args:
             fingerprints: of the types that this channel may carry.
             once: False for messages whose own numbering makes a repetition harmless.
         """
-        verdict = self._judge(channel, message, fingerprints, once)
-        if isinstance(verdict, SealFault):
-            return verdict
-        window = self._window(verdict)
-        self.epochs[verdict.origin], self._windows[verdict.origin] = verdict.epoch, window
-        if once:
-            window.commit(verdict.counter)
-        return verdict
-
-    def _judge(
-        self, channel: str, message: bytes, fingerprints: frozenset[bytes], once: bool
-    ) -> Header | SealFault:
         if len(message) < _HEADER.size:
             return SealFault.TOO_SHORT
         if len(message) > MAX_PAYLOAD:
@@ -142,6 +159,8 @@ class Seal:
             return SealFault.WRONG_VERSION
         if not 0 <= header.origin <= MAX_ROBOT_ID:
             return SealFault.BAD_ORIGIN
+        if not 0 <= header.utime <= LAST_UTIME:
+            return SealFault.BAD_TIME
         ours = header.origin == self.robot
         if ours and header.epoch == self.epoch and header.counter <= self._counter:
             return SealFault.OWN

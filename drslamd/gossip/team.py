@@ -9,11 +9,14 @@ from dataclasses import dataclass
 from drslamd.conventions import SECOND_US, Chain
 from drslamd.events import ChannelMessage, Datagram, Send
 from drslamd.gossip import lc02, messages
+from drslamd.gossip.bounds import LAST_SEQ, Measurement, is_sayable
 from drslamd.gossip.lc02 import MAX_PAYLOAD
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.messages import UNKNOWN_CLOCK, Heard, Message, OdometryBatch, Pose, Status
-from drslamd.gossip.peer import SILENCE_US, Peer
+from drslamd.gossip.peer import Peer, carrier, shared_module
+from drslamd.gossip.replicated_log import AHEAD
 from drslamd.gossip.seal import Header, Seal, SealFault
+from drslamd.gossip.starts import StartFault, Starts
 from drslamd.slam.graph.measurements import (
     ClosureMeasurement,
     GraphEntry,
@@ -29,19 +32,21 @@ MODEL_EVERY = 64
 """Log entries between two that say what our sensors are like."""
 MEASUREMENTS_PER_ENTRY = 20
 """Keyframes, ranges and closures in one log entry; 20 closures with 20 peers are 1,280 bytes."""
-PUBLIC_ENVELOPE_BYTES = 57
-"""What a public_poses_t needs besides its poses."""
+PUBLIC_ENVELOPE_BYTES = 80
+"""What a public_poses_t needs besides its poses and what it holds of others."""
 UNVERIFIED_US = 10 * SECOND_US
 """How long after a message that does not fit the team key it is still spoken of."""
 _FINGERPRINTS = {kind: frozenset([value]) for kind, value in messages.FINGERPRINTS.items()}
 
-_REMEDIES = {
+_REMEDIES: dict[SealFault | StartFault, str] = {
     SealFault.WRONG_TAG: "hears messages that do not fit the team key, from {sender}; "
     "give all robots the same team.key_file",
     SealFault.WRONG_VERSION: "hears messages of another version of drslamd, from {sender}; "
     "install the same version on all robots",
     SealFault.OWN_ID_USED: "another robot uses id {robot}, at {sender}; "
     "give every robot a robot.id of its own",
+    StartFault.BEYOND_CLOCKS: "hears a start that no clock can show, from {sender}; its state file "
+    "is damaged, or somebody who can seal messages makes them up",
 }
 """Refusals that somebody must do something about."""
 
@@ -61,6 +66,7 @@ class Team:
         refused: messages that were turned away, by reason; accepted are those that said something
             new, `repeats_heard` log entries that we had, `own_echoes` what we sent ourselves.
             Together they are all that came.
+        unsayable: measurements of ours that were beyond what a message can say.
         last_echo: when we last heard ourselves, which proves that the network carries us.
     """
 
@@ -71,17 +77,17 @@ class Team:
         self.peers: dict[int, Peer] = {}
         self.refused: Counter[str] = Counter()
         self.accepted = 0
+        self.unsayable = 0
         self.repeats_heard = 0
         self.own_echoes = 0
         self.last_echo: int | None = None
         self._next_seq = 0
         self._named_last = -1
         """The robot after which the next status goes on, when it cannot name all that are heard."""
-        self.superseded_by: int | None = None
-        """A later epoch of ours that a peer has heard; then our messages are refused as old."""
-        self._last_refused: dict[SealFault, tuple[int, str]] = {}
+        self.starts = Starts(self.own, seal.epochs)
+        self._last_refused: dict[SealFault | StartFault, tuple[int, str]] = {}
 
-    # ---- outgoing ----
+    # outgoing
 
     def send(self, message: Message, utime: int) -> Send:
         """Seal a message."""
@@ -91,12 +97,13 @@ class Team:
 
     def send_public(self, public: PublicPoses, utime: int) -> list[Send]:
         """Lifted poses, as many in one message as one datagram takes."""
-        # 4 bytes of number and 4 * rank floats for each, and the anchor's floats once
+        # 10 bytes for each that is held, 4 bytes of number and 4 * rank floats for each pose, and
+        # the anchor's floats once
         lifted = 16 * public.rank
-        at_once = (MAX_PAYLOAD - PUBLIC_ENVELOPE_BYTES - lifted) // (4 + lifted)
+        envelope = PUBLIC_ENVELOPE_BYTES + 10 * len(public.held) + lifted
         return [
-            self.send(public.part(first, first + at_once), utime)
-            for first in range(0, len(public.keyframes), at_once)
+            self.send(part, utime)
+            for part in public.split((MAX_PAYLOAD - envelope) // (4 + lifted))
         ]
 
     def append(self, entry: GraphEntry, utime: int) -> tuple[GraphEntry, bytes]:
@@ -117,8 +124,13 @@ class Team:
         ranges: Sequence[RangeMeasurement],
         closures: Sequence[ClosureMeasurement],
     ) -> Iterator[GraphEntry]:
-        """The next entries of our log, each small enough for one datagram."""
-        measurements = [*keyframes, *ranges, *closures]
+        """The next entries of our log, each small enough for one datagram.
+
+        What no reader would take is left out and counted.
+        """
+        measured: list[Measurement] = [*keyframes, *ranges, *closures]
+        measurements = [item for item in measured if is_sayable(item)]
+        self.unsayable += len(measured) - len(measurements)
         starts = range(0, len(measurements), MEASUREMENTS_PER_ENTRY)
         for seq, first in enumerate(starts, start=self._next_seq):
             part = measurements[first : first + MEASUREMENTS_PER_ENTRY]
@@ -163,7 +175,7 @@ class Team:
             if peer.clock.delay_us is not None
         )
 
-    # ---- incoming ----
+    # incoming
 
     def receive(self, event: Datagram | ChannelMessage) -> Received | None:
         """Judge one datagram; whatever is wrong with it is counted by its reason."""
@@ -179,14 +191,10 @@ class Team:
         if kind is None:
             self.refused["channel of another program"] += 1
             return None
-        header = self.seal.open(channel, payload, _FINGERPRINTS[kind], once=kind != "GRAPH")
+        once = kind != "GRAPH"
+        header = self.seal.judge(channel, payload, _FINGERPRINTS[kind], once)
         if isinstance(header, SealFault):
-            if header is SealFault.OWN:
-                self.own_echoes += 1
-                self.last_echo = event.utime
-            else:
-                self.refused[header.value] += 1
-                self._last_refused[header] = (event.utime, event.sender)
+            self._refuse(header, event)
             return None
         message = messages.decode(kind, payload)
         if isinstance(message, str):
@@ -195,7 +203,34 @@ class Team:
         if channel != messages.channel(kind, header.origin):
             self.refused["channel of another robot"] += 1
             return None
+        origin = Chain(header.origin, header.epoch)
+        fault = self.starts.judge(origin, self.peers.get(origin.robot), event.utime)
+        if fault is not None:
+            self._refuse(fault, event)
+            return None
+        if isinstance(message, GraphEntry) and not self._is_near(origin, message.seq):
+            self.refused["entry far ahead of its log"] += 1
+            return None
+        self.seal.accept(header, once)
         return self._sort(header, message, payload, event.utime)
+
+    def _is_near(self, origin: Chain, seq: int) -> bool:
+        """Is an entry near the end of its log as we, or the latest status of any peer, know it?"""
+        statuses = (peer.status for peer in self.peers.values() if peer.status is not None)
+        return self.logs.is_near(origin, seq) or any(
+            (log.id, log.epoch) == origin and seq < log.newest + AHEAD
+            for status in statuses
+            for log in status.logs
+        )
+
+    def _refuse(self, fault: SealFault | StartFault, event: Datagram | ChannelMessage) -> None:
+        """Count a message that is not to be heard; our own echo is none that anybody refused."""
+        if fault is SealFault.OWN:
+            self.own_echoes += 1
+            self.last_echo = event.utime
+            return
+        self.refused[fault.value] += 1
+        self._last_refused[fault] = (event.utime, event.sender)
 
     def _sort(self, header: Header, message: Message, sealed: bytes, utime: int) -> Received | None:
         origin = Chain(header.origin, header.epoch)
@@ -219,24 +254,29 @@ class Team:
             peer.extend_track(message, utime)
         elif isinstance(message, Pose):
             peer.take_pose(message, header.counter)
-        else:
-            peer.take_public(message)
         return Received(origin, message)
 
     def _status(self, peer: Peer, status: Status, counter: int, utime: int) -> None:
         if not peer.take_status(status, counter, self.own, utime):
             return
         self.logs.on_states(status.logs, peer.chain.robot, utime)
-        starts = [(s.id, s.epoch) for s in status.heard] + [(s.id, s.epoch) for s in status.logs]
-        for robot, epoch in starts:
-            if robot == self.own.robot and epoch > self.own.epoch:
-                self.superseded_by = max(self.superseded_by or 0, epoch)
+        self.starts.on_status(peer.chain.robot, status, self._next_seq, utime)
 
     def lacks_odometry(self) -> bool:
         """Was odometry lost that may still come?"""
         return any(peer.lacks_odometry for peer in self.peers.values())
 
-    # ---- who is there ----
+    @property
+    def superseded_by(self) -> int | None:
+        """A start of ours above which we have to begin again: our messages are refused as old."""
+        return self.starts.superseded_by()
+
+    @property
+    def is_spent(self) -> bool:
+        """Does this start run out of numbers for its messages or its log?"""
+        return self.seal.is_spent or self._next_seq >= LAST_SEQ
+
+    # who is there
 
     def living(self, utime: int) -> dict[int, Peer]:
         """Peers that are alive and hear us."""
@@ -257,11 +297,6 @@ class Team:
         }
         return set(direct) | vouched | {self.own.robot}
 
-    def shifts(self, utime: int) -> dict[int, int]:
-        """Clock of each peer minus ours, us, as well as it is known."""
-        offsets = {robot: peer.clock.offset(utime) for robot, peer in self.peers.items()}
-        return {robot: offset.us for robot, offset in offsets.items() if offset is not None}
-
     def compare_radio_clocks(self, own_minus_system: int | None, utime: int) -> None:
         """Use LinkTrack's system_time, where both sides know their clock against it."""
         for peer in self.peers.values():
@@ -278,37 +313,19 @@ class Team:
             text = sentence.format(robot=self.own.robot, sender=sender or "an unknown sender")
             key = f"team.{fault.name.lower()}"
             out.append((key, text if self._refused_of_late(fault, utime) else None))
-        return [*out, ("team.uwb_id", self._shared_uwb_id(utime))]
+        return [*out, ("team.uwb_id", shared_module(self.peers.values(), utime))]
 
     def is_own_id_used(self, utime: int) -> bool:
         """Does another robot speak under our id?"""
         return self._refused_of_late(SealFault.OWN_ID_USED, utime)
 
-    def _refused_of_late(self, fault: SealFault, utime: int) -> bool:
+    def _refused_of_late(self, fault: SealFault | StartFault, utime: int) -> bool:
         when, _ = self._last_refused.get(fault, (None, ""))
         return when is not None and utime - when < UNVERIFIED_US
 
-    def _shared_uwb_id(self, utime: int) -> str | None:
-        claims: dict[int, list[int]] = {}
-        for robot, peer in sorted(self.peers.items()):
-            if peer.status is not None and peer.is_alive(utime):
-                claims.setdefault(peer.status.uwb_id, []).append(robot)
-        for uwb_id, robots in sorted(claims.items()):
-            if len(robots) > 1:
-                names = " and ".join(map(str, robots))
-                return (
-                    f"robots {names} all claim UWB module {uwb_id}, so its ranges cannot be "
-                    "used; give every robot the uwb.id of its own module"
-                )
-        return None
-
     def robot_of_uwb(self, uwb_id: int) -> int | None:
         """The robot that carries this UWB module, None when it is not (yet) known."""
-        peers = [p for p in self.peers.values() if p.status and p.status.uwb_id == uwb_id]
-        latest = max((peer.last_heard for peer in peers), default=0)
-        # a module may have moved from a robot that is silent now to one that speaks
-        robots = [p.chain.robot for p in peers if latest - p.last_heard < SILENCE_US]
-        return robots[0] if len(robots) == 1 else None
+        return carrier(self.peers.values(), uwb_id)
 
     def forget_silent(self, utime: int) -> None:
         """Drop the peers that were not heard for long; their logs remain."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
-from drslamd.conventions import MILLISECOND_US
-
 
 class Clock(Protocol):
     """Microseconds that only ever grow."""
@@ -21,6 +19,11 @@ class MonotonicClock:
         return time.monotonic_ns() // 1_000
 
 
-def wall_epoch() -> int:
-    """A number for this start: milliseconds of the wall clock, if it has ever been set."""
-    return time.time_ns() // (1_000 * MILLISECOND_US)
+def wall_s() -> int:
+    """The wall clock, s since 1970; anybody may set it, and it may never have been set."""
+    return time.time_ns() // 1_000_000_000
+
+
+def uptime_s() -> int:
+    """Since the computer began, sleep and all."""
+    return int(time.clock_gettime(time.CLOCK_BOOTTIME))

@@ -1,22 +1,31 @@
 """What a robot keeps over a restart: epochs, what it learned of its sensors, the team key.
 
-The file is replaced whole or not at all, so a power cut leaves the old one or the new one.
+The file is replaced whole or not at all, so a power cut leaves the old one or the new one. It is
+read as if a stranger had written it: bounded in size, depth and every number; and nothing is
+written that would not be read.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import secrets
 import stat
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from drslamd.config import ConfigError
+from drslamd.conventions import ROBOT_NAMES, SECOND_US
+from drslamd.gossip.epochs import is_kept_epoch, next_epoch
 from drslamd.gossip.seal import KEY_BYTES
+from drslamd.io.clock import uptime_s, wall_s
 from drslamd.slam.calibration import sensor_calibration
 
 SCHEMA = 1
+MAX_STATE_BYTES = 256 * 1024
+"""Of the file; epochs and biases of 254 peers are a tenth of it."""
 
 
 class StateStore:
@@ -30,23 +39,48 @@ class StateStore:
     def load(self) -> dict[str, Any]:
         """What was kept, or nothing when there is none or it is not ours to read."""
         try:
-            state = json.loads(self.path.read_text())
+            state = json.loads(_read_bounded(self.path))
         except FileNotFoundError:
             return {}
+        except RecursionError:
+            self.fault = f"cannot read {self.path}: brackets nested too deep; starting afresh"
+            return {}
         except (OSError, ValueError) as error:
-            self.fault = f"cannot read {self.path}: {error}"
+            reason = getattr(error, "strerror", None) or str(error)
+            self.fault = f"cannot read {self.path}: {reason}; starting afresh"
             return {}
         if not isinstance(state, dict) or state.get("schema") != SCHEMA:
             self.fault = f"{self.path} was written by another version; starting afresh"
             return {}
-        if not _is_sound(state):
+        if not is_sound(state):
             self.fault = f"{self.path} is damaged; starting afresh"
             return {}
         return state
 
+    def begin(self, state: Mapping[str, Any], above: int) -> int:
+        """Keep this state under a new epoch, before anything is sent under it.
+
+        Args:
+            above: the last epoch that is known.
+
+        Returns:
+            The epoch. Where it cannot be kept, another start will begin from the same knowledge,
+            and the wall clock keeps them in order. A clock that is behind the last epoch cannot:
+            then the time since the computer began does, and after another power-up the random part
+            still tells two starts apart.
+        """
+        now_s, draw_us = wall_s(), secrets.randbelow(SECOND_US)
+        epoch = next_epoch(above, now_s, draw_us)
+        self.save({**state, "epoch": epoch})
+        if self.fault and now_s <= above // SECOND_US:
+            epoch = next_epoch(above + uptime_s() * SECOND_US, now_s, draw_us)
+        return epoch
+
     def save(self, state: Mapping[str, Any]) -> None:
         """Replace the file; a fault is remembered, not raised: the robot can drive without."""
-        text = json.dumps({"schema": SCHEMA, **state}, indent=1)
+        text = json.dumps({**state, "schema": SCHEMA}, indent=1)
+        if len(text) > MAX_STATE_BYTES or not is_sound(json.loads(text)):
+            raise AssertionError("state that the next start would not read")
         fresh = self.path.with_suffix(".new")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -63,21 +97,40 @@ class StateStore:
             self.fault = ""
         except OSError as error:
             self.fault = f"cannot write {self.path}: {error.strerror}"
+            with suppress(OSError):
+                fresh.unlink()
 
 
-def _is_sound(state: dict[str, Any]) -> bool:
+def _read_bounded(path: Path) -> str:
+    """The text of a file.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: it is too large, no plain file or not text.
+    """
+
+    def at_once(name: str, flags: int) -> int:
+        return os.open(name, flags | os.O_NONBLOCK)  # a pipe would wait for its other end
+
+    with open(path, "rb", opener=at_once) as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise ValueError("it is no plain file")
+        data = file.read(MAX_STATE_BYTES + 1)
+    if len(data) > MAX_STATE_BYTES:
+        raise ValueError(f"it has more than {MAX_STATE_BYTES} bytes")
+    return data.decode()
+
+
+def is_sound(state: Mapping[str, Any]) -> bool:
+    """Could a daemon have kept this? Any JSON object may be given."""
     epochs = state.get("epochs", {})
     return (
-        isinstance(state.get("epoch", 0), int)
+        is_kept_epoch(state.get("epoch", 0))
         and isinstance(epochs, dict)
-        and all(robot.isdecimal() and isinstance(n, int) for robot, n in epochs.items())
+        and epochs.keys() <= ROBOT_NAMES
+        and all(is_kept_epoch(epoch) for epoch in epochs.values())
         and sensor_calibration.is_sound(state.get("calibration", {}))
     )
-
-
-def next_epoch(state: Mapping[str, Any], wall: int) -> int:
-    """An epoch above every earlier one: the wall clock's, unless that went backwards."""
-    return max(int(state.get("epoch", 0)) + 1, wall)
 
 
 def read_key(path: str) -> bytes:

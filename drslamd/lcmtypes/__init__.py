@@ -8,6 +8,7 @@ from .closure_t import closure_t as closure_t
 from .graph_t import graph_t as graph_t
 from .header_t import header_t as header_t
 from .heard_t import heard_t as heard_t
+from .held_t import held_t as held_t
 from .keyframe_t import keyframe_t as keyframe_t
 from .log_t import log_t as log_t
 from .odometry_t import odometry_t as odometry_t

@@ -10,11 +10,11 @@ import struct
 class closure_t(object):
     """ One loop closure that passed the consistency check, or its withdrawal. """
 
-    __slots__ = ["number", "kept", "a_n", "peer", "b_n", "x", "y", "theta", "covariance"]
+    __slots__ = ["number", "kept", "a_n", "peer", "b_n", "x", "y", "theta", "covariance", "corrected"]
 
-    __typenames__ = ["int32_t", "int8_t", "int32_t", "int8_t", "int32_t", "int32_t", "int32_t", "int32_t", "float"]
+    __typenames__ = ["int32_t", "int8_t", "int32_t", "int8_t", "int32_t", "int32_t", "int32_t", "int32_t", "float", "int8_t"]
 
-    __dimensions__ = [None, None, None, None, None, None, None, None, [6]]
+    __dimensions__ = [None, None, None, None, None, None, None, None, [6], [4]]
 
     def __init__(self):
         self.number = 0
@@ -63,6 +63,12 @@ class closure_t(object):
         LCM Type: float[6]
         """
 
+        self.corrected = [ 0 for dim0 in range(4) ]
+        """
+        with which scale and turn of the origin and of the peer it was found, in 50ths
+        LCM Type: int8_t[4]
+        """
+
 
     def encode(self):
         buf = BytesIO()
@@ -73,6 +79,7 @@ class closure_t(object):
     def _encode_one(self, buf):
         buf.write(struct.pack(">ibibiiii", self.number, self.kept, self.a_n, self.peer, self.b_n, self.x, self.y, self.theta))
         buf.write(struct.pack('>6f', *self.covariance[:6]))
+        buf.write(struct.pack('>4b', *self.corrected[:4]))
 
     @staticmethod
     def decode(data: bytes):
@@ -89,12 +96,13 @@ class closure_t(object):
         self = closure_t()
         self.number, self.kept, self.a_n, self.peer, self.b_n, self.x, self.y, self.theta = struct.unpack(">ibibiiii", buf.read(26))
         self.covariance = struct.unpack('>6f', buf.read(24))
+        self.corrected = struct.unpack('>4b', buf.read(4))
         return self
 
     @staticmethod
     def _get_hash_recursive(parents):
         if closure_t in parents: return 0
-        tmphash = (0xe90fb3447b35c816) & 0xffffffffffffffff
+        tmphash = (0x13e211d32cb586fc) & 0xffffffffffffffff
         tmphash  = (((tmphash<<1)&0xffffffffffffffff) + (tmphash>>63)) & 0xffffffffffffffff
         return tmphash
     _packed_fingerprint = None

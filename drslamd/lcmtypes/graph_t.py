@@ -29,7 +29,8 @@ class graph_t(object):
         self.n_traits = 0
         """
         now and then, what the origin is like: sigmas of its odometry (scale, yaw rad/m, m/sqrt(m),
-        rad/sqrt(m)) and where its antenna sits in its body frame (x, y, z, m)
+        rad/sqrt(m)), where its antenna sits in its body frame (x, y, z, m), and how far its wheels
+        stand from its middle (m), 0 where its odometry has no sides
         LCM Type: int8_t
         """
 

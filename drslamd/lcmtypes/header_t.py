@@ -34,7 +34,7 @@ class header_t(object):
 
         self.epoch = 0
         """
-        start of that robot's daemon; never repeats
+        start of that robot's daemon, us of a wall clock or a little above the last; never repeats
         LCM Type: int64_t
         """
 
@@ -46,7 +46,7 @@ class header_t(object):
 
         self.utime = 0
         """
-        when it was made, us, monotonic clock of the origin
+        when it was made, us, monotonic clock of the origin, which began with it
         LCM Type: int64_t
         """
 

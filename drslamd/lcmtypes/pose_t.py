@@ -10,7 +10,10 @@ import struct
 import drslamd.lcmtypes
 
 class pose_t(object):
-    """ Where the origin is, in the frame of the team; sent when its estimate was renewed. """
+    """
+    Where the origin is, in the frame of the team; sent when its estimate was renewed, and every
+    second while its odometry is missing.
+    """
 
     __slots__ = ["header", "state", "frame", "frame_epoch", "pose_utime", "x", "y", "theta", "covariance"]
 
@@ -24,6 +27,10 @@ class pose_t(object):
         self.state = 0
         """
         0 not localised: the other fields then say nothing
+        1 localised: the pose is at most a second old and the covariance is meant
+        2 doubtful: there is a pose, but what was measured contradicts it
+        3 stale: no odometry for more than a second; the last pose, with a covariance that grows as
+        fast as the robot drove
         LCM Type: int8_t
         """
 
@@ -37,7 +44,7 @@ class pose_t(object):
         """ LCM Type: int64_t """
         self.pose_utime = 0
         """
-        time of the pose, us, clock of the origin of this message
+        time for which pose and covariance hold, us, clock of the origin of this message
         LCM Type: int64_t
         """
 

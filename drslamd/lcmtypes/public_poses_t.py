@@ -13,14 +13,15 @@ class public_poses_t(object):
     """
     Lifted public poses for [optimizer] algorithm = "rbcd": values are the rows of a complex
     (n + 1) x (2 rank) array, real and imaginary parts alternating, rotation before translation. The
-    first row is the pose that anchors the frame, row k + 1 belongs to keyframe k.
+    first row is the pose that anchors the frame, row k + 1 belongs to keyframe k. Directions beyond
+    the rank are zero.
     """
 
-    __slots__ = ["header", "frame", "frame_epoch", "rank", "n", "keyframes", "n_values", "values"]
+    __slots__ = ["header", "frame", "frame_epoch", "rank", "round", "since", "part", "parts", "asks", "n_held", "held", "n", "keyframes", "n_values", "values"]
 
-    __typenames__ = ["drslamd.lcmtypes.header_t", "int16_t", "int64_t", "int16_t", "int16_t", "int32_t", "int32_t", "float"]
+    __typenames__ = ["drslamd.lcmtypes.header_t", "int16_t", "int64_t", "int16_t", "int64_t", "int64_t", "int16_t", "int16_t", "int8_t", "int16_t", "drslamd.lcmtypes.held_t", "int16_t", "int32_t", "int32_t", "float"]
 
-    __dimensions__ = [None, None, None, None, None, ["n"], None, ["n_values"]]
+    __dimensions__ = [None, None, None, None, None, None, None, None, None, None, ["n_held"], None, ["n"], None, ["n_values"]]
 
     def __init__(self):
         self.header = drslamd.lcmtypes.header_t()
@@ -35,6 +36,40 @@ class public_poses_t(object):
         """ LCM Type: int64_t """
         self.rank = 0
         """ LCM Type: int16_t """
+        self.round = 0
+        """
+        number of the origin's move, above those of its neighbours: these are poses after it ...
+        LCM Type: int64_t
+        """
+
+        self.since = 0
+        """
+        ... namely those that were said anew after this one ...
+        LCM Type: int64_t
+        """
+
+        self.part = 0
+        """
+        ... or one part of them, from 0
+        LCM Type: int16_t
+        """
+
+        self.parts = 0
+        """ LCM Type: int16_t """
+        self.asks = 0
+        """
+        1 says nothing of poses: the origin waits for a neighbour that it names
+        LCM Type: int8_t
+        """
+
+        self.n_held = 0
+        """ LCM Type: int16_t """
+        self.held = []
+        """
+        when it asks: how far it holds its neighbours
+        LCM Type: drslamd.lcmtypes.held_t[n_held]
+        """
+
         self.n = 0
         """ LCM Type: int16_t """
         self.keyframes = []
@@ -57,7 +92,11 @@ class public_poses_t(object):
     def _encode_one(self, buf):
         assert self.header._get_packed_fingerprint() == drslamd.lcmtypes.header_t._get_packed_fingerprint()
         self.header._encode_one(buf)
-        buf.write(struct.pack(">hqhh", self.frame, self.frame_epoch, self.rank, self.n))
+        buf.write(struct.pack(">hqhqqhhbh", self.frame, self.frame_epoch, self.rank, self.round, self.since, self.part, self.parts, self.asks, self.n_held))
+        for i0 in range(self.n_held):
+            assert self.held[i0]._get_packed_fingerprint() == drslamd.lcmtypes.held_t._get_packed_fingerprint()
+            self.held[i0]._encode_one(buf)
+        buf.write(struct.pack(">h", self.n))
         buf.write(struct.pack('>%di' % self.n, *self.keyframes[:self.n]))
         buf.write(struct.pack(">i", self.n_values))
         buf.write(struct.pack('>%df' % self.n_values, *self.values[:self.n_values]))
@@ -76,7 +115,11 @@ class public_poses_t(object):
     def _decode_one(buf):
         self = public_poses_t()
         self.header = drslamd.lcmtypes.header_t._decode_one(buf)
-        self.frame, self.frame_epoch, self.rank, self.n = struct.unpack(">hqhh", buf.read(14))
+        self.frame, self.frame_epoch, self.rank, self.round, self.since, self.part, self.parts, self.asks, self.n_held = struct.unpack(">hqhqqhhbh", buf.read(35))
+        self.held = []
+        for i0 in range(self.n_held):
+            self.held.append(drslamd.lcmtypes.held_t._decode_one(buf))
+        self.n = struct.unpack(">h", buf.read(2))[0]
         self.keyframes = struct.unpack('>%di' % self.n, buf.read(self.n * 4))
         self.n_values = struct.unpack(">i", buf.read(4))[0]
         self.values = struct.unpack('>%df' % self.n_values, buf.read(self.n_values * 4))
@@ -86,7 +129,7 @@ class public_poses_t(object):
     def _get_hash_recursive(parents):
         if public_poses_t in parents: return 0
         newparents = parents + [public_poses_t]
-        tmphash = (0x23eb3e0085914bd5+ drslamd.lcmtypes.header_t._get_hash_recursive(newparents)) & 0xffffffffffffffff
+        tmphash = (0xf1c97ecacaf7818d+ drslamd.lcmtypes.header_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.held_t._get_hash_recursive(newparents)) & 0xffffffffffffffff
         tmphash  = (((tmphash<<1)&0xffffffffffffffff) + (tmphash>>63)) & 0xffffffffffffffff
         return tmphash
     _packed_fingerprint = None

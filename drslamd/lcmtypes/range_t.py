@@ -10,11 +10,11 @@ import struct
 class range_t(object):
     """ One distance between an antenna of the origin and an antenna of a peer. """
 
-    __slots__ = ["a_n", "peer", "b_n", "qa", "qb", "range", "sigma"]
+    __slots__ = ["a_n", "peer", "b_n", "qa", "qb", "range", "sigma", "turn"]
 
-    __typenames__ = ["int32_t", "int8_t", "int32_t", "int16_t", "int16_t", "int32_t", "int16_t"]
+    __typenames__ = ["int32_t", "int8_t", "int32_t", "int16_t", "int16_t", "int32_t", "int16_t", "int16_t"]
 
-    __dimensions__ = [None, None, None, [2], [2], None, None]
+    __dimensions__ = [None, None, None, [2], [2], None, None, [2]]
 
     def __init__(self):
         self.a_n = 0
@@ -55,6 +55,12 @@ class range_t(object):
         LCM Type: int16_t
         """
 
+        self.turn = [ 0 for dim0 in range(2) ]
+        """
+        how each robot stood turned against its keyframe, 0.1 mrad
+        LCM Type: int16_t[2]
+        """
+
 
     def encode(self):
         buf = BytesIO()
@@ -67,6 +73,7 @@ class range_t(object):
         buf.write(struct.pack('>2h', *self.qa[:2]))
         buf.write(struct.pack('>2h', *self.qb[:2]))
         buf.write(struct.pack(">ih", self.range, self.sigma))
+        buf.write(struct.pack('>2h', *self.turn[:2]))
 
     @staticmethod
     def decode(data: bytes):
@@ -85,12 +92,13 @@ class range_t(object):
         self.qa = struct.unpack('>2h', buf.read(4))
         self.qb = struct.unpack('>2h', buf.read(4))
         self.range, self.sigma = struct.unpack(">ih", buf.read(6))
+        self.turn = struct.unpack('>2h', buf.read(4))
         return self
 
     @staticmethod
     def _get_hash_recursive(parents):
         if range_t in parents: return 0
-        tmphash = (0x9b7318bf9be5a7cb) & 0xffffffffffffffff
+        tmphash = (0xea1742f886ccae5f) & 0xffffffffffffffff
         tmphash  = (((tmphash<<1)&0xffffffffffffffff) + (tmphash>>63)) & 0xffffffffffffffff
         return tmphash
     _packed_fingerprint = None

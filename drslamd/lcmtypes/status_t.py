@@ -23,7 +23,7 @@ class status_t(object):
         """ LCM Type: drslamd.lcmtypes.header_t """
         self.state = 0
         """
-        0 not localised, 1 localised in the frame of robot `frame`
+        as in pose_t: 0 not localised, 1 localised in the frame of robot `frame`, 2 doubtful, 3 stale
         LCM Type: int8_t
         """
 

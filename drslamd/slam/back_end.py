@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Set
 from typing import NamedTuple
-
-import numpy as np
 
 from drslamd.config import Config
 from drslamd.conventions import Chain, Segment
@@ -17,17 +15,23 @@ from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
-from drslamd.slam.graph.thinning import Thinning
 from drslamd.slam.optimizer.contract import Job
+from drslamd.slam.optimizer.rbcd import lifted_neighbours
+from drslamd.slam.optimizer.rbcd.pose_exchange import PoseExchange
+from drslamd.slam.optimizer.rbcd.rbcd_optimizer import at_anchor
 from drslamd.slam.tuning import DEFAULTS, Tuning
+
+URGENT = 1e-4
+"""Share of its cost that a move must bring for the next one to follow as soon as it is our turn:
+when a team has just met, and for some moves after each closure that says something new."""
 
 
 class _Known(NamedTuple):
-    """What a job knows: log entries that are held, robots that live, public poses of the peers."""
+    """What a job knows: log entries that are held, robots that live, moves of the neighbours."""
 
     inserted: int = -1
     living: frozenset[int] = frozenset()
-    public: Mapping[int, PublicPoses] = {}
+    moves: int = 0
 
 
 class BackEnd:
@@ -37,13 +41,15 @@ class BackEnd:
         history: where we were.
         group: segments that are connected to our current one, as the last job knew them.
         estimate: of that group; None while we are in none.
+        exchange: of public poses, with `rbcd`.
     """
 
     def __init__(self, config: Config, own: Chain, tuning: Tuning = DEFAULTS) -> None:
         self._own = own
         self._optimizer = settings.optimizer(config, own, tuning)
-        self.graph = PoseGraph()
-        self._thinning = Thinning(self.graph)
+        self._takes_turns = config.optimizer.algorithm == "rbcd"
+        self.exchange = PoseExchange(own)
+        self.graph = PoseGraph(tuning.recent_s)
         self.history = History()
         self.group: set[Segment] = set()
         self.estimate: TeamEstimate | None = None
@@ -52,7 +58,6 @@ class BackEnd:
 
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
         self.graph.insert(origin, entry)
-        self._thinning.after(origin.robot)
         self._inserted += 1
 
     def digest(self) -> int:
@@ -63,61 +68,74 @@ class BackEnd:
         """The solved keyframes of a robot, in the frame of the team."""
         return self.estimate.trajectories.get(robot) if self.estimate else None
 
+    def hear(self, origin: Chain, message: PublicPoses) -> None:
+        """A peer said its public poses, or asks for ours."""
+        if not self._takes_turns:
+            return
+        self.exchange.hear(origin, message)
+        if self.estimate is not None and origin == self.estimate.frame.chain:
+            self.estimate = self._anchored(self.estimate)
+
     def begin(
-        self, present: set[int], shift_us: dict[int, int], public: Mapping[int, PublicPoses]
+        self, present: set[int], talking: Set[int] = frozenset(), utime: int = 0
     ) -> Job | None:
         """Begin to renew the estimate; None when nothing is new or connected.
 
-        An estimate that has not converged is renewed without any news.
+        An estimate that has not converged is renewed without any news. With `rbcd` it has to be
+        our turn too.
 
         Args:
             present: robots that live.
-            shift_us: clock of each robot minus ours, us.
-            public: lifted public poses of the peers.
+            talking: those of them that hear us as we hear them.
         """
-        now = _Known(self._inserted, frozenset(present), dict(public))
-        if not _is_news(self._known, now) and (not self.estimate or self.estimate.converged):
+        now = _Known(self._inserted, frozenset(present), self.exchange.news)
+        if now == self._known and (self.estimate is None or self.estimate.converged):
+            self.exchange.rest(utime)
             return None
-        self._known = now
-        data = self.graph.chains.get(self._own.robot)
-        if data is None or not len(data.keyframes):
+        if self._takes_turns and not self.exchange.begin(self._neighbours(talking), utime):
             return None
-        current = Segment(*self._own, int(data.keyframes.segment[-1]))
+        chain = self.graph.view.chains.get(self._own.robot)
+        if chain is None:
+            self._known = now
+            return None
+        current = Segment(*self._own, int(chain.keyframes.segment[-1]))
         groups = [group for group in team_frame.groups(self.graph) if current in group]
         self.group = groups[0] if groups else set()
-        frame = team_frame.gauge_segment(self.group, present)
-        if frame is None:
-            self.estimate = None
+        gauge = team_frame.gauge_segment(self.group, present)
+        if gauge is None:
+            self.estimate, self._known = None, now
             return None
-        same = {r: p for r, p in public.items() if (p.frame, p.frame_epoch) == frame.chain}
-        group = Group(self.group, frame, {**shift_us, self._own.robot: 0})
-        return self._optimizer.job(self.graph, group, self.estimate, same)
+        same = self.exchange.held(gauge.chain)
+        job = self._optimizer.job(self.graph, Group(self.group, gauge), self.estimate, same)
+        if job is None:
+            self.exchange.wait(utime)
+            return None
+        self._known = now
+        return job
 
-    def on_solution(self, result: TeamEstimate) -> None:
-        """Module 3 has answered."""
-        self.estimate = result
+    @property
+    def is_urgent(self) -> bool:
+        """Did the last move bring so much that the next one should not wait for its time?"""
+        lifted = self.estimate.lifted if self.estimate else None
+        return lifted is not None and lifted.gain > URGENT
+
+    def _anchored(self, estimate: TeamEstimate) -> TeamEstimate:
+        """Where the owner of the frame has the pose that anchors it now."""
+        frame = estimate.frame.chain
+        owner = self.exchange.held(frame).get(frame.robot)
+        return at_anchor(estimate, owner) if owner else estimate
+
+    def _neighbours(self, talking: Set[int]) -> list[Chain]:
+        """With whom we share closures, of those that we can talk to."""
+        robots = lifted_neighbours.robots(self.graph, self._own) & talking
+        return [self.graph.chains[robot].chain for robot in robots]
+
+    def on_solution(self, result: TeamEstimate, utime: int = 0) -> list[PublicPoses]:
+        """Module 3 has answered; what must be said of it."""
+        self.estimate = result = self._anchored(result)
         own = result.trajectories.get(self._own.robot)
         if own is not None:
             self.history.update(own)
-
-    def public_poses(self) -> PublicPoses | None:
-        """What neighbours must know of a relaxation: our poses that carry closures."""
-        lifted = self.estimate.lifted if self.estimate else None
-        if self.estimate is None or lifted is None or not len(lifted.carriers):
-            return None
-        rows = lifted.rows[np.searchsorted(lifted.n, lifted.carriers)]
-        values = np.concatenate([lifted.anchor[None], rows])
-        keyframes = tuple(int(n) for n in lifted.carriers)
-        frame, rank = self.estimate.frame, len(lifted.anchor) // 2
-        return PublicPoses(frame.robot, frame.epoch, rank, keyframes, values)
-
-
-def _is_news(before: _Known, now: _Known) -> bool:
-    """Does a job know anything that the one before it did not?"""
-    same = (before.inserted, before.living, before.public.keys()) == (
-        now.inserted,
-        now.living,
-        now.public.keys(),
-    )
-    # poses of the same keyframes compare equal, whatever they are
-    return not same or any(before.public[k] is not poses for k, poses in now.public.items())
+        if result.lifted is None:
+            return []
+        return self.exchange.moved(result.frame.chain, result.lifted, utime)

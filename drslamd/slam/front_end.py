@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import NamedTuple
-
-import numpy as np
 
 from drslamd.config import Config
 from drslamd.conventions import SECOND_US, Chain
@@ -18,22 +16,22 @@ from drslamd.slam.consistency.pair import Checked, PairTracker
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import ClosureMeasurement, Keyframe, RangeMeasurement
 from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.keyframe_selector import KeyframeSelector
+from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.dead_reckoning import DeadReckoning
-from drslamd.slam.odometry.track import RESOLUTION
 from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.range_model import RangeNoise
+from drslamd.slam.range_watch import Partner, RangeWatch
+from drslamd.slam.relative_pose import what_if
 from drslamd.slam.relative_pose.estimate import PairNoise, RelativePoseEstimate
 from drslamd.slam.relative_pose.pair_end import PairEnd
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 from drslamd.slam.relative_pose.range_sampler import RangeSampler
+from drslamd.slam.relative_pose.what_if import Case
 from drslamd.slam.relative_pose.window_request import WindowRequest, request
+from drslamd.slam.se2 import Array
 from drslamd.slam.tuning import DEFAULTS, Tuning
 
-KEYFRAME_M = 0.05
-"""A robot that moved less than this since its last keyframe, and turned less than `KEYFRAME_RAD`,
-makes no new one."""
-KEYFRAME_RAD = 0.05
-"""See `KEYFRAME_M`."""
 MAX_UWB_IDS = 64
 """Modules whose ranges are remembered, 2 MB; a radio cell holds no more."""
 RANGES_FRESH_US = 3 * SECOND_US
@@ -56,6 +54,21 @@ class WindowJob(NamedTuple):
     run: Callable[[], RelativePoseEstimate]
 
 
+class WhatIfJob(NamedTuple):
+    """A search for mistakes in the mountings of a pair, by one window: chi-squared of each case,
+    and how far the robot drove that drove less."""
+
+    pair: PairTracker
+    request: WindowRequest
+    run: Callable[[], tuple[Array, float]]
+
+
+def _asked(
+    question: what_if.Question, cases: Sequence[Case], noise: PairNoise, delta: float
+) -> tuple[Array, float]:
+    return question.costs(cases, noise, delta), question.way_m
+
+
 class FrontEnd:
     """What this robot measures, prepared for the graph."""
 
@@ -71,22 +84,22 @@ class FrontEnd:
             known: of our sensors, from before this start; it is taken out of what they say.
         """
         section = config.relative_pose
-        self._own = own
+        self.own = own
         self._known, self._range_model = known, tuning.ranges
         self._method = settings.closure_method(section, tuning)
         self._range_sigma, self._bias_sigma = section.range_sigma_m, section.range_bias_sigma_m
+        self._delta = section.delta
         self._nlos_db, self._epsilon = section.nlos_db, config.consistency.epsilon
-        self._tells_all = config.optimizer.algorithm != "banded"
+        self._has_ranges_in_graph = config.optimizer.algorithm == "banded"
         noise = known.narrowed(settings.odometry_noise(config.odometry))
-        self.model = settings.robot_model(config, noise)
+        self.model = known.mounted(settings.robot_model(config, noise))
         self.reckoning = DeadReckoning()
         self.ranges: dict[int, RangeBuffer] = {}
         self.pairs: dict[int, PairTracker] = {}
-        self._segment = 0
-        self._segment_start: int | None = None
-        self._last: Keyframe | None = None
+        self.watch = RangeWatch(section.range_sigma_m, tuning.ranges)
+        self._keyframes = KeyframeSelector()
 
-    # ---- sensors ----
+    # sensors
 
     def on_motion(self, motion: Motion) -> None:
         self.reckoning.add(self._known.corrected(motion))
@@ -111,32 +124,34 @@ class FrontEnd:
         """UWB ids to which ranges came in of late."""
         return [u for u, b in self.ranges.items() if b.is_fresh(utime, RANGES_FRESH_US)]
 
-    # ---- keyframes ----
+    def make_keyframe(self, is_doubted: bool = False) -> Keyframe | None:
+        """See `KeyframeSelector.next`."""
+        return self._keyframes.next(self.reckoning.track, is_doubted)
 
-    def make_keyframe(self) -> Keyframe | None:
-        """The latest sample of our odometry, if we moved since the last keyframe."""
-        track = self.reckoning.track
-        if not len(track):
-            return None
-        if self._segment_start is not None and track.segment_start > self._segment_start:
-            self._segment += 1
-            self._last = None
-        self._segment_start = track.segment_start
-        n = track.end - 1
-        x, y, theta = (int(v) for v in track.steps(n, 1)[0])
-        if self._last is not None:
-            last = self._last
-            moved = np.array([x - last.x, y - last.y, theta - last.theta]) * RESOLUTION
-            if np.hypot(moved[0], moved[1]) < KEYFRAME_M and abs(moved[2]) < KEYFRAME_RAD:
-                return None
-        self._last = Keyframe(n, self._segment, x, y, theta)
-        return self._last
+    # pairs
 
-    # ---- pairs ----
+    def watch_ranges(
+        self,
+        neighbours: list[PeerInRange],
+        graph: PoseGraph,
+        estimate: TeamEstimate | None,
+        utime: int,
+    ) -> None:
+        """Hold the ranges of this second against where everybody should be."""
+        own = graph.chains.get(self.own.robot)
+        partners: dict[int, Partner] = {}
+        for peer in neighbours if own is not None else ():
+            ranges, data = self.ranges.get(peer.uwb_id), graph.chains.get(peer.chain.robot)
+            is_fresh = ranges is not None and ranges.is_fresh(utime, RANGES_FRESH_US)
+            if is_fresh and data is not None and peer.ahead_us is not None:
+                assert ranges is not None
+                partners[peer.chain.robot] = Partner(data, peer.ahead_us, ranges)
+        if own is not None:
+            self.watch.look(estimate, PairEnd(self.reckoning.track, own), partners, utime)
 
     def _owns(self, peer: PeerInRange) -> bool:
         """Are we the one of the two that makes closures?"""
-        return self._own.robot < peer.chain.robot or not peer.ranges_to_us
+        return self.own.robot < peer.chain.robot or not peer.ranges_to_us
 
     def needed(self, neighbours: list[PeerInRange], utime: int) -> set[int]:
         """Robots whose odometry our windows need."""
@@ -160,7 +175,7 @@ class FrontEnd:
         self, neighbours: list[PeerInRange], graph: PoseGraph, utime: int
     ) -> Iterator[PeerInRange]:
         """Peers of owned pairs to which ranges come in and whose log has begun."""
-        if self._own.robot not in graph.chains:
+        if self.own.robot not in graph.chains:
             return
         for peer in neighbours:
             ranges, data = self.ranges.get(peer.uwb_id), graph.chains.get(peer.chain.robot)
@@ -176,12 +191,12 @@ class FrontEnd:
         for peer in self._measured(neighbours, graph, utime):
             pair = self.pairs.get(peer.chain.robot)
             if pair is not None and pair.peer == peer.chain and peer.ahead_us is not None:
-                a = PairEnd(self.reckoning.track, graph.chains[self._own.robot])
+                a = PairEnd(self.reckoning.track, graph.chains[self.own.robot])
                 b = PairEnd(peer.track, graph.chains[peer.chain.robot], peer.ahead_us)
                 out.append(Measurable(pair, a, b))
         return out
 
-    # ---- module 1 ----
+    # module 1
 
     def module1(
         self,
@@ -217,46 +232,99 @@ class FrontEnd:
     def _computation(
         self, pair: PairTracker, found: WindowRequest, b: PairEnd, estimate: TeamEstimate | None
     ) -> Callable[[], RelativePoseEstimate]:
-        peer = pair.peer.robot
-        bias_sigma = self._known.bias_sigma(peer, self._bias_sigma)
-        noise = PairNoise(
-            RangeNoise(self._range_sigma, bias_sigma),
-            self.model.noise,
-            b.data.model.noise,
-            self._range_model,
-        )
-        team = estimate if self._method.uses_calibration else None
-        known = PairCalibration.of(team, self._own.robot, peer)
-        return partial(self._method.solve, found.window, noise, known)
+        known = self._calibration(pair, estimate)
+        return partial(self._method.solve, found.window, self._noise(pair, b), known)
 
-    # ---- module 2 ----
+    def _noise(self, pair: PairTracker, b: PairEnd) -> PairNoise:
+        bias_sigma = self._known.bias_sigma(pair.peer.robot, self._bias_sigma)
+        ranges = RangeNoise(self._range_sigma, bias_sigma)
+        return PairNoise(ranges, self.model.noise, b.data.model.noise, self._range_model)
 
-    def module2(self, graph: PoseGraph) -> list[tuple[PairTracker, Callable[[], Checked]]]:
-        """Begin the consistency checks to be computed now: pair, computation."""
+    def _calibration(self, pair: PairTracker, estimate: TeamEstimate | None) -> PairCalibration:
+        found = pair.search.found
+        return PairCalibration.of(self._used(estimate), self.own.robot, pair.peer.robot, found)
+
+    def _used(self, estimate: TeamEstimate | None) -> TeamEstimate | None:
+        """What was learned, where it serves modules 1 and 2."""
+        return estimate if self._method.uses_calibration else None
+
+    def _corrections(
+        self, pair: PairTracker, estimate: TeamEstimate | None
+    ) -> tuple[Correction, Correction] | None:
+        """Of our odometry and a peer's; a solution that was not reached says nothing of them, and
+        nothing that was found along corrected tracks is given up for it."""
+        team = self._used(estimate)
+        if pair.search.found is None and (team is None or not team.converged):
+            return None
+        known = self._calibration(pair, estimate)
+        return known.a.correction, known.b.correction
+
+    def what_if(
+        self, neighbours: list[PeerInRange], graph: PoseGraph, utime: int
+    ) -> list[WhatIfJob]:
+        """Begin the searches for mistakes in mountings that are due, where windows disagree."""
         out = []
-        own = graph.chains.get(self._own.robot)
+        for pair, a, b in self._measurable(neighbours, graph, utime):
+            if not (
+                self._method.agreement.confirms
+                and pair.search.is_due(utime, pair.awaits_confirmation)
+            ):
+                continue
+            found = request(pair.ranges, a, b, self._method.rule, self._range_model)
+            if isinstance(found, str):
+                continue
+            pair.search.begin(utime)
+            question = what_if.ask(found, a, b)
+            noise = self._noise(pair, b)
+            run = partial(_asked, question, pair.search.cases, noise, self._delta)
+            out.append(WhatIfJob(pair, found, run))
+        return out
+
+    # module 2
+
+    def module2(
+        self, graph: PoseGraph, estimate: TeamEstimate | None
+    ) -> list[tuple[PairTracker, Callable[[], Checked]]]:
+        """Begin the consistency checks to be computed now: pair, computation.
+
+        Args:
+            estimate: see `module1`.
+        """
+        out = []
+        own = graph.chains.get(self.own.robot)
         for robot, pair in self.pairs.items():
             data = graph.chains.get(robot)
             if own is None or data is None or data.chain != pair.peer:
                 continue
-            job = pair.begin_check(own, data, self.model.noise)
+            corrections = self._corrections(pair, estimate)
+            job = pair.begin_check(own, data, self.model.noise, corrections)
             if job is not None:
                 out.append((pair, job))
         return out
 
-    # ---- what goes into our log ----
+    # what goes into our log
 
     def sample_ranges(
-        self, neighbours: list[PeerInRange], graph: PoseGraph, utime: int
+        self,
+        neighbours: list[PeerInRange],
+        graph: PoseGraph,
+        utime: int,
+        is_doubted: bool = False,
     ) -> list[RangeMeasurement]:
-        """New distances for the graph."""
+        """New distances for the graph, where module 3 knows what to do with them.
+
+        Args:
+            is_doubted: see `make_keyframe`; of who makes them or of any other.
+        """
+        if not self._has_ranges_in_graph:
+            return []
         self.update_pairs(neighbours, graph, utime)
         found = [
-            pair.sampler.sample(pair.ranges, a, b, pair.peer)
+            pair.sampler.sample(pair.ranges, a, b, pair.peer, is_doubted)
             for pair, a, b in self._measurable(neighbours, graph, utime)
         ]
         return [measurement for measurement in found if measurement is not None]
 
     def tell_closures(self) -> list[ClosureMeasurement]:
         """Closures to tell the team, and to withdraw."""
-        return [c for pair in self.pairs.values() for c in pair.tell(self._tells_all)]
+        return [c for pair in self.pairs.values() for c in pair.tell(not self._has_ranges_in_graph)]

@@ -61,13 +61,17 @@ class RangeModel:
         blocked_sigma_m: added where the first path is blocked; such ranges are 0.3 to 1 m too long.
         doubt_db: from likely line of sight, 6 dB, to likely none, 10 dB (LinkTrack manual 7.2).
         least_bias_m: biases move by so much with distance and bearing.
-        bias_tails: the prior of a bias is Cauchy's, so many times narrower than its sigma: four of
-            five values of that distribution lie within three half widths. Most modules are
-            calibrated to a decimetre, some are off by half a metre.
+        spread_share: the biases of one team's modules resemble each other. What a pair has beyond
+            that of the team is of Student's distribution, so much narrower than the sigma that is
+            configured for a bias ...
+        spread_dof: ... of so many degrees of freedom, all pairs together: where one pair is far
+            off the others may be.
+        team_share: what all pairs have in common is of Cauchy's distribution, so much narrower:
+            most makers calibrate to centimetres, some not at all.
+        antenna_sigma_m: biases move with the bearing by 4 to 10 cm, which is as if ranges were not
+            measured from the antenna but from a point beside it.
         huber_sigmas: of module 1; beyond it a range loses weight (bursts are 0.3 m and more).
         cauchy_sigmas: of module 3; a burst of 0.5 m weighs 1/50 of a good range.
-        shared: ranges of one second and the next have a correlation of 0.3 to 0.7, so a sigma
-            counted as if they had none is wrong by about this factor.
     """
 
     slow_share: float = 0.8
@@ -79,10 +83,21 @@ class RangeModel:
     blocked_sigma_m: float = 0.5
     doubt_db: float = 4.0
     least_bias_m: float = 0.05
-    bias_tails: float = 3.0
+    spread_share: float = 0.27
+    spread_dof: float = 3.0
+    team_share: float = 0.07
+    antenna_sigma_m: float = 0.03
     huber_sigmas: float = 2.5
     cauchy_sigmas: float = 2.5
-    shared: float = 2.0
+
+    def correlated_ratio(self, period_s: float) -> float:
+        """How many times more wrong many ranges are together, one every `period_s`, than if each
+        had its own error.
+
+        The variance of a mean of values with a slow part is larger by the sum of its correlations.
+        """
+        keep = float(np.exp(-period_s / self.slow_s))
+        return float(np.sqrt(1 + 2 * self.slow_share**2 * keep / (1 - keep)))
 
     def near_range_shape(self, ranges: Array) -> Array:
         """(n,) exp(-r / L): how much of the near-range bias is in ranges (n,) m."""

@@ -22,12 +22,14 @@ class RobotModel:
         noise: of its odometry.
         antenna_x_m, antenna_y_m: its antenna in the body frame.
         antenna_z_m: the antenna above the floor, or any level that the team shares.
+        half_track_m: from its middle to its wheels; 0 where its odometry has no sides.
     """
 
     noise: OdometryNoise
     antenna_x_m: float = 0.0
     antenna_y_m: float = 0.0
     antenna_z_m: float = 0.0
+    half_track_m: float = 0.0
 
     @property
     def antenna(self) -> Array:
@@ -37,11 +39,13 @@ class RobotModel:
     def is_plausible(self) -> bool:
         """Could a configuration say this?"""
         places = (self.antenna_x_m, self.antenna_y_m, self.antenna_z_m)
-        return self.noise.is_plausible() and all(abs(v) <= MOST_ANTENNA_M for v in places)
+        has_places = all(abs(v) <= MOST_ANTENNA_M for v in places)
+        return self.noise.is_plausible() and has_places and 0 <= self.half_track_m <= MOST_ANTENNA_M
 
     def numbers(self) -> tuple[float, ...]:
-        """Seven numbers, as they travel: the sigmas of the odometry, then the antenna's place."""
-        return (*astuple(self.noise), self.antenna_x_m, self.antenna_y_m, self.antenna_z_m)
+        """Eight, as they travel: sigmas of odometry, the antenna's place, half of the track."""
+        antenna = self.antenna_x_m, self.antenna_y_m, self.antenna_z_m
+        return (*astuple(self.noise), *antenna, self.half_track_m)
 
     @staticmethod
     def of_numbers(numbers: tuple[float, ...]) -> RobotModel:

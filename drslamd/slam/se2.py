@@ -7,6 +7,7 @@ adds up in the frame of its origin (Barfoot, State Estimation for Robotics, 7.3)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ Array = NDArray[Any]
 
 Index = NDArray[np.int64]
 """Places in other arrays."""
+
+_PACKED_AT = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 
 
 def wrap(angle: Array | float) -> Array:
@@ -91,11 +94,9 @@ def packed(covariance: Array) -> tuple[float, ...]:
     return tuple(float(v) for v in covariance[np.triu_indices(3)])
 
 
-def unpacked(upper: tuple[float, ...]) -> Array:
-    """The (3, 3) covariance of `packed`."""
-    full = np.zeros((3, 3))
-    full[np.triu_indices(3)] = upper
-    return np.asarray(full + np.triu(full, 1).T)
+def unpacked(upper: Sequence[float] | Array) -> Array:
+    """The (..., 3, 3) covariances of `packed` (..., 6)."""
+    return np.asarray(upper)[..., _PACKED_AT]
 
 
 def turned(covariance: Array, theta: Array | float) -> Array:

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import math
 
-from drslamd.config import Config, OdometrySection, RelativePoseSection
+from drslamd.config import (
+    AgilexSection,
+    Config,
+    DbcSection,
+    OdometrySection,
+    RelativePoseSection,
+    WheelSection,
+)
 from drslamd.conventions import SECOND_US, Chain
 from drslamd.slam.closure_method import ClosureMethod, drslamd_method, paper_method
 from drslamd.slam.odometry.noise import OdometryNoise
@@ -31,8 +38,15 @@ def robot_model(config: Config, noise: OdometryNoise) -> RobotModel:
     Args:
         noise: of our odometry, as much of it as is not known.
     """
-    uwb = config.uwb
-    return RobotModel(noise, uwb.antenna_x_m, uwb.antenna_y_m, uwb.antenna_z_m)
+    uwb, wheels = config.uwb, config.wheels
+    half_track_m = wheels.track_m / 2 if has_sides(wheels) else 0.0
+    return RobotModel(noise, uwb.antenna_x_m, uwb.antenna_y_m, uwb.antenna_z_m, half_track_m)
+
+
+def has_sides(wheels: WheelSection) -> bool:
+    """Do these wheels say how far each side went, or only what the whole robot did?"""
+    is_twist = isinstance(wheels, DbcSection) and wheels.measures == "twist"
+    return not (is_twist or isinstance(wheels, AgilexSection))
 
 
 def closure_method(section: RelativePoseSection, tuning: Tuning = DEFAULTS) -> ClosureMethod:
@@ -55,6 +69,4 @@ def optimizer(config: Config, own: Chain, tuning: Tuning = DEFAULTS) -> Optimize
         range_sigma=ranges.range_sigma_m,
         model=tuning.ranges,
         scale_tails=tuning.scale_tails,
-        has_cauchy_priors=tuning.has_cauchy_priors,
-        learns_scatter=tuning.learns_scatter,
     )

@@ -15,7 +15,7 @@ from drslamd.config import Config
 from drslamd.conventions import Chain
 from drslamd.events import ChannelMessage, Send
 from drslamd.gossip import messages
-from drslamd.gossip.message_types import Message, OdometryBatch, Status
+from drslamd.gossip.message_types import Message, OdometryBatch, PoseState, Status
 from drslamd.gossip.team import Team
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.front_end import FrontEnd
@@ -59,7 +59,7 @@ def test_forty_robots_know_that_they_are_heard_hold_all_logs_and_do_not_crowd_th
     assert max(air.bytes_sent.values()) <= 8 * 1361 + (4 + relayed) * 70
 
 
-# ---- heartbeats --------------------------------------------------------------------------------
+# heartbeats
 
 
 def a_broadcast(team: Team, ranged: set[int]) -> Broadcast:
@@ -83,7 +83,7 @@ def test_a_robot_in_a_crowd_stays_quiet_and_still_names_everybody(others: int) -
         for seal in seals:
             status = a_status(uwb_id=1000 + seal.robot)
             team.receive(ChannelMessage(utime, *sealed(seal, status, utime)))
-        for send in broadcast.heartbeat([], None, utime):
+        for send in broadcast.heartbeat([], None, PoseState.LOCALISED, utime):
             assert isinstance(send, Send)
             heartbeat = messages.decode("STATUS", send.payload)
             assert isinstance(heartbeat, Status)
@@ -98,17 +98,17 @@ def test_a_robot_in_a_crowd_stays_quiet_and_still_names_everybody(others: int) -
 
 def test_a_quiet_robot_speaks_when_any_of_a_crowd_comes_or_goes() -> None:
     team = Team(a_seal(0))
-    for robot in range(1, 41):
-        team.receive(ChannelMessage(0, *sealed(a_seal(robot), a_status())))
+    seals = {robot: a_seal(robot) for robot in range(1, 41)}
+    for seal in seals.values():
+        team.receive(ChannelMessage(0, *sealed(seal, a_status())))
     broadcast = a_broadcast(team, set())
-    assert broadcast.heartbeat([], None, SECOND)
-    assert not broadcast.heartbeat([], None, 2 * SECOND)
+    assert broadcast.heartbeat([], None, PoseState.LOCALISED, SECOND)
+    assert not broadcast.heartbeat([], None, PoseState.LOCALISED, 2 * SECOND)
     team.receive(ChannelMessage(0, *sealed(a_seal(99), a_status())))
-    assert broadcast.heartbeat([], None, 2 * SECOND)
-    leaving = a_seal(40, epoch=2), a_status(leaving=True)
-    team.receive(ChannelMessage(0, *sealed(*leaving)))
+    assert broadcast.heartbeat([], None, PoseState.LOCALISED, 2 * SECOND)
+    team.receive(ChannelMessage(0, *sealed(seals[40], a_status(leaving=True))))
     assert Chain(40, 1) not in team.audible(2 * SECOND)
-    assert broadcast.heartbeat([], None, 3 * SECOND)
+    assert broadcast.heartbeat([], None, PoseState.LOCALISED, 3 * SECOND)
 
 
 @pytest.mark.parametrize("lost", ["odometry", "entry of a log"])
@@ -119,7 +119,7 @@ def test_a_robot_that_lacks_something_is_not_quiet(lost: str) -> None:
         team.receive(ChannelMessage(0, *sealed(seal, message)))
 
     def spoke(ms: int) -> bool:
-        return bool(broadcast.heartbeat([], None, 1000 * ms))
+        return bool(broadcast.heartbeat([], None, PoseState.LOCALISED, 1000 * ms))
 
     broadcast = a_broadcast(team, set())
     says(OdometryBatch(0, 0, np.zeros((10, 3))))
@@ -142,5 +142,5 @@ def test_a_quiet_robot_speaks_when_it_ranges_to_somebody_new_or_no_longer_does()
     for ms, now in scene:
         ranged.clear()
         ranged.update(now)
-        spoke.append(bool(broadcast.heartbeat([], None, 1000 * ms)))
+        spoke.append(bool(broadcast.heartbeat([], None, PoseState.LOCALISED, 1000 * ms)))
     assert spoke == [True, False, True, False, True]

@@ -8,7 +8,6 @@ import struct
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
 import pytest
 from message_builders import (
     OTHER_SECRET,
@@ -21,6 +20,7 @@ from message_builders import (
     resealed,
     sealed,
 )
+from snapshots import plain
 
 from drslamd.conventions import Chain
 from drslamd.events import ChannelMessage, Datagram
@@ -32,19 +32,6 @@ OWN = Chain(1, 10)
 T0 = 100 * SECOND
 COUNTERS = {"refused", "own_echoes", "last_echo", "repeats_heard", "_last_refused"}
 """What an unproven message may change: counts, and what the user is told of them."""
-
-
-def plain(value: Any) -> Any:
-    """An object and all in it as plain values that can be compared."""
-    if isinstance(value, np.ndarray):
-        return value.tobytes()
-    if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)) or type(value).__name__ == "deque":
-        return [plain(item) for item in value]
-    if hasattr(value, "__dict__"):
-        return {key: plain(item) for key, item in vars(value).items()}
-    return value
 
 
 def snapshot(team: Team) -> Any:
@@ -161,6 +148,10 @@ def test_everything_that_comes_in_is_counted_exactly_once() -> None:
         ChannelMessage(T0, "MBOT_ODOMETRY", b"x"),
         ChannelMessage(T0, *forged(a_status(), robot=1, epoch=99)),
         ChannelMessage(T0, *sealed(a_seal(3, epoch=12), a_status())),
+        ChannelMessage(T0 + 3 * SECOND, *sealed(a_seal(3, epoch=13), a_status())),
+        ChannelMessage(T0, *forged(a_status(), robot=4, epoch=2**62)),
+        ChannelMessage(T0, *forged(an_entry(5_000), robot=4)),
+        ChannelMessage(T0, *forged(a_status(), robot=4, utime=-1)),
     ]
     for event in more:
         before = team.accepted + team.refused.total() + team.own_echoes + team.repeats_heard
@@ -201,6 +192,12 @@ def test_everything_that_comes_in_is_counted_exactly_once() -> None:
             "of another start of this robot, repeated by a peer",
         ),
         (ChannelMessage(T0, *forged(an_entry(-1))), "content out of range"),
+        (ChannelMessage(T0, *forged(an_entry(1_024))), "entry far ahead of its log"),
+        (
+            ChannelMessage(T0, *forged(a_status(), epoch=2**53 + 2**32 + 1)),
+            "of a start later than any clock can say",
+        ),
+        (ChannelMessage(T0, *forged(a_status(), utime=-1)), "made at a time that no clock shows"),
     ],
 )
 def test_every_reason_has_a_counter_of_its_own(

@@ -74,7 +74,7 @@ def test_of_a_robot_that_was_never_heard_nothing_is_known() -> None:
     assert LogSync(5).next_states() == ()
 
 
-# ---- bounds ------------------------------------------------------------------------------------
+# bounds
 
 
 def test_the_oldest_entries_go_when_a_log_is_full(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -165,7 +165,66 @@ def test_a_boast_about_a_log_is_no_reason_to_count_to_it() -> None:
     assert repeated(logs, T0 + 2 * SECOND) == [said(OWNER, 0)]
 
 
-# ---- what is said of it ------------------------------------------------------------------------
+# words that are not true
+
+
+LAST = 2**31 - 1
+
+
+def test_an_owner_that_takes_back_that_it_forgot_everything_is_believed() -> None:
+    logs = holding(5, OWNER, 0, 1, 3)
+    logs.on_states(state(OWNER, LAST, first=LAST), OWNER.robot, T0)
+    assert logs.next_states() == state(OWNER, LAST, first=LAST)
+    assert logs.add(OWNER, 4, said(OWNER, 4), T0)
+    logs.on_states(state(OWNER, 5), OWNER.robot, T0 + SECOND)
+    assert logs.next_states() == state(OWNER, 2, newest=5)
+    assert logs.lacking(3) == 1
+    assert logs.add(OWNER, 2, said(OWNER, 2), T0)
+    assert logs.next_states() == state(OWNER, 5)
+
+
+def test_an_owner_that_takes_back_a_boast_is_believed() -> None:
+    logs = holding(5, OWNER, 0, 1)
+    logs.on_states(state(OWNER, 2, newest=LAST), OWNER.robot, T0)
+    assert logs.lacks_any()
+    logs.on_states(state(OWNER, 2), OWNER.robot, T0 + SECOND)
+    assert not logs.lacks_any()
+    assert logs.next_states() == state(OWNER, 2)
+
+
+def test_what_somebody_else_boasts_of_a_log_counts_1024_entries_ahead_until_its_owner_speaks() -> (
+    None
+):
+    logs = holding(5, OWNER, 0, 1)
+    logs.on_states(state(OWNER, 0, newest=LAST), OTHER.robot, T0)
+    assert logs.lacking(3) == 1024
+    logs.on_states(state(OWNER, 3), OWNER.robot, T0)
+    assert logs.lacking(3) == 1
+
+
+@pytest.mark.parametrize(("seq", "near"), [(1_025, True), (1_026, False), (LAST - 1, False)])
+def test_an_entry_is_near_up_to_1023_beyond_what_is_known_of_its_log(seq: int, near: bool) -> None:
+    logs = holding(5, OWNER, 0, 1)
+    assert logs.is_near(OWNER, seq) == near
+    assert logs.is_near(OTHER, seq - 2) == near
+    assert logs.is_near(Chain(3, 2), seq - 2) == near
+
+
+def test_a_robot_that_was_away_for_hours_finds_entries_near_that_the_owner_spoke_of() -> None:
+    logs = holding(5, OWNER, 0, 1)
+    logs.on_states(state(OWNER, 20_000), OWNER.robot, T0)
+    assert logs.is_near(OWNER, 21_023)
+    assert not logs.is_near(OWNER, 21_024)
+
+
+def test_a_log_of_which_the_owner_knows_nothing_begins_anew() -> None:
+    logs = holding(5, OWNER, 0, LAST - 1)
+    logs.on_states(state(OWNER, 2), OWNER.robot, T0)
+    assert logs.next_states() == state(OWNER)
+    assert logs.add(OWNER, 0, said(OWNER, 0), T0)
+
+
+# what is said of it
 
 
 def test_a_status_names_our_own_log_first() -> None:

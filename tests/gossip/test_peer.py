@@ -7,7 +7,7 @@ import pytest
 from message_builders import MS, SECOND, a_status
 
 from drslamd.conventions import Chain
-from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose, Status
+from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose, PoseState, Status
 from drslamd.gossip.peer import Peer
 from drslamd.slam.se2 import Array
 
@@ -24,7 +24,7 @@ def own_log(entries: int) -> tuple[LogState, ...]:
     return (LogState(*CHAIN, 0, entries, entries),)
 
 
-# ---- loss --------------------------------------------------------------------------------------
+# loss
 
 
 def loss_after(messages: list[str], lost: set[int]) -> float:
@@ -80,7 +80,7 @@ def test_a_peer_that_lies_about_its_log_has_some_loss_and_breaks_nothing() -> No
         assert 0.0 <= peer.loss <= 1.0
 
 
-# ---- life --------------------------------------------------------------------------------------
+# life
 
 
 def test_a_peer_lives_for_five_seconds_after_its_last_message() -> None:
@@ -174,13 +174,27 @@ def test_a_status_that_was_overtaken_says_nothing_new() -> None:
 
 def test_a_pose_that_was_overtaken_says_nothing_new() -> None:
     peer = a_peer()
-    late, latest = Pose(1, 3, 11, 1), Pose(1, 3, 11, 2)
+    late, latest = (Pose(PoseState.LOCALISED, 3, 11, utime) for utime in (1, 2))
     peer.take_pose(latest, 5)
     peer.take_pose(late, 4)
     assert peer.pose is latest
 
 
-# ---- odometry ----------------------------------------------------------------------------------
+@pytest.mark.parametrize(("ahead", "taken"), [(63, False), (64, True), (2**31 - 6, True)])
+def test_a_status_and_a_pose_far_ahead_of_all_others_overtake_nothing(
+    ahead: int, taken: bool
+) -> None:
+    """A false one with the last counter there is would silence its robot."""
+    peer = a_peer()
+    peer.take_status(a_status(leaving=True), 5 + ahead, OWN, 0)
+    peer.take_pose(Pose(PoseState.LOCALISED, 3, 11, 1), 5 + ahead)
+    assert peer.take_status(a_status(), 5, OWN, 0) == taken
+    pose = Pose(PoseState.LOCALISED, 3, 11, 2)
+    peer.take_pose(pose, 5)
+    assert (peer.pose is pose) == taken
+
+
+# odometry
 
 
 def steps(first: int, count: int) -> Array:
@@ -244,7 +258,28 @@ def test_a_break_in_the_odometry_of_the_peer_is_a_break_in_its_track() -> None:
     assert peer.track.covers(15, 19)
 
 
-# ---- what the front end learns -----------------------------------------------------------------
+LAST = 2**31 - 2
+
+
+def test_a_false_batch_from_the_end_of_all_numbers_is_given_up_for_true_ones() -> None:
+    peer = a_peer()
+    peer.extend_track(batch(0, 100), 0)
+    peer.extend_track(OdometryBatch(LAST - 149, LAST - 149, steps(0, 150)), SECOND)
+    assert peer.track.end == LAST + 1
+    peer.extend_track(batch(100, 150), 2 * SECOND)
+    assert (peer.track.n0, peer.track.end) == (100, 250)
+    assert np.array_equal(peer.track.steps(100, 150), steps(100, 150))
+
+
+@pytest.mark.parametrize(("late", "anew"), [(599, False), (600, True)])
+def test_a_batch_that_ends_a_minute_before_the_track_begins_it_anew(late: int, anew: bool) -> None:
+    peer = a_peer()
+    peer.extend_track(batch(1_000, 150), 0)
+    peer.extend_track(batch(1_150 - late - 150, 150), 0)
+    assert peer.track.end == (1_150 - late if anew else 1_150)
+
+
+# what the front end learns
 
 
 def test_a_neighbour_carries_what_the_peer_said() -> None:

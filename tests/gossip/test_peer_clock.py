@@ -69,7 +69,7 @@ def is_within_the_claim(talk: Conversation) -> bool:
     return talk.error() <= talk.found().uncertainty_us
 
 
-# ---- from messages -----------------------------------------------------------------------------
+# from messages
 
 
 def test_before_the_first_message_nothing_is_known() -> None:
@@ -162,7 +162,7 @@ def test_a_peer_that_no_longer_hears_us_is_known_one_way_again() -> None:
     assert talk.found().source == "one way"
 
 
-# ---- from LinkTrack's system_time --------------------------------------------------------------
+# from LinkTrack's system_time
 
 OWN_MINUS_SYSTEM = 77_000_123
 
@@ -243,3 +243,16 @@ def test_the_radio_alone_is_not_believed() -> None:
     found = clock.offset(T0)
     assert found is not None
     assert found.source == "one way"
+
+
+@pytest.mark.parametrize("lie", [-3600 * SECOND, 3600 * SECOND])
+def test_what_a_peer_says_of_our_messages_makes_its_clock_as_uncertain_as_it_is_wrong(
+    lie: int,
+) -> None:
+    """Both delays together are never less than nothing."""
+    talk = Conversation(50 * SECOND)
+    talk.talk(5)
+    talk.ours.echoed((lie, talk.now))
+    found = talk.found()
+    assert abs(found.us - talk.offset()) <= found.uncertainty_us
+    assert found.uncertainty_us > 1000 * SECOND

@@ -7,7 +7,9 @@ import random
 import pytest
 
 from drslamd.gossip import replicated_log
-from drslamd.gossip.replicated_log import ReplicatedLog
+from drslamd.gossip.replicated_log import AHEAD, ReplicatedLog
+
+LAST = 2**31 - 1
 
 
 def holding(*seqs: int) -> ReplicatedLog:
@@ -37,33 +39,66 @@ def test_what_was_heard_of_stays_known_when_less_is_held() -> None:
     assert numbers(log) == (0, 2, 2, 9)
 
 
-def test_what_is_given_up_is_no_longer_waited_for() -> None:
+def test_what_the_owner_no_longer_holds_is_not_waited_for() -> None:
     log = holding(0, 5, 6, 8)
-    log.forget_before(5)
-    assert numbers(log) == (5, 7, 9, 9)
-    assert sorted(log.sealed) == [5, 6, 8]
+    assert (log.complete, log.lacking) == (1, 5)
+    log.on_owner(first=5, newest=9)
+    assert (log.start, log.complete, log.lacking) == (5, 7, 1)
+    assert sorted(log.sealed) == [0, 5, 6, 8]
 
 
-def test_what_was_given_up_stays_given_up() -> None:
+def test_what_the_owner_says_of_a_log_replaces_what_it_said_before() -> None:
+    log = holding(0, 1, 3)
+    log.on_owner(first=LAST, newest=LAST)
+    assert (log.complete, log.newest, log.lacking) == (LAST, LAST, 0)
+    log.on_owner(first=0, newest=4)
+    assert numbers(log) == (0, 2, 4, 4)
+    assert log.lacking == 1
+
+
+def test_less_than_what_is_held_is_not_believed_of_its_end() -> None:
     log = holding(0, 1, 2)
-    log.forget_before(2)
-    for earlier in (2, 1, 0, -5):
-        log.forget_before(earlier)
-        assert numbers(log) == (2, 3, 3, 3)
+    log.on_owner(first=0, newest=1)
+    assert numbers(log) == (0, 3, 3, 3)
 
 
-def test_giving_up_more_than_is_held_leaves_an_empty_log_that_begins_there() -> None:
+def test_an_owner_that_forgot_only_what_is_held_here_changes_nothing() -> None:
     log = holding(0, 1, 2)
-    log.forget_before(2**31 - 1)
-    assert numbers(log) == (2**31 - 1,) * 4
-    assert not log.sealed
+    for first in (0, 2, 3):
+        log.on_owner(first, newest=3)
+        assert (log.start, *numbers(log)) == (0, 0, 3, 3, 3)
 
 
-def test_when_an_entry_was_on_the_air_is_forgotten_with_it() -> None:
+@pytest.mark.parametrize("newest", [1, 3, 2 + AHEAD])
+def test_what_somebody_else_has_heard_of_counts(newest: int) -> None:
+    log = holding(0, 1)
+    log.on_hearsay(newest)
+    assert log.newest == max(2, newest)
+
+
+def test_what_somebody_else_has_heard_of_counts_only_so_far_ahead() -> None:
+    log = holding(0, 1)
+    log.on_hearsay(LAST)
+    assert log.newest == 2 + AHEAD
+    log.on_owner(0, newest=4)
+    assert (log.newest, log.lacking) == (4, 2)
+
+
+def test_when_an_entry_was_on_the_air_is_forgotten_with_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(replicated_log, "MAX_ENTRIES", 2)
     log = holding(0, 1)
     log.aired = {0: 10, 1: 11}
-    log.forget_before(1)
+    log.put(2, b"2")
     assert log.aired == {1: 11}
+
+
+def test_an_entry_far_ahead_gives_up_all_before_it_without_counting_to_it() -> None:
+    log = holding(0, 1, LAST)
+    first = LAST + 1 - replicated_log.MAX_ENTRIES
+    assert numbers(log) == (first, first, LAST + 1, LAST + 1)
+    assert sorted(log.sealed) == [LAST]
 
 
 @pytest.mark.parametrize(("last", "first"), [(9, 0), (10, 1), (25, 16)])

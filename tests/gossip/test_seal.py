@@ -25,7 +25,7 @@ def counters(*values: int, once: bool = True) -> list[bool]:
     ]
 
 
-# ---- the tag -----------------------------------------------------------------------------------
+# the tag
 
 
 def test_a_message_of_the_team_is_opened_with_its_header() -> None:
@@ -87,7 +87,7 @@ def test_the_tag_covers_the_channel() -> None:
         assert opened(receiver, (other, payload)) is SealFault.WRONG_TAG
 
 
-# ---- the order of judgement --------------------------------------------------------------------
+# the order of judgement
 
 
 def test_a_message_shorter_than_its_header_is_refused() -> None:
@@ -122,6 +122,27 @@ def test_the_first_and_the_last_robot_id_are_heard(robot: int) -> None:
     assert isinstance(opened(a_seal(1), forged(a_status(), robot=robot)), Header)
 
 
+LAST_TIME = 100_000 * (2**31 - 2)
+"""us; of the last sample of a 10 Hz grid whose numbers have 32 bits."""
+
+
+@pytest.mark.parametrize(
+    ("utime", "heard"), [(-1, False), (0, True), (LAST_TIME, True), (LAST_TIME + 1, False)]
+)
+def test_a_message_of_a_time_that_no_clock_shows_is_refused(utime: int, heard: bool) -> None:
+    answer = opened(a_seal(1), forged(a_status(), utime=utime))
+    assert isinstance(answer, Header) == heard
+    assert heard or answer is SealFault.BAD_TIME
+
+
+def test_to_judge_a_message_remembers_nothing_of_it() -> None:
+    receiver, message = a_seal(1), forged(a_status(), epoch=7)
+    for _ in range(3):
+        assert isinstance(receiver.judge(*message, STATUS), Header)
+    assert receiver.epochs == {}
+    assert isinstance(opened(receiver, forged(a_status(), epoch=4)), Header)
+
+
 def test_faults_are_named_in_the_order_of_their_cost() -> None:
     """Each message has all the faults from its own on; the first one must be named."""
     receiver = a_seal(1, epoch=10)
@@ -130,10 +151,15 @@ def test_faults_are_named_in_the_order_of_their_cost() -> None:
     channel = messages.channel("STATUS", 3)
 
     def bad(
-        version: int = 2, robot: int = 3, epoch: int = 5, counter: int = 4, kind: str = "STATUS"
+        version: int = 2,
+        robot: int = 3,
+        epoch: int = 5,
+        counter: int = 4,
+        kind: str = "STATUS",
+        utime: int = 0,
     ) -> bytes:
         message = kinds()[kind]
-        return messages.encode(Header(version, robot, epoch, counter, 0), message)
+        return messages.encode(Header(version, robot, epoch, counter, utime), message)
 
     order = [
         (bad(1, -5, 4, kind="POSE")[:20], SealFault.TOO_SHORT),
@@ -141,6 +167,7 @@ def test_faults_are_named_in_the_order_of_their_cost() -> None:
         (bad(1, -5, 4, kind="POSE"), SealFault.UNKNOWN_TYPE),
         (bad(1, -5, 4), SealFault.WRONG_VERSION),
         (bad(2, -5, 4), SealFault.BAD_ORIGIN),
+        (bad(2, 1, 10, 1, utime=-1), SealFault.BAD_TIME),
         (bad(2, 1, 10, 1), SealFault.OWN),
         (bad(2, 3, 4), SealFault.OLD_EPOCH),
         (bad(2, 3, 5), SealFault.SEEN),
@@ -150,7 +177,7 @@ def test_faults_are_named_in_the_order_of_their_cost() -> None:
         assert opened(receiver, (channel, payload)) is fault
 
 
-# ---- replay ------------------------------------------------------------------------------------
+# replay
 
 
 def test_a_message_is_accepted_once() -> None:
@@ -177,9 +204,9 @@ def test_counters_in_any_order_are_accepted_once_each() -> None:
 
 
 def test_the_window_reaches_back_1023_counters_and_not_1024() -> None:
-    assert counters(2000, 2000 - 1023, 2000 - 1024) == [True, True, False]
-    moved = counters(2000, 2000 - 1023, 2001, 2001 - 1023, 2001 - 1024)
-    assert moved == [True] * 4 + [False]
+    assert counters(1000, 2000, 2000 - 1023, 2000 - 1024) == [True, True, True, False]
+    moved = counters(1000, 2000, 2000 - 1023, 2001, 2001 - 1023, 2001 - 1024)
+    assert moved == [True] * 5 + [False]
 
 
 def test_a_leap_by_a_whole_window_forgets_everything_before_it() -> None:
@@ -193,15 +220,12 @@ def test_counters_below_the_first_are_never_new(counter: int) -> None:
 
 
 def test_the_largest_counter_is_the_last_one() -> None:
-    assert counters(LAST_COUNTER, LAST_COUNTER, LAST_COUNTER - 1, LAST_COUNTER - 1024) == [
-        True,
-        False,
-        True,
-        False,
-    ]
+    last = [LAST_COUNTER - k for k in (2, 1, 0)]
+    assert counters(*last, *last, LAST_COUNTER - 1023) == [True] * 3 + [False] * 3 + [True]
+    assert counters(*last, LAST_COUNTER - 1024) == [True] * 3 + [False]
 
 
-# ---- nothing is remembered of what is not proven -----------------------------------------------
+# nothing is remembered of what is not proven
 
 
 def test_a_forged_huge_counter_does_not_move_the_window() -> None:
@@ -229,7 +253,7 @@ def test_a_forged_later_epoch_does_not_lock_the_robot_out() -> None:
     assert receiver.epochs == {3: 4}
 
 
-# ---- epochs ------------------------------------------------------------------------------------
+# epochs
 
 
 def test_a_new_epoch_begins_a_new_window_and_ends_the_old_one() -> None:
@@ -263,7 +287,7 @@ def test_the_windows_of_two_robots_are_apart() -> None:
     assert isinstance(opened(receiver, forged(a_status(), robot=4, counter=7)), Header)
 
 
-# ---- our own id --------------------------------------------------------------------------------
+# our own id
 
 
 def test_our_own_messages_come_back_as_own() -> None:

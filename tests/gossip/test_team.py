@@ -21,7 +21,6 @@ from drslamd.gossip import lc02
 from drslamd.gossip.message_types import Heard, LogState, Message, OdometryBatch, Status
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
-from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.robot_model import UNTOLD, RobotModel
 
@@ -43,7 +42,7 @@ def hearing(*chains: Chain, logs: tuple[LogState, ...] = (), uwb_id: int = 7) ->
     return a_status(tuple(Heard(*chain, 0) for chain in chains), logs, uwb_id=uwb_id)
 
 
-# ---- what comes in -----------------------------------------------------------------------------
+# what comes in
 
 
 def test_a_datagram_and_the_message_in_it_are_heard_alike() -> None:
@@ -63,15 +62,11 @@ def test_every_kind_reaches_the_peer_that_said_it() -> None:
     for kind in ("STATUS", "ODOMETRY", "POSE", "PUBLIC"):
         assert tell(team, seal, said[kind])
     peer = team.peers[3]
-    batch, public = said["ODOMETRY"], said["PUBLIC"]
-    assert isinstance(batch, OdometryBatch)
-    assert isinstance(public, PublicPoses)
+    assert isinstance(said["ODOMETRY"], OdometryBatch)
     assert peer.chain == Chain(3, 11)
     assert peer.status == said["STATUS"]
     assert peer.pose == said["POSE"]
     assert (peer.track.n0, peer.track.end) == (40, 43)
-    assert peer.public is not None
-    assert peer.public.keyframes == (40, 50)
     assert peer.received == 4
 
 
@@ -91,6 +86,17 @@ def test_a_log_entry_says_nothing_of_whether_its_origin_lives() -> None:
     assert team.logs.next_states() == (LogState(3, 1, 0, 1, 1),)
 
 
+@pytest.mark.parametrize(("newest", "taken"), [(3_977, True), (3_976, False)])
+def test_an_entry_far_from_what_we_hold_is_taken_when_any_status_speaks_of_its_log(
+    newest: int, taken: bool
+) -> None:
+    """A newcomer may hear an old robot through others only."""
+    team = a_team()
+    tell(team, a_seal(4), hearing(logs=(LogState(3, 1, 0, newest, newest),)))
+    assert tell(team, a_seal(3), an_entry(5_000, 1)) == taken
+    assert dict(team.refused) == ({} if taken else {"entry far ahead of its log": 1})
+
+
 def test_a_log_entry_is_handed_out_once_whoever_sends_it() -> None:
     team, event = a_team(), ChannelMessage(T0, *sealed(a_seal(3), an_entry(0, 1)))
     assert team.receive(event) is not None
@@ -102,7 +108,7 @@ def test_a_robot_that_starts_again_is_a_new_peer() -> None:
     team = a_team()
     tell(team, a_seal(3, epoch=5), kinds()["ODOMETRY"])
     tell(team, a_seal(3, epoch=5), an_entry(0, 1))
-    assert tell(team, a_seal(3, epoch=6), a_status())
+    assert tell(team, a_seal(3, epoch=6), a_status(), T0 + 3 * SECOND)
     assert team.peers[3].chain == Chain(3, 6)
     assert len(team.peers[3].track) == 0
     assert team.logs.next_states() == (LogState(3, 6, 0, 0, 0),)
@@ -119,7 +125,7 @@ def test_a_status_that_was_overtaken_is_no_reason_to_repeat_anything() -> None:
     assert team.repeats(T0) == []
 
 
-# ---- what goes out -----------------------------------------------------------------------------
+# what goes out
 
 
 def test_a_message_goes_out_sealed_on_the_channel_of_its_robot() -> None:
@@ -166,7 +172,7 @@ def test_what_a_peer_lacks_is_repeated_as_it_was_sealed() -> None:
     assert (send.channel, send.payload) == ("DRSLAM_GRAPH_001", payload)
 
 
-# ---- who is there ------------------------------------------------------------------------------
+# who is there
 
 
 def test_the_living_are_those_that_are_heard_and_hear_us() -> None:
@@ -245,7 +251,7 @@ def test_a_peer_is_forgotten_after_ten_silent_minutes_and_its_log_is_not() -> No
     assert team.logs.epoch(3) == 1
 
 
-# ---- UWB modules and clocks --------------------------------------------------------------------
+# UWB modules and clocks
 
 
 def test_a_module_belongs_to_the_robot_that_says_so() -> None:
@@ -279,12 +285,6 @@ def test_a_module_moves_with_its_robot_once_the_last_owner_is_silent() -> None:
     assert dict(team.conditions(T0 + 5 * SECOND))["team.uwb_id"] is None
 
 
-def test_clocks_of_peers_are_told_as_shifts() -> None:
-    team = a_team()
-    team.receive(ChannelMessage(T0, *sealed(a_seal(3), hearing(OWN), T0 + 5 * SECOND)))
-    assert team.shifts(T0) == {3: 2_500_000}
-
-
 PERIOD = 2**32 * MS
 
 
@@ -294,7 +294,6 @@ def test_radio_clocks_are_compared_modulo_their_period(wrap: int) -> None:
     status = a_status((Heard(*OWN, 8 * SECOND + 9 * MS),), uwb_clock_us=50 * SECOND + wrap)
     team.receive(ChannelMessage(T0, *sealed(a_seal(3), status, T0 + 8 * SECOND - 1 * MS)))
     team.compare_radio_clocks(42 * SECOND, T0)
-    assert team.shifts(T0) == {3: 8 * SECOND}
     assert team.peers[3].neighbour(OWN, T0).ahead_us == 8 * SECOND
 
 
@@ -321,31 +320,18 @@ def test_what_a_silent_peer_said_of_its_radio_clock_is_not_taken_for_fresh() -> 
     assert offset.source == "messages"
 
 
-# ---- our own id and epoch ----------------------------------------------------------------------
-
-
-def test_a_peer_that_heard_a_later_start_of_ours_says_that_we_are_superseded() -> None:
-    for status in (hearing(Chain(1, 12)), hearing(logs=(LogState(1, 12, 0, 0, 0),))):
-        team = a_team()
-        tell(team, a_seal(3), status)
-        assert team.superseded_by == 12
-
-
-@pytest.mark.parametrize("epoch", [9, 10])
-def test_a_peer_that_heard_this_start_or_an_earlier_one_says_nothing_of_the_kind(
-    epoch: int,
-) -> None:
-    team = a_team()
-    tell(team, a_seal(3), hearing(Chain(1, epoch), logs=(LogState(1, epoch, 0, 0, 0),)))
-    assert team.superseded_by is None
+# our own id and epoch
 
 
 def test_a_robot_that_lost_its_memory_learns_its_last_epoch_after_any_silence() -> None:
     peer = Team(a_seal(3))
     tell(peer, a_seal(1, epoch=12), a_status(), T0)
     team = a_team()
-    status = a_status(peer.next_heard(T0 + 60 * SECOND), peer.logs.next_states())
-    tell(team, a_seal(3), status, T0 + 60 * SECOND)
+    for seconds in (60, 63):
+        utime = T0 + seconds * SECOND
+        status = a_status(peer.next_heard(utime), peer.logs.next_states())
+        assert team.superseded_by is None
+        tell(team, a_seal(3, epoch=seconds), status, utime)
     assert team.superseded_by == 12
 
 
@@ -357,7 +343,7 @@ def test_relays_of_our_own_log_from_another_start_do_not_look_like_another_robot
     assert dict(team.refused) == {"of another start of this robot, repeated by a peer": 2}
 
 
-# ---- sentences ---------------------------------------------------------------------------------
+# sentences
 
 
 WRONG_TAG = (

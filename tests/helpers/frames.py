@@ -26,7 +26,7 @@ class Peer(NamedTuple):
     system_ms: int = 0
 
 
-# ---- LinkTrack ---------------------------------------------------------------------------------
+# LinkTrack
 
 
 def summed(frame: bytes) -> bytes:
@@ -189,7 +189,7 @@ def ranging_stream(
     ]
 
 
-# ---- wheels ------------------------------------------------------------------------------------
+# wheels
 
 
 def kobuki_packet(payload: bytes) -> bytes:
@@ -215,7 +215,7 @@ def ascii_line(time_ms: int, left: int, right: int) -> bytes:
     return b"$%s*%02X\r\n" % (text, reduce(xor, text))
 
 
-# ---- how bytes arrive --------------------------------------------------------------------------
+# how bytes arrive
 
 
 def cut(data: bytes, seed: int, longest: int = 40) -> Iterator[bytes]:

@@ -9,7 +9,15 @@ import numpy as np
 
 from drslamd.conventions import Chain
 from drslamd.gossip import messages
-from drslamd.gossip.message_types import Heard, LogState, Message, OdometryBatch, Pose, Status
+from drslamd.gossip.message_types import (
+    Heard,
+    LogState,
+    Message,
+    OdometryBatch,
+    Pose,
+    PoseState,
+    Status,
+)
 from drslamd.gossip.seal import Header, Seal, team_key
 from drslamd.slam.graph.measurements import (
     ClosureMeasurement,
@@ -30,6 +38,8 @@ HEADER = Header(2, 3, 11, 12, 13)
 
 COVARIANCE = (0.25, 0.0, 0.0, 0.25, 0.0, 0.0625)
 """Powers of two, so that a float on the wire changes nothing."""
+CORRECTED = (0.5, 0.0, -0.5, 1.0)
+"""Whole steps of a fiftieth."""
 
 
 def a_seal(robot: int, epoch: int = 1, secret: bytes | None = SECRET) -> Seal:
@@ -45,7 +55,8 @@ def a_status(
     uwb_clock_us: int = messages.UNKNOWN_CLOCK,
     ranged: tuple[int, ...] = (),
 ) -> Status:
-    return Status(0, 3, leaving, uwb_id, uwb_clock_us, 99, heard, ranged, logs)
+    state, frame, graph_hash = PoseState.NOT_LOCALISED, 3, 99
+    return Status(state, frame, leaving, uwb_id, uwb_clock_us, graph_hash, heard, ranged, logs)
 
 
 def an_entry(seq: int, *keyframes: int) -> GraphEntry:
@@ -59,7 +70,7 @@ def one_of_each_kind() -> list[Message]:
     lifted = (np.arange(12) + 1j * np.arange(12, 24)).reshape(3, 4)
     return [
         Status(
-            1,
+            PoseState.LOCALISED,
             3,
             True,
             70_000,
@@ -72,13 +83,15 @@ def one_of_each_kind() -> list[Message]:
         OdometryBatch(40, 40, steps),
         GraphEntry(
             2,
-            RobotModel(OdometryNoise(0.5, 0.25, 0.125, 0.0625), 0.5, -0.5, 0.25),
+            RobotModel(OdometryNoise(0.5, 0.25, 0.125, 0.0625), 0.5, -0.5, 0.25, 0.75),
             (Keyframe(40, 1, -100, 200, -30),),
-            (RangeMeasurement(40, peer, 41, (0.25, 0.0), (-0.125, 0.5), 3.5, 0.125),),
-            (ClosureMeasurement(8, True, 40, peer, 41, (1.5, -2.5, 0.25), COVARIANCE),),
+            (RangeMeasurement(40, peer, 41, (0.25, 0.0), (-0.125, 0.5), 3.5, 0.125, 0.25, -0.5),),
+            (ClosureMeasurement(8, True, 40, peer, 41, (1.5, -2.5, 0.25), COVARIANCE, CORRECTED),),
         ),
-        Pose(1, 3, 11, 4_000_000, (1.25, -2.5, 3.0), COVARIANCE),
-        PublicPoses(3, 11, 2, (40, 50), lifted),
+        Pose(PoseState.LOCALISED, 3, 11, 4_000_000, (1.25, -2.5, 3.0), COVARIANCE),
+        PublicPoses(
+            3, 11, 2, (40, 50), lifted, round=9, since=7, part=1, parts=3, held=((4, 6), (9, 0))
+        ),
     ]
 
 

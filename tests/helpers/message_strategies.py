@@ -1,4 +1,4 @@
-"""Any message that can be said, drawn by hypothesis."""
+"""Any message that can be said, drawn by hypothesis: within the bounds of what is believed."""
 
 from __future__ import annotations
 
@@ -6,36 +6,38 @@ import numpy as np
 from hypothesis import strategies as st
 
 from drslamd.conventions import Chain
-from drslamd.gossip.message_types import Heard, LogState, Message, OdometryBatch, Pose, Status
+from drslamd.gossip.message_types import (
+    UNKNOWN_CLOCK,
+    Heard,
+    LogState,
+    Message,
+    OdometryBatch,
+    Pose,
+    PoseState,
+    Status,
+)
 from drslamd.slam.graph.measurements import (
     ClosureMeasurement,
     GraphEntry,
     Keyframe,
     RangeMeasurement,
 )
-from drslamd.slam.graph.public_poses import PublicPoses
+from drslamd.slam.graph.public_poses import MAX_HELD, MAX_PUBLIC, PublicPoses
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.robot_model import RobotModel
 
 i16 = st.integers(-(2**15), 2**15 - 1)
-
-
 i32 = st.integers(-(2**31), 2**31 - 1)
-
-
 i64 = st.integers(-(2**63), 2**63 - 1)
-
-
 n32 = st.integers(0, 2**31 - 1)
-
-
+samples = st.integers(0, 2**31 - 2)
+times = st.integers(0, 100_000 * (2**31 - 2))
 robots = st.integers(0, 254)
-
-
-chains = st.builds(Chain, robots, i64)
-
-
-float32s = st.floats(allow_nan=False, allow_infinity=False, width=32)
+epochs = st.integers(0, 2**62)
+chains = st.builds(Chain, robots, epochs)
+metres = st.floats(-1e6, 1e6, width=32)
+variances = st.floats(0.0, 2.0**39, width=32)
+states = st.sampled_from(PoseState)
 
 
 def millimetres(steps: int) -> float:
@@ -46,118 +48,119 @@ def tenths(steps: int) -> float:
     return steps * 1e-4
 
 
-def six(values: st.SearchStrategy[float]) -> st.SearchStrategy[tuple[float, ...]]:
-    return st.tuples(values, values, values, values, values, values)
+def fiftieths(steps: int) -> float:
+    return steps * (1 / 50)
 
 
-diagonals = st.floats(2**-20, 2**20, width=32).map(lambda v: (v, 0.0, 0.0, v, 0.0, v))
-
-
+covariances = st.tuples(variances, metres, metres, variances, metres, variances)
+diagonals = st.floats(2**-20, 2**16, width=32).map(lambda v: (v, 0.0, 0.0, v, 0.0, v))
 log_states = st.builds(
     lambda robot, epoch, numbers: LogState(robot, epoch, *sorted(numbers)),
     robot=robots,
-    epoch=i64,
+    epoch=epochs,
     numbers=st.tuples(n32, n32, n32),
 )
-
-
-heard = st.builds(Heard, robots, i64, i64, st.integers(-1, 2**31 - 1))
-
-
+delays = st.one_of(times, times.map(lambda v: -v))
+heard = st.builds(Heard, robots, epochs, delays, st.integers(-1, 2**31 - 1))
 statuses = st.builds(
     Status,
-    state=st.integers(0, 1),
+    state=states,
     frame=robots,
     leaving=st.booleans(),
     uwb_id=st.integers(0, 2**32 - 1),
-    uwb_clock_us=i64,
+    uwb_clock_us=st.one_of(st.just(UNKNOWN_CLOCK), delays),
     graph_hash=i64,
     heard=st.lists(heard, max_size=28).map(tuple),
     ranged=st.lists(robots, max_size=28).map(tuple),
     logs=st.lists(log_states, max_size=28).map(tuple),
 )
-
-
 batches = st.builds(
     lambda start, later, first, steps: OdometryBatch(
         start, start + later, np.cumsum([first, *steps], axis=0).astype(float)
     ),
     start=st.integers(0, 2**30),
     later=st.integers(0, 2**30),
-    first=st.tuples(i32, i32, i32),
+    first=st.tuples(*[st.integers(-(2**30), 2**30)] * 3),
     steps=st.lists(st.tuples(*[st.integers(-32_767, 32_767)] * 3), max_size=149),
 )
-
-
+places = st.integers(-99_999_999, 99_999_999)
+angles = st.integers(-31_416, 31_416).map(tenths)
 antennas = st.tuples(i16.map(millimetres), i16.map(millimetres))
-
-
-keyframes = st.builds(Keyframe, n32, st.integers(0, 2**15 - 1), i32, i32, i32)
-
-
+keyframes = st.builds(Keyframe, samples, st.integers(0, 2**15 - 1), i32, i32, i32)
 ranges = st.builds(
     RangeMeasurement,
-    a_n=n32,
+    a_n=samples,
     peer=chains,
-    b_n=n32,
+    b_n=samples,
     q_a=antennas,
     q_b=antennas,
-    range_m=i32.map(tenths),
+    range_m=places.map(tenths),
     sigma_m=st.integers(1, 2**15 - 1).map(millimetres),
+    turn_a=angles,
+    turn_b=angles,
 )
-
-
 closures = st.builds(
     ClosureMeasurement,
     number=n32,
     kept=st.booleans(),
-    a_n=n32,
+    a_n=samples,
     peer=chains,
-    b_n=n32,
-    a_T_b=st.tuples(*[i32.map(tenths)] * 3),
+    b_n=samples,
+    a_T_b=st.tuples(places.map(tenths), places.map(tenths), angles),
     covariance=diagonals,
+    corrected=st.tuples(*[st.integers(-127, 127).map(fiftieths)] * 4),
 )
-
-
 sigmas = st.floats(2**-20, 8, width=32)
-
-
 models = st.builds(
     RobotModel,
     st.builds(OdometryNoise, sigmas, sigmas, sigmas, sigmas),
     *[st.floats(-8, 8, width=32)] * 3,
+    st.floats(0, 8, width=32),
 )
-
-
 entries = st.builds(
     GraphEntry,
-    seq=n32,
+    seq=samples,
     model=models | st.none(),
     keyframes=st.lists(keyframes, max_size=6).map(tuple),
     ranges=st.lists(ranges, max_size=6).map(tuple),
     closures=st.lists(closures, max_size=6).map(tuple),
 )
-
-
 poses = st.builds(
     Pose,
-    st.integers(0, 1),
+    states,
     robots,
-    i64,
-    i64,
-    st.tuples(float32s, float32s, float32s),
-    six(float32s),
+    epochs,
+    times,
+    st.tuples(metres, metres, st.floats(-3.125, 3.125, width=32)),
+    covariances,
 )
+
+
+rounds = st.integers(0, 2**62 - 1)
 
 
 @st.composite
 def publics(draw: st.DrawFn) -> PublicPoses:
     rank, count = draw(st.sampled_from([1, 2, 5, 20])), draw(st.integers(0, 4))
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
-    parts = rng.normal(0, draw(st.sampled_from([1e-9, 1.0, 1e9])), (2, count + 1, 2 * rank))
+    parts = rng.normal(0, draw(st.sampled_from([1e-9, 1.0, 1e5])), (2, count + 1, 2 * rank))
     real, imaginary = parts.astype(np.float32).astype(float)
-    numbers = tuple(draw(n32) for _ in range(count))
-    return PublicPoses(draw(robots), draw(i64), rank, numbers, real + 1j * imaginary)
+    numbers = sorted(draw(st.sets(samples, min_size=count, max_size=count)))
+    since, move = sorted(draw(st.tuples(rounds, rounds)))
+    many = draw(st.integers(1, MAX_PUBLIC))
+    return PublicPoses(
+        draw(robots),
+        draw(epochs),
+        rank,
+        tuple(numbers),
+        real + 1j * imaginary,
+        round=move,
+        since=since,
+        part=draw(st.integers(0, many - 1)),
+        parts=many,
+        asks=draw(st.booleans()),
+        held=tuple(draw(st.lists(st.tuples(robots, rounds), max_size=MAX_HELD))),
+    )
 
 
 any_message: st.SearchStrategy[Message] = st.one_of(statuses, batches, entries, poses, publics())

@@ -12,7 +12,7 @@ from transport_helpers import GROUP, Ear, native, running, section, spoken_until
 from drslamd.config import GossipSection
 from drslamd.events import ChannelMessage
 from drslamd.gossip import lc02, messages
-from drslamd.gossip.message_types import Pose
+from drslamd.gossip.message_types import Pose, PoseState
 from drslamd.gossip.seal import Seal, team_key
 from drslamd.gossip.team import Team
 from drslamd.io.clock import MonotonicClock
@@ -132,7 +132,7 @@ async def the_group_on_an_interface_that_others_joined_is_not_heard() -> None:
         assert ear.messages == [("DRSLAM_POSE_001", b"on wlan0")]
 
 
-# ---- with the lcm package ----------------------------------------------------------------------
+# with the lcm package
 
 
 def route_to_the_group() -> None:
@@ -248,7 +248,7 @@ async def lcm_logger_records_what_we_say(folder: str) -> None:
     route_to_the_group()
     where, log = section("lo"), Path(folder) / "team.lcmlog"
     speaker, listener = (Team(Seal(team_key(None), robot, 1, {})) for robot in (3, 4))
-    poses = [Pose(1, 3, 1, number, (1.0, 2.0, 3.0)) for number in range(20)]
+    poses = [Pose(PoseState.LOCALISED, 3, 1, number, (1.0, 2.0, 3.0)) for number in range(20)]
     transport, ear = native(where)
     # the program itself, which the console script of the same name would only start
     logger = await asyncio.create_subprocess_exec(

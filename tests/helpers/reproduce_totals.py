@@ -21,6 +21,10 @@ def good() -> Tally:
             tally.poses(f"{name}/before", (np.array([before]), np.array([before])))
             for when in ("there", "after"):
                 tally.poses(f"{name}/{when}", (np.array([0.5]), np.array([4.1])))
+            tally.add(f"{name}/ate", 0.33)
+            tally.add(f"{name}/least/ate", 0.32)
+            tally.add(f"{name}/rounds", 12)
+    tally.add("table4/paper/1/bytes", 1.5e6)
     tally.poses("odometry", (np.array([0.85]), np.array([8.99])))
     tally.poses("drslamd/after", (np.array([0.1]), np.array([1.0])))
     for name in (

@@ -107,7 +107,7 @@ class RobotScene:
         estimate = TeamEstimate(
             Segment(own.robot if frame is None else frame, 1, 0),
             {own.robot: Trajectory(own, np.array([at]), np.array([pose], dtype=float))},
-            {own.robot: np.eye(3) if covariance is None else covariance},
+            joint=np.eye(3) if covariance is None else covariance,
         )
         self.robot.back.on_solution(estimate)
         return estimate

@@ -1,23 +1,29 @@
-"""Problems for the optimisers of module 3, and the same problems as dense residuals."""
+"""Problems for the optimisers of module 3."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from slam_scenes import Array, inverted, product, wander
 
-from drslamd.slam.optimizer.banded.layout import BandLayout
-from drslamd.slam.optimizer.banded.normal_equations import GAUGE_SIGMA, System
+from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.problem import (
     BetweenFactors,
-    Calibration,
+    CarriedEnds,
+    Doubted,
     OdometryFactors,
     Priors,
     Problem,
     RangeFactors,
 )
 from drslamd.slam.range_model import LINKTRACK
+
+BIAS = BiasPrior(sigma=0.6, spread=0.3, dof=3.0, team=0.1)
+"""So wide that the biases of these problems are found."""
+CLOCKS = (20_000, 50_000, 10_000, 40_000)
+"""Steps of the grid at which the clocks of the robots begin; a keyframe is ten steps long."""
 
 
 def random_covariance(rng: np.random.Generator, sigma: tuple[float, float, float]) -> Array:
@@ -46,7 +52,15 @@ def pose_edges(
 def no_ranges() -> RangeFactors:
     none = np.zeros(0, dtype=np.int64)
     return RangeFactors(
-        none, none, np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0), none
+        none,
+        none,
+        np.zeros((0, 2)),
+        np.zeros((0, 2)),
+        np.zeros(0),
+        np.zeros(0),
+        none,
+        np.zeros((0, 2), dtype=np.int64),
+        np.zeros((0, 2)),
     )
 
 
@@ -54,20 +68,22 @@ def team_problem(
     seed: int,
     robots: int = 2,
     count: int = 12,
-    biases: tuple[float, ...] = (0.0, 0.0, 0.0),
-    scale: tuple[float, ...] = (0.0, 0.0, 0.0),
-    yaw: tuple[float, ...] = (0.0, 0.0, 0.0),
+    biases: tuple[float, ...] = (0.0,) * 6,
+    scale: tuple[float, ...] = (0.0,) * 4,
+    yaw: tuple[float, ...] = (0.0,) * 4,
     near_bias: float = 0.0,
     range_error: float = 0.05,
     link_error: float = 1.0,
     closures: int = 3,
     link_sigma: tuple[float, float, float] = (0.01, 0.01, 0.008),
+    is_thinned: bool = False,
 ) -> tuple[Problem, Array]:
     """Robots whose poses alternate in time, with every kind of edge; and the truth.
 
-    Pose robots * k + r is keyframe k of robot r. Each pair has its ranges, between antennas off
-    the middle, wrong by `near_bias` where they are near; neighbouring poses of a robot have their
-    odometry, wrong by `scale` and `yaw`.
+    Pose robots * k + r is keyframe k of robot r, one a second on a clock of its own. Each pair has
+    its ranges, between antennas off the middle, wrong by `near_bias` where they are near;
+    neighbouring poses of a robot have their odometry, wrong by `scale` and `yaw`. Of a thinned
+    problem each third link was driven in bows, and each third range was carried by such odometry.
     """
     rng = np.random.default_rng(seed)
     paths = [wander(rng, count, 0.4) for _ in range(robots)]
@@ -77,13 +93,21 @@ def team_problem(
     ]
     odometry = pose_edges(rng, truth, chain, link_sigma, link_error)
     robot = odometry.i % robots
-    path = np.hypot(odometry.measured[:, 0], odometry.measured[:, 1])
+    bows = np.random.default_rng(seed).normal(0, 0.1, (2, len(chain), 3))
+    bows[:, (np.arange(len(chain)) % 3 > 0) | (not is_thinned)] = 0.0
     measured = odometry.measured.copy()
-    for k, r in enumerate(robot):
-        bend = yaw[r] * path[k]
-        x, y = (1 + scale[r]) * measured[k, :2]
-        measured[k] = [x - bend / 2 * y, y + bend / 2 * x, measured[k, 2] + bend]
-    odometry = OdometryFactors(odometry.i, odometry.j, measured, odometry.covariance, robot, path)
+    measured[:, :2] *= 1 + np.array(scale)[robot, None]
+    by_yaw = straight_by_yaw(measured) + bows[0]
+    measured += np.array(yaw)[robot, None] * by_yaw
+    odometry = OdometryFactors(
+        odometry.i,
+        odometry.j,
+        measured,
+        odometry.covariance,
+        robot,
+        by_yaw=by_yaw,
+        by_turn=straight_by_turn(measured) + bows[1],
+    )
     names = [(a, b) for a in range(robots) for b in range(a + 1, robots)]
     rows = []
     q = rng.normal(0, 0.2, (robots, 2))
@@ -110,119 +134,143 @@ def team_problem(
         table[:, 6] + range_error * rng.normal(size=len(table)),
         np.full(len(table), 0.05),
         table[:, 7].astype(int),
+        table[:, :2].astype(int) % robots,
+        np.zeros((len(table), 2)),
+        carried_ends(seed, table, robots, scale, yaw) if is_thinned else CarriedEnds.none(),
     )
     joined = [(robots * k, robots * k + 1) for k in np.linspace(1, count - 2, closures).astype(int)]
     priors = Priors(
-        np.full(len(names), 0.3), np.full(robots, 0.03), np.full(robots, 0.01), np.full(1, 0.1)
+        bias=BIAS,
+        scale=np.full(robots, 0.06),
+        scale_tails=2.0,
+        yaw=np.full(robots, 0.01),
+        near_bias=0.1,
     )
     start = truth + rng.normal(0, 0.03, truth.shape)
+    which = np.arange(len(truth)) % robots
     problem = Problem(
-        np.arange(len(truth)) % robots,
-        np.arange(len(truth)) // robots,
-        start,
-        0,
-        odometry,
-        pose_edges(rng, truth, [(int(i), int(j)) for i, j in joined], (0.05, 0.05, 0.03)),
-        ranges,
-        priors,
+        robot=which,
+        n=np.array(CLOCKS)[which] + 10 * (np.arange(len(truth)) // robots),
+        initial=start,
+        gauge=0,
+        pairs=len(names),
+        odometry=odometry,
+        closures=pose_edges(rng, truth, [(int(i), int(j)) for i, j in joined], (0.05, 0.05, 0.03)),
+        ranges=ranges,
+        priors=priors,
+        doubted=Doubted.none(robots),
+        range_sigma=0.05,
     )
     return problem, truth
 
 
-# ---- the same written once more, plainly -------------------------------------------------------
+def straight_by_yaw(measured: Array) -> Array:
+    """(m, 3) how straight links move with a yaw rate: each swings about its middle."""
+    x, y, _ = measured.T
+    way = np.hypot(x, y)
+    return np.stack([-way / 2 * y, way / 2 * x, way], axis=-1)
 
 
-def unpacked(problem: Problem, x: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Poses, biases, scales, yaw rates and near-range bias of one vector of all unknowns."""
-    count, priors = len(problem.initial), problem.priors
-    ends = np.cumsum([3 * count, len(priors.bias), len(priors.scale), len(priors.yaw)])
-    poses, bias, scale, yaw, near_bias = np.split(x, ends)
-    return poses.reshape(-1, 3), bias, scale, yaw, near_bias
+def straight_by_turn(measured: Array) -> Array:
+    """(m, 3) how straight links move when turns are longer by a fraction."""
+    x, y, turn = measured.T
+    return np.stack([-turn / 2 * y, turn / 2 * x, turn], axis=-1)
 
 
-def packed(poses: Array, c: Calibration) -> Array:
-    return np.concatenate([poses.ravel(), c.bias, c.scale, c.yaw, c.near_bias])
+def carried_ends(
+    seed: int,
+    table: Array,
+    robots: int,
+    scale: tuple[float, ...],
+    yaw: tuple[float, ...],
+) -> CarriedEnds:
+    """Each third range of a table (m, 6 or more) of i, j, q_i and q_j: how its points move; in the
+    table they are made wrong by the constants of their robots."""
+    rows = np.arange(1, len(table), 3)
+    moves = np.random.default_rng(seed).normal(0, [[1.0], [0.3]], (len(rows), 2, 2, 2))
+    for row, move in zip(rows, moves, strict=True):
+        for end, at in enumerate((slice(2, 4), slice(4, 6))):
+            robot = int(table[row, end]) % robots
+            table[row, at] += yaw[robot] * move[end, 0] + scale[robot] * move[end, 1]
+    return CarriedEnds(rows, moves)
 
 
-def residual_vector(problem: Problem, x: Array, robust: bool = True) -> Array:
-    """Whose sum of squares is the cost, one residual after the other.
+def links_of(problem: Problem, robot: int, first: int, last: int) -> Array:
+    """The links of a robot that begin at its keyframes from `first` to before `last`."""
+    robots = len(problem.priors.scale)
+    k = problem.odometry.i // robots
+    return np.flatnonzero((problem.odometry.robot == robot) & (k >= first) & (k < last))
+
+
+def mismeasured(
+    problem: Problem, links: Array, measured: Array, sigma: float | None = None
+) -> Problem:
+    """A problem some of whose links of odometry say something else, with so much certainty."""
+    odometry = problem.odometry
+    poses, covariance = odometry.measured.copy(), odometry.covariance.copy()
+    poses[links] = measured
+    if sigma is not None:
+        covariance[links] = sigma**2 * np.eye(3)
+    by_yaw, by_turn = odometry.by_yaw.copy(), odometry.by_turn.copy()
+    by_yaw[links], by_turn[links] = straight_by_yaw(poses[links]), straight_by_turn(poses[links])
+    wrong = replace(odometry, measured=poses, covariance=covariance, by_yaw=by_yaw, by_turn=by_turn)
+    return replace(problem, odometry=wrong)
+
+
+def stuck(problem: Problem, robot: int, first: int, last: int) -> Problem:
+    """Wheels that measure no way for some seconds, and no way has no noise."""
+    return mismeasured(problem, links_of(problem, robot, first, last), np.zeros(3), 5e-4)
+
+
+def slipping(problem: Problem, robot: int, first: int, last: int) -> Problem:
+    """Wheels that turn two and a half times as fast as the robot drives."""
+    links = links_of(problem, robot, first, last)
+    return mismeasured(problem, links, problem.odometry.measured[links] * [2.5, 2.5, 1])
+
+
+def mismounted(
+    problem: Problem,
+    truth: Array,
+    turn: tuple[float, ...] | None = None,
+    antenna: tuple[tuple[float, float], ...] | None = None,
+    turned_sigma: float = 0.0,
+) -> Problem:
+    """Robots whose mountings are not as configured.
 
     Args:
-        robust: ranges, biases and scales by the root of Cauchy's cost; otherwise by the error
-            itself, which Gauss and Newton weigh by `range_weights`.
+        turn: of each robot, by which fraction its turns are longer than its wheels say.
+        antenna: of each robot, where its antenna is beside the place that is said, m.
+        turned_sigma: ranges are measured where robots stand turned against their keyframes, rad.
     """
-    poses, bias, scale, yaw, near_bias = unpacked(problem, x)
-    out: list[float] = []
-    odometry = problem.odometry
-    for m in range(len(odometry)):
-        mx, my, mt = odometry.measured[m]
-        s, b = scale[odometry.robot[m]], yaw[odometry.robot[m]] * odometry.path[m]
-        right = ((1 - s) * mx + b / 2 * my, (1 - s) * my - b / 2 * mx, mt - b)
-        out += whitened(poses[odometry.i[m]], poses[odometry.j[m]], right, odometry.covariance[m])
-    closures = problem.closures
-    for m in range(len(closures)):
-        ends = poses[closures.i[m]], poses[closures.j[m]]
-        out += whitened(*ends, closures.measured[m], closures.covariance[m])
-    r = problem.ranges
+    robots = len(problem.priors.scale)
+    fraction = np.array(turn or (0.0,) * robots)[problem.odometry.robot]
+    by_turn = problem.odometry.by_turn / (1 + fraction[:, None])
+    measured = problem.odometry.measured - fraction[:, None] * by_turn
+    odometry = replace(problem.odometry, measured=measured, by_turn=by_turn)
+    r, beside = problem.ranges, np.array(antenna or ((0.0, 0.0),) * robots)
+    turned = np.random.default_rng(5).normal(0, turned_sigma, r.turned.shape)
+    said, seen, real = [], [], []
     for m in range(len(r)):
-        i, j = (product(poses[k], (*q, 0)) for k, q in ((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m])))
-        wrong = bias[r.pair[m]] + near_bias[0] * math.exp(-r.measured[m] / LINKTRACK.near_reach_m)
-        e = (math.hypot(*(j - i)[:2]) + wrong - r.measured[m]) / r.sigma[m]
-        out.append(cauchy_root(e, LINKTRACK.cauchy_sigmas) if robust else e)
-    for e in np.concatenate([bias / problem.priors.bias, scale / problem.priors.scale]):
-        out.append(cauchy_root(e, 1.0) if robust else e)
-    out += (yaw / problem.priors.yaw).tolist() + (near_bias / problem.priors.near_bias).tolist()
-    out += ((poses[problem.gauge] - problem.initial[problem.gauge]) / GAUGE_SIGMA).tolist()
-    return np.array(out)
-
-
-def cauchy_root(e: float, c: float) -> float:
-    """Whose square is c^2 log(1 + (e / c)^2)."""
-    return math.copysign(c * math.sqrt(math.log1p((e / c) ** 2)), e)
-
-
-def whitened(
-    i: Array, j: Array, measured: Array | tuple[float, ...], covariance: Array
-) -> list[float]:
-    seen = product(inverted(i), j)
-    error = np.array(
-        [*(seen[:2] - np.array(measured[:2])), math.remainder(seen[2] - measured[2], 2 * math.pi)]
+        for end, (k, q) in enumerate(((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m]))):
+            there = (0.0, 0.0, turned[m, end])
+            said.append(product(there, (*q, 0.0))[:2])
+            seen.append(product(truth[k], (*q, 0.0))[:2])
+            place = (*(q + beside[r.robots[m, end]]), 0.0)
+            real.append(product(truth[k], there, place)[:2])
+    q_ends, before, after = (np.reshape(v, (-1, 2, 2)) for v in (said, seen, real))
+    lengths = [np.hypot(*(v[:, 1] - v[:, 0]).T) for v in (before, after)]
+    ranges = replace(
+        r,
+        q_i=q_ends[:, 0],
+        q_j=q_ends[:, 1],
+        turned=turned,
+        measured=r.measured - lengths[0] + lengths[1],
     )
-    return list(np.linalg.solve(np.linalg.cholesky(covariance), error))
+    return replace(problem, odometry=odometry, ranges=ranges)
 
 
-def range_weights(problem: Problem, x: Array) -> Array:
-    """Cauchy's weight of every residual of `residual_vector`; 1 where there is none."""
-    plain = residual_vector(problem, x, robust=False)
-    first = 3 * (len(problem.odometry) + len(problem.closures))
-    weights = np.ones(len(plain))
-    part = slice(first, first + len(problem.ranges))
-    weights[part] = 1 / (1 + (plain[part] / LINKTRACK.cauchy_sigmas) ** 2)
-    loose = len(problem.priors.bias) + len(problem.priors.scale)
-    sensors = slice(part.stop, part.stop + loose)
-    weights[sensors] = 1 / (1 + plain[sensors] ** 2)
-    return weights
-
-
-def jacobian(problem: Problem, x: Array, robust: bool, h: float = 1e-6) -> Array:
-    columns = []
-    for k in range(len(x)):
-        step = np.zeros(len(x))
-        step[k] = h
-        ahead, behind = (residual_vector(problem, x + s, robust) for s in (step, -step))
-        columns.append((ahead - behind) / (2 * h))
-    return np.stack(columns, axis=1)
-
-
-def dense(system: System, layout: BandLayout) -> Array:
-    """The whole matrix of a system in the order of `packed`."""
-    n, b = layout.band, layout.border
-    full = np.zeros((n + b, n + b))
-    for d in range(len(system.band)):
-        below = np.arange(n - d)
-        full[below + d, below] = full[below, below + d] = system.band[d, : n - d]
-    full[:n, n:], full[n:, :n], full[n:, n:] = system.border, system.border.T, system.corner
-    order = np.concatenate(
-        [layout.poses.ravel(), layout.bias, layout.scale, layout.yaw, layout.near_bias]
-    )
-    return np.asarray(full[np.ix_(order, order)])
+def held_at(problem: Problem, truth: Array) -> Problem:
+    """The same, its gauge at the true place, so that solutions can be compared with the truth."""
+    start = problem.initial.copy()
+    start[problem.gauge] = truth[problem.gauge]
+    return replace(problem, initial=start)

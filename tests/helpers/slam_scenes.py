@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.config import Config, parse
-from drslamd.conventions import GRID_US, Chain, Segment
+from drslamd.conventions import Chain, Segment
 from drslamd.slam.graph.measurements import (
     ClosureMeasurement,
     GraphEntry,
@@ -86,7 +86,7 @@ def same_pose(a: Array, b: Array, tolerance: float = 1e-9) -> bool:
     )
 
 
-# ---- paths -------------------------------------------------------------------------------------
+# paths
 
 
 def wander(rng: np.random.Generator, count: int, step_m: float = 0.05) -> Array:
@@ -147,7 +147,7 @@ def curved_window(
     return window_of(a, b, bias, a_antenna, b_antenna, step_s)
 
 
-# ---- items -------------------------------------------------------------------------------------
+# items
 
 
 def keyframes(
@@ -193,7 +193,7 @@ def model_of(
     return RobotModel(noise, *antenna, height)
 
 
-# ---- a small team with a graph -----------------------------------------------------------------
+# a small team with a graph
 
 
 @dataclass
@@ -284,11 +284,9 @@ def driven(rng: np.random.Generator, truth: Array, noise: OdometryNoise) -> Arra
 
 BANDED = BandedOptimizer(bias_sigma=0.30, range_sigma=0.10)
 """As the configuration has it by default."""
-CLOCKS = {0: 0, 1: 1000 * GRID_US, 2: 2000 * GRID_US}
-"""Of `small_team` minus those of its robot 0, us."""
 
 
-def group_of(graph: PoseGraph, shift_us: dict[int, int] | None = None) -> Group:
+def group_of(graph: PoseGraph) -> Group:
     """All first segments of a graph, in the frame of the lowest."""
     members = {Segment(*items.chain, 0) for items in graph.chains.values()}
-    return Group(members, min(members), shift_us or {})
+    return Group(members, min(members))

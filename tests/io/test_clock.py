@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from drslamd.io.clock import MonotonicClock, wall_epoch
+from drslamd.io.clock import MonotonicClock, uptime_s, wall_s
 
 
 def test_the_clock_is_the_kernels_monotonic_one() -> None:
@@ -36,10 +36,16 @@ def test_setting_the_wall_clock_moves_the_clock_by_nothing(
 
 
 @pytest.mark.parametrize(
-    ("ns", "epoch"), [(1_764_000_000_123_999_999, 1_764_000_000_123), (0, 0), (999_999, 0)]
+    ("ns", "seconds"), [(1_764_000_000_999_999_999, 1_764_000_000), (0, 0), (-1, -1)]
 )
-def test_an_epoch_is_the_wall_clock_in_milliseconds(
-    ns: int, epoch: int, monkeypatch: pytest.MonkeyPatch
+def test_the_wall_clock_is_read_in_whole_seconds(
+    ns: int, seconds: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(time, "time_ns", lambda: ns)
-    assert wall_epoch() == epoch
+    assert wall_s() == seconds
+
+
+def test_the_time_since_the_computer_began_is_that_of_the_kernel() -> None:
+    with open("/proc/uptime") as file:
+        seconds = float(file.read().split()[0])
+    assert abs(uptime_s() - seconds) < 5

@@ -38,7 +38,7 @@ def a_transport(url: str) -> tuple[Liblcm, Ear]:
     return Liblcm(section, MonotonicClock(), ear.events.append), ear
 
 
-# ---- what must be installed --------------------------------------------------------------------
+# what must be installed
 
 
 def import_fails(monkeypatch: pytest.MonkeyPatch, error: ImportError) -> None:
@@ -72,7 +72,7 @@ def test_without_the_package_it_is_named(monkeypatch: pytest.MonkeyPatch) -> Non
     ]
 
 
-# ---- the URL -----------------------------------------------------------------------------------
+# the URL
 
 
 def test_the_url_means_the_group_of_the_native_transport() -> None:
@@ -84,7 +84,7 @@ def test_a_url_of_its_own_is_taken_as_it_is() -> None:
     assert default_url(GossipSection(provider="liblcm", url="tcpq://")) == "tcpq://"
 
 
-# ---- without a network -------------------------------------------------------------------------
+# without a network
 
 
 def test_what_is_sent_before_the_start_is_dropped_and_counted() -> None:
@@ -140,7 +140,7 @@ async def test_the_end_of_a_log_that_is_played_is_told_and_nothing_breaks(tmp_pa
     assert ear.states[1].detail.startswith("cannot receive from file://")
 
 
-# ---- on a network, where only a namespace has the route that liblcm wants ----------------------
+# on a network, where only a namespace has the route that liblcm wants
 
 
 @needs_lcm

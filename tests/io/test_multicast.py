@@ -44,7 +44,7 @@ class Deaf:
         raise self._error
 
 
-# ---- talking -----------------------------------------------------------------------------------
+# talking
 
 
 @pytest.mark.parametrize("interface", ["127.0.0.1", "lo"])
@@ -145,7 +145,7 @@ async def test_malformed_datagrams_of_every_length_are_handed_on_to_be_judged() 
     assert [event.data for event in ear.events if isinstance(event, Datagram)] == said
 
 
-# ---- what does not come in, and what does not go out -------------------------------------------
+# what does not come in, and what does not go out
 
 
 @in_a_loop
@@ -178,7 +178,7 @@ def test_the_group_on_an_interface_that_others_joined_is_not_heard() -> None:
     run_in_namespace("the_group_on_an_interface_that_others_joined_is_not_heard")
 
 
-# ---- up and down -------------------------------------------------------------------------------
+# up and down
 
 
 def be_quick(monkeypatch: pytest.MonkeyPatch, echo_s: float = 0.1) -> None:
@@ -340,7 +340,7 @@ def test_in_a_namespace(scenario: str) -> None:
     run_in_namespace(scenario)
 
 
-# ---- under load --------------------------------------------------------------------------------
+# under load
 
 FLOOD = """
 import socket, sys

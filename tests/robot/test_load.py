@@ -23,6 +23,7 @@ def test_a_module_takes_a_fifth_of_a_core_at_most_and_names_its_pace(
     assert (sentence in team.problems(1)) == said
 
 
+@pytest.mark.slow
 def test_on_a_network_that_is_too_slow_poses_wait_and_the_team_still_agrees() -> None:
     """Ten solutions a second and two kilobytes a second for each robot."""
     fast = "[optimizer]\nrate_hz = 10.0\n[relative_pose]\nrate_hz = 5.0\n"

@@ -48,7 +48,7 @@ def first() -> VirtualTeam:
 
 @pytest.mark.slow
 def test_what_was_learned_is_in_the_state_that_an_orderly_stop_keeps(first: VirtualTeam) -> None:
-    state = json.loads(json.dumps(first.member(0).robot.state()["calibration"]))
+    state = json.loads(json.dumps(first.member(0).robot.memory.state()["calibration"]))
     assert is_sound(state)
     kept = SensorCalibration.of_state(state)
     assert kept.scale.value == pytest.approx(SCALE, abs=0.03)
@@ -70,7 +70,7 @@ def test_a_restarted_robot_begins_with_what_it_knew(first: VirtualTeam) -> None:
     assert robot.front.model.noise.scale < 0.05
     assert robot.front.ranges[1].bias_m == kept.bias[1].value
     # so early nothing better is known, and nothing is forgotten
-    assert SensorCalibration.of_state(robot.state()["calibration"]).scale == kept.scale
+    assert SensorCalibration.of_state(robot.memory.state()["calibration"]).scale == kept.scale
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from frames import KOBUKI_REST, kobuki_core, kobuki_packet, ranging_stream
 from message_builders import a_seal, a_status, sealed
-from robot_scenes import RobotScene, notes, saves, sends, status_in
+from robot_scenes import RobotScene, saves, sends, status_in
 from slam_scenes import product, same_pose
 
 from drslamd.conventions import GRID_US, Chain, Segment
@@ -197,6 +197,23 @@ def test_a_pose_is_as_uncertain_as_the_estimate_says() -> None:
     assert np.array_equal(found.covariance, covariance)
 
 
+def test_a_pose_is_the_more_uncertain_the_farther_odometry_went_since() -> None:
+    scene = RobotScene()
+    scene.drive(1)
+    covariance = np.diag([0.04, 0.09, 0.0025])
+    scene.localise(covariance=covariance)
+    traces = []
+    for _ in range(3):
+        found = scene.robot.pose()
+        assert found is not None
+        traces.append(np.trace(found.covariance[:2, :2]))
+        scene.drive(5)
+    assert traces[0] == pytest.approx(0.13)
+    # half a metre a second, whose heading was known to 0.05 rad
+    assert traces[1] > 0.13 + (0.05 * 2.4) ** 2
+    assert traces[2] > traces[1] + (0.05 * 2.4) ** 2
+
+
 def test_a_pose_across_a_hole_in_the_odometry_is_not_known() -> None:
     scene = RobotScene()
     scene.drive(1)
@@ -213,13 +230,16 @@ def test_without_odometry_or_an_estimate_of_us_there_is_no_pose() -> None:
     scene = RobotScene()
     other = Trajectory(Chain(4, 1), np.array([7]), np.zeros((1, 3)))
     own = Trajectory(scene.robot.own, np.array([1001]), np.zeros((1, 3)))
-    covariances = {0: np.eye(3)}
+    joint = np.eye(3)
     assert scene.robot.pose() is None
-    scene.robot.back.on_solution(TeamEstimate(Segment(0, 1, 0), {0: own}, covariances))
+    scene.robot.back.on_solution(TeamEstimate(Segment(0, 1, 0), {0: own}, joint))
     assert scene.robot.pose() is None
     scene.drive(1)
     assert scene.robot.pose() is not None
-    scene.robot.back.on_solution(TeamEstimate(Segment(4, 1, 0), {4: other}, covariances))
+    # an estimate that claims nothing of us
+    scene.robot.back.on_solution(TeamEstimate(Segment(0, 1, 0), {4: other, 0: own}, joint))
+    assert scene.robot.pose() is None
+    scene.robot.back.on_solution(TeamEstimate(Segment(4, 1, 0), {4: other}, joint))
     assert scene.robot.pose() is None
 
 
@@ -260,33 +280,33 @@ def test_a_later_start_goes_on_with_what_was_kept() -> None:
     off = RobotScene(kept=kept, extra="[relative_pose]\nself_calibration = false\n")
     off.drive(1, metres=0.1)
     assert off.robot.front.reckoning.path_m == pytest.approx(10 * 0.1, rel=0.01)
-    assert off.robot.state()["calibration"] == kept.state()
+    assert off.robot.memory.state()["calibration"] == kept.state()
 
 
 def restarts(effects: list[Effect]) -> list[int]:
-    return [effect.epoch for effect in effects if isinstance(effect, Restart)]
+    return [effect.above for effect in effects if isinstance(effect, Restart)]
 
 
-@pytest.mark.parametrize(("known", "begins_at"), [(5, []), (6, [7]), (40, [41])])
-def test_a_robot_that_lost_its_memory_begins_above_what_its_peers_know(
-    known: int, begins_at: list[int]
+@pytest.mark.parametrize(("known", "above"), [(5, []), (6, [6]), (40, [40])])
+def test_a_robot_that_lost_its_memory_begins_above_what_a_peer_says_twice(
+    known: int, above: list[int]
 ) -> None:
     scene = RobotScene(epoch=5)
     scene.hear(4, a_status((Heard(0, known, 0),)))
-    effects = scene.tick()
-    assert restarts(effects) == begins_at
-    superseded = [note for note in notes(effects) if note.event == "epoch.superseded"]
-    assert [note.fields for note in superseded] == [
-        {"epoch": 5, "known_to_peers": known} for _ in begins_at
-    ]
+    assert restarts(scene.tick()) == []
+    scene.later(2)
+    scene.hear(4, a_status((Heard(0, known, 0),)))
+    assert restarts(scene.tick()) == above
 
 
 def test_a_robot_whose_id_is_used_by_another_does_not_begin_again() -> None:
     """Each of the two would drive the other on for ever."""
     scene = RobotScene(epoch=5)
-    scene.hear(0, a_status(), epoch=9)
-    scene.hear(4, a_status((Heard(0, 9, 0),)))
+    for _ in range(2):
+        scene.later(2)
+        scene.hear(0, a_status(), epoch=9)
+        scene.hear(4, a_status((Heard(0, 9, 0),)))
     assert restarts(scene.tick()) == []
     # ten seconds after the other one was heard last
     assert restarts(scene.tick(9)) == []
-    assert restarts(scene.tick(1.5)) == [10]
+    assert restarts(scene.tick(1.5)) == [9]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,11 +12,14 @@ from robot_scenes import RobotScene, sends, solves
 
 from drslamd.conventions import GRID_US, Chain, Segment
 from drslamd.events import Effect, JobDone, Solve
+from drslamd.gossip import messages
 from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, Job
 from drslamd.slam.front_end import WindowJob
 from drslamd.slam.graph.estimate import Learned, Lifted, TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.graph.public_poses import PublicPoses
+
+RBCD = '[optimizer]\nalgorithm = "rbcd"\n'
 
 
 def answered(scene: RobotScene, job: Job, result: object) -> list[Effect]:
@@ -49,7 +53,7 @@ def test_an_answer_of_module_3_is_our_estimate_and_our_pose_goes_out() -> None:
     n = scene.robot.front.reckoning.track.end - 1
     own = Trajectory(scene.robot.own, np.array([n]), np.zeros((1, 3)))
     estimate = TeamEstimate(
-        Segment(0, 1, 0), {0: own}, {0: np.eye(3)}, scale={0: Learned(0.03, 0.01)}
+        Segment(0, 1, 0), {0: own}, joint=np.eye(3), scale={0: Learned(0.03, 0.01)}
     )
     effects = answered(scene, Job(OPTIMIZER), estimate)
     assert scene.robot.back.estimate is estimate
@@ -57,12 +61,53 @@ def test_an_answer_of_module_3_is_our_estimate_and_our_pose_goes_out() -> None:
     assert len(sends(effects, "POSE")) == len(effects) == 1
 
 
+def relaxed(reach: float = 1.0) -> TeamEstimate:
+    """Module 3 with `rbcd` has moved one pose that carries closures."""
+    rows, n = reach * np.ones((1, 4), dtype=complex), np.array([10])
+    lifted = Lifted(n, rows, rows[0], np.zeros(3), n, np.ones((1, 2)), ends=1, quiet=0, gain=0.0)
+    return TeamEstimate(Segment(0, 1, 0), {}, lifted=lifted)
+
+
 def test_public_poses_go_out_where_there_is_a_relaxation() -> None:
     scene = RobotScene()
-    rows = np.ones((1, 4), dtype=complex)
-    lifted = Lifted(np.array([10]), rows, rows[0], np.array([10]))
-    estimate = TeamEstimate(Segment(0, 1, 0), {}, lifted=lifted)
-    assert len(sends(answered(scene, Job(OPTIMIZER), estimate), "PUBLIC")) == 1
+    assert len(sends(answered(scene, Job(OPTIMIZER), relaxed()), "PUBLIC")) == 1
+    # what did not move is not said again
+    assert sends(answered(scene, Job(OPTIMIZER), relaxed()), "PUBLIC") == []
+
+
+def test_poses_that_nobody_would_believe_are_left_unsaid() -> None:
+    scene = RobotScene()
+    assert sends(answered(scene, Job(OPTIMIZER), relaxed(1e7)), "PUBLIC") == []
+
+
+def a_question(move: int, held: int) -> PublicPoses:
+    """Robot 4 waits for us."""
+    values, asked = np.zeros((1, 2), dtype=complex), ((0, held),)
+    return PublicPoses(4, 1, 1, (), values, round=move, since=move, asks=True, held=asked)
+
+
+def test_what_a_neighbour_missed_is_said_again_when_it_asks() -> None:
+    scene = RobotScene(extra=RBCD)
+    scene.meet(4)
+    answered(scene, Job(OPTIMIZER), relaxed())
+    (again,) = sends(scene.hear(4, a_question(0, held=0)), "PUBLIC")
+    message = messages.decode("PUBLIC", again.payload)
+    assert isinstance(message, PublicPoses)
+    assert (message.keyframes, message.round, message.since) == ((10,), 1, 0)
+
+
+def test_who_waits_for_its_turn_begins_as_soon_as_a_neighbour_has_moved(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene, begun = RobotScene(extra=RBCD), list[int]()
+    scene.tick()
+    monkeypatch.setattr(scene.robot.back, "begin", lambda *_: begun.append(1))
+    public = PublicPoses(0, 1, 2, (10,), np.ones((2, 4), dtype=complex))
+    scene.hear(4, public)
+    assert begun == []
+    scene.robot.back.exchange.wait(scene.utime)
+    scene.hear(4, replace(public, round=2))
+    assert begun == [1]
 
 
 # our log
@@ -181,17 +226,15 @@ def test_module_3_runs_once_at_a_time_and_rests_too(
     assert bool(solves(scene.tick(1), OPTIMIZER)) is goes_on
 
 
-def test_module_3_is_told_who_lives_what_their_clocks_say_and_their_public_poses(
+def test_module_3_is_told_who_lives_and_whom_we_can_talk_to(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     scene, told = RobotScene(), list[tuple[object, ...]]()
     monkeypatch.setattr(scene.robot.back, "begin", lambda *known: told.append(known))
     scene.meet(4)
     scene.meet(5, hears_us=False)
-    public = PublicPoses(0, 1, 2, (10,), np.ones((2, 4), dtype=complex))
-    scene.hear(4, public)
     assert solves(scene.tick(), OPTIMIZER) == []
-    assert told == [({0, 4}, {4: 0, 5: 0}, {4: public})]
+    assert told == [({0, 4}, {4}, scene.utime)]
 
 
 def test_each_module_runs_at_its_configured_rate(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -51,7 +51,7 @@ def section(toml: str) -> WheelSection:
     return parse(rest + toml).wheels
 
 
-# ---- wheels ------------------------------------------------------------------------------------
+# wheels
 
 
 class Base(NamedTuple):
@@ -253,7 +253,7 @@ def test_a_scale_has_bounds_on_both_sides(scale: str, allowed: bool) -> None:
                 section(toml)
 
 
-# ---- ranges ------------------------------------------------------------------------------------
+# ranges
 
 
 def a_module(uwb_id: int = OWN, max_range_m: float = 120.0) -> LinkTrackInput:

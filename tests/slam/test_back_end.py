@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from slam_scenes import CLOCKS, SmallTeam, closure, config, keyframes, same_pose, small_team, wander
+from slam_scenes import SmallTeam, closure, config, keyframes, same_pose, small_team, wander
 
 from drslamd.conventions import Chain, Segment
 from drslamd.slam.back_end import BackEnd
@@ -48,9 +48,9 @@ def team() -> SmallTeam:
     return small_team(0, count=20)
 
 
-def back_end(team: SmallTeam, robot: int = 0) -> tuple[BackEnd, Asked]:
+def back_end(team: SmallTeam, robot: int = 0, extra: str = "") -> tuple[BackEnd, Asked]:
     """A back end that holds all that the team has said, with an optimiser that takes notes."""
-    back = BackEnd(config(robot), team.chains[robot])
+    back = BackEnd(config(robot, extra), team.chains[robot])
     for origin, entry in team.entries:
         back.insert(origin, entry)
     asked = Asked()
@@ -58,10 +58,8 @@ def back_end(team: SmallTeam, robot: int = 0) -> tuple[BackEnd, Asked]:
     return back, asked
 
 
-def begin(
-    back: BackEnd, present: set[int] = EVERYBODY, public: Mapping[int, PublicPoses] | None = None
-) -> Job | None:
-    return back.begin(present, {1: 7, 2: 9}, public or {})
+def begin(back: BackEnd, present: set[int] = EVERYBODY, utime: int = 0) -> Job | None:
+    return back.begin(present, present, utime)
 
 
 def settled(team: SmallTeam, robot: int = 0) -> tuple[BackEnd, Asked]:
@@ -73,8 +71,29 @@ def settled(team: SmallTeam, robot: int = 0) -> tuple[BackEnd, Asked]:
     return back, asked
 
 
-def lifted_poses(frame: int = 0, epoch: int = 10) -> PublicPoses:
-    return PublicPoses(frame, epoch, 2, (10,), np.zeros((2, 4), dtype=complex))
+RBCD = '[optimizer]\nalgorithm = "rbcd"\n'
+
+
+def public_poses(frame: int = 0, epoch: int = 10, move: int = 1) -> PublicPoses:
+    values = np.ones((2, 4), dtype=complex)
+    return PublicPoses(frame, epoch, 2, (10,), values, round=move)
+
+
+def moved(own: int, carriers: tuple[int, ...] = (10, 30)) -> TeamEstimate:
+    """An answer of the relaxation in the frame of robot 1."""
+    rows = np.arange(12).reshape(3, 4) * (1 + 2j)
+    lifted = Lifted(
+        n=np.array([10, 20, 30]),
+        rows=rows,
+        anchor=np.array([1, 0, 5, 6j]),
+        origin=np.zeros(3),
+        carriers=np.array(carriers, dtype=np.int64),
+        weights=np.ones((len(carriers), 2)),
+        ends=0,
+        quiet=0,
+        gain=0.0,
+    )
+    return TeamEstimate(Segment(1, 11, 0), {}, lifted=lifted)
 
 
 # news
@@ -107,18 +126,37 @@ def test_who_lives_is_news(team: SmallTeam, present: set[int]) -> None:
     assert begin(back, present) is None
 
 
-def test_public_poses_of_a_peer_are_news_each_time_that_they_come(team: SmallTeam) -> None:
-    back, _ = settled(team)
-    one, same = lifted_poses(), lifted_poses()
-    assert one == same
-    for public in ({1: one}, {1: same}, {1: same, 2: one}, {1: same}):
-        assert begin(back, public=public) is not None
-        assert begin(back, public=public) is None
+def test_a_move_of_a_peer_is_news_and_a_turn_that_it_passes_on_is_none(team: SmallTeam) -> None:
+    back, _ = back_end(team, 1, RBCD)
+    back.hear(team.chains[0], public_poses())
+    assert begin(back) is not None
+    assert begin(back) is None
+    back.hear(team.chains[0], public_poses(move=2))
+    assert begin(back) is not None
+    back.hear(team.chains[0], replace(public_poses(move=3).chosen(()), since=2))
+    assert begin(back) is None
 
 
-def test_clocks_are_no_news(team: SmallTeam) -> None:
+def test_other_algorithms_do_not_listen_to_public_poses(team: SmallTeam) -> None:
     back, _ = settled(team)
-    assert back.begin(EVERYBODY, {1: 8, 2: 10}, {}) is None
+    back.hear(team.chains[1], public_poses())
+    assert begin(back) is None
+    assert back.exchange.held() == {}
+
+
+def test_with_turns_a_neighbour_that_lives_is_waited_for(team: SmallTeam) -> None:
+    back, asked = back_end(team, 1, RBCD)
+    assert begin(back) is not None
+    back.on_solution(moved(1), 0)
+    back.hear(team.chains[0], public_poses(move=2))
+    assert begin(back) is None
+    assert back.exchange.is_waiting
+    back.hear(team.chains[2], public_poses(move=2))
+    assert begin(back) is not None
+    back.on_solution(replace(moved(1, (10, 20)), converged=False), 0)
+    # whoever is not there is not waited for
+    assert begin(back, {1}) is not None
+    assert len(asked.groups) == 3
 
 
 @pytest.mark.parametrize("converged", [True, False])
@@ -139,7 +177,6 @@ def test_a_job_is_of_the_group_of_our_current_segment(team: SmallTeam) -> None:
     back, asked = back_end(team, robot=1)
     assert begin(back) is not None
     assert back.group == asked.groups[0].members == FIRST
-    assert asked.groups[0].shift_us == {1: 0, 2: 9}
 
 
 @pytest.mark.parametrize(("present", "frame"), [({0, 1, 2}, 0), ({1, 2}, 1)])
@@ -173,10 +210,11 @@ def test_without_closures_a_robot_is_in_no_group(team: SmallTeam) -> None:
 
 
 def test_public_poses_of_other_frames_are_of_no_use(team: SmallTeam) -> None:
-    back, asked = back_end(team)
-    ours = lifted_poses()
-    others = {1: ours, 2: lifted_poses(frame=1, epoch=11), 3: lifted_poses(epoch=9)}
-    assert begin(back, public=others) is not None
+    back, asked = back_end(team, 0, RBCD)
+    ours = public_poses()
+    back.hear(team.chains[1], ours)
+    back.hear(team.chains[2], public_poses(frame=1, epoch=11))
+    assert begin(back) is not None
     assert dict(asked.public) == {1: ours}
 
 
@@ -187,7 +225,7 @@ def test_the_answer_of_the_default_optimiser_says_where_everybody_was(team: Smal
     back = BackEnd(config(), team.chains[0])
     for origin, entry in team.entries:
         back.insert(origin, entry)
-    run = back.begin(EVERYBODY, CLOCKS, {})
+    run = begin(back)
     assert run is not None
     back.on_solution(run())
     own = back.trajectory(0)
@@ -224,30 +262,37 @@ def test_two_robots_of_a_group_that_hold_the_same_say_the_same_of_it(team: Small
 
 def test_what_is_told_of_a_relaxation_are_our_poses_that_carry_closures(team: SmallTeam) -> None:
     back, _ = back_end(team)
-    rows = np.arange(12).reshape(3, 4) * (1 + 2j)
-    anchor = np.array([1, 0, 5, 6j])
-    lifted = Lifted(np.array([10, 20, 30]), rows, anchor, np.array([10, 30]))
-    back.on_solution(TeamEstimate(Segment(1, 11, 0), {}, lifted=lifted))
-    public = back.public_poses()
-    assert public is not None
-    assert (public.frame, public.frame_epoch, public.rank) == (1, 11, 2)
+    result = moved(0)
+    (public,) = back.on_solution(result)
+    assert (public.frame, public.frame_epoch, public.round) == (1, 11, 1)
     assert public.keyframes == (10, 30)
-    assert np.array_equal(public.values, [anchor, rows[0], rows[2]])
+    assert result.lifted is not None
+    assert np.array_equal(
+        public.of_rank(2).values, [result.lifted.anchor, *result.lifted.rows[::2]]
+    )
 
 
 def test_without_a_relaxation_or_without_carriers_nothing_is_told(team: SmallTeam) -> None:
     back, _ = back_end(team)
-    assert back.public_poses() is None
-    frame, none = Segment(0, 10, 0), np.zeros(0)
-    back.on_solution(TeamEstimate(frame, {}))
-    assert back.public_poses() is None
-    rows = np.zeros((1, 4), dtype=complex)
-    back.on_solution(TeamEstimate(frame, {}, lifted=Lifted(np.array([10]), rows, rows[0], none)))
-    assert back.public_poses() is None
+    assert back.on_solution(TeamEstimate(Segment(0, 10, 0), {})) == []
+    assert back.on_solution(moved(0, ())) == []
 
 
-def test_the_graph_is_thinned_as_it_grows() -> None:
+@pytest.mark.parametrize(("gain", "is_urgent"), [(1.1e-4, True), (0.9e-4, False)])
+def test_a_move_that_brought_much_is_followed_at_once(
+    team: SmallTeam, gain: float, is_urgent: bool
+) -> None:
+    back, _ = back_end(team)
+    assert not back.is_urgent
+    result = moved(0)
+    assert result.lifted is not None
+    back.on_solution(replace(result, lifted=replace(result.lifted, gain=gain)))
+    assert back.is_urgent is is_urgent
+
+
+def test_what_is_solved_is_thinned_and_what_was_said_is_held() -> None:
     back = BackEnd(config(), Chain(0, 10))
     path = wander(np.random.default_rng(1), 900)
     back.insert(Chain(0, 10), GraphEntry(0, keyframes=keyframes(range(0, 9000, 10), path)))
-    assert len(back.graph.chains[0].keyframes) < 600
+    assert len(back.graph.chains[0].keyframes) == 900
+    assert len(back.graph.view.chains[0].keyframes) < 600

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,6 +15,7 @@ from drslamd.conventions import GRID_US, SECOND_US, Chain, Segment
 from drslamd.sensors.samples import Motion, RangeSample
 from drslamd.slam.calibration.sensor_calibration import CHANGED_BIAS_M, SensorCalibration
 from drslamd.slam.closure_method import AGREEMENT, CONFIRM_US
+from drslamd.slam.consistency.pair import PairTracker
 from drslamd.slam.front_end import (
     MAX_UWB_IDS,
     RANGES_FRESH_US,
@@ -22,6 +23,7 @@ from drslamd.slam.front_end import (
 )
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
+from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.relative_pose.estimate import PairNoise, RelativePoseEstimate
 
 UNKNOWN_CLOCK = "clock of the peer not known well enough"
@@ -292,9 +294,10 @@ def test_what_was_learned_before_this_start_is_taken_out_of_motions_and_ranges()
 def believed(scene: FrontScene, windows: int) -> None:
     """So many closures that agree, through module 2."""
     pair = scene.front.pairs[1]
+    pair.search.is_confirmed = True
     for n in range(10, 10 + 10 * windows, 10):
         pair.on_estimate(asked_at(n), estimate_of(scene.seen(n)))
-        ((same, run),) = scene.front.module2(scene.graph)
+        ((same, run),) = scene.front.module2(scene.graph, None)
         assert same is pair
         pair.on_check(run())
 
@@ -319,11 +322,41 @@ def test_module_2_checks_what_waits_and_only_of_the_start_that_the_graph_knows()
     scene = FrontScene()
     scene.drive(5)
     scene.module1()
-    assert scene.front.module2(scene.graph) == []
+    assert scene.front.module2(scene.graph, None) == []
     scene.front.pairs[1].on_estimate(asked_at(10), estimate_of(BESIDE))
     later = GraphEntry(0, keyframes=(Keyframe(10, 0, 0, 0, 0),))
     scene.graph.insert(Chain(1, 2), later)
-    assert scene.front.module2(scene.graph) == []
+    assert scene.front.module2(scene.graph, None) == []
+
+
+@pytest.mark.parametrize("converged", [True, False])
+@pytest.mark.parametrize("algorithm", ["drslamd", "paper"])
+def test_module_2_goes_along_tracks_as_they_should_have_been(
+    algorithm: str, converged: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As module 3 learned it of both robots, where it came to an end; the paper has none of it."""
+    scene = FrontScene(extra=f'[relative_pose]\nalgorithm = "{algorithm}"\n')
+    scene.drive(5)
+    scene.module1()
+    scene.front.pairs[1].on_estimate(asked_at(10), estimate_of(scene.seen(10)))
+    estimate = TeamEstimate(
+        Segment(0, 1, 0),
+        {},
+        scale={0: Learned(0.1, 0.01)},
+        turn={0: Learned(0.4, 0.02)},
+        converged=converged,
+    )
+    seen: list[tuple[Correction, Correction] | None] = []
+    begin = PairTracker.begin_check
+
+    def watched(self: PairTracker, *args: Any) -> Any:
+        seen.append(args[3])
+        return begin(self, *args)
+
+    monkeypatch.setattr(PairTracker, "begin_check", watched)
+    assert len(scene.front.module2(scene.graph, estimate)) == 1
+    learned = Correction(scale=0.1, turn=0.4), Correction()
+    assert seen == [learned if algorithm == "drslamd" and converged else None]
 
 
 def test_a_range_is_sampled_each_second_between_keyframes_of_both() -> None:

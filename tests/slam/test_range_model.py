@@ -42,6 +42,20 @@ def test_ranges_share_a_bias_and_a_slow_part() -> None:
     assert np.allclose(LINKTRACK.covariance(t, FAR, noise), seen, atol=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("period_s", "ratio"), [(0.5, 2.6), (1.0, 1.90), (5.0, 1.10), (100.0, 1.0)]
+)
+def test_many_ranges_are_together_as_much_more_wrong_as_they_share_errors(
+    period_s: float, ratio: float
+) -> None:
+    """The variance of a mean of a thousand over that of as many independent ones."""
+    t = period_s * np.arange(1000)
+    shared = LINKTRACK.correlated_covariance(t, 0.1).mean() / (0.1**2 / 1000)
+    found = LINKTRACK.correlated_ratio(period_s)
+    assert found == pytest.approx(math.sqrt(shared), rel=0.01)
+    assert found == pytest.approx(ratio, rel=0.02)
+
+
 def test_short_ranges_share_a_bias_of_their_own() -> None:
     """As LinkTrack modules were measured: 0.13 m more at 0.5 m, 0.07 m at 1.5 m, none beyond."""
     assert LINKTRACK.near_range_sigma(np.array([0.5, 1.5, 8.0])) == pytest.approx(

@@ -40,7 +40,28 @@ def test_the_configuration_speaks_degrees_and_the_code_radians() -> None:
 
 def test_an_antenna_stands_where_the_configuration_puts_it() -> None:
     text = "antenna_x_m = 0.25\nantenna_y_m = -0.5\nantenna_z_m = 1.5\n"
-    assert robot_model(config(uwb=text), NOISE) == RobotModel(NOISE, 0.25, -0.5, 1.5)
+    model = robot_model(config(uwb=text), NOISE)
+    assert replace(model, half_track_m=0.0) == RobotModel(NOISE, 0.25, -0.5, 1.5)
+
+
+DBC = 'source = "dbc"\ncan.channel = "can0"\ndbc_file = "/etc/base.dbc"\ntrack_m = 0.5\n'
+SIDES = 'measures = "wheel_speeds"\nleft = "A.L"\nright = "A.R"\n'
+TWIST = 'measures = "twist"\nlinear = "A.V"\nangular = "A.W"\n'
+
+
+@pytest.mark.parametrize(
+    ("wheels", "half_track_m"),
+    [
+        ('source = "kobuki"\nport = "/dev/wheels"\ntrack_m = 0.3\n', 0.15),
+        ('source = "agilex"\ncan.channel = "can0"\ntrack_m = 0.5\n', 0.0),
+        (DBC + SIDES, 0.25),
+        (DBC + TWIST, 0.0),
+    ],
+)
+def test_wheels_have_sides_where_they_say_how_far_each_side_went(
+    wheels: str, half_track_m: float
+) -> None:
+    assert robot_model(config(wheels=wheels), NOISE).half_track_m == pytest.approx(half_track_m)
 
 
 def test_windows_are_as_long_as_configured_and_confirmed_by_what_comes_after() -> None:
@@ -82,8 +103,6 @@ def test_the_default_optimiser_gets_the_noise_of_ranges() -> None:
     [
         ({"ranges": OTHER_RANGES}, {"model": OTHER_RANGES}),
         ({"scale_tails": 1.0}, {"scale_tails": 1.0}),
-        ({"has_cauchy_priors": False}, {"has_cauchy_priors": False}),
-        ({"learns_scatter": False}, {"learns_scatter": False}),
     ],
 )
 def test_what_the_laboratory_tunes_reaches_the_optimiser(

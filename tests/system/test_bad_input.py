@@ -14,8 +14,12 @@ import pytest
 from lab.play.emulators import as_heard_at
 from lab.play.real_team import GROUP, RealRobot, RealTeam
 from lab.recordings import world
+from message_builders import a_status, an_entry, forged
 
 from drslamd.gossip import lc02
+from drslamd.gossip.message_types import Heard, LogState, Message, OdometryBatch
+from drslamd.gossip.seal import team_key
+from drslamd.io.state_store import StateStore
 from drslamd.io.status_socket import ask
 
 pytestmark = pytest.mark.slow
@@ -179,6 +183,44 @@ def test_malformed_datagrams_of_every_kind_are_counted_and_nothing_else() -> Non
             assert sum(refused.values()) - sum(before.values()) == len(MALFORMED)
             for fault in lc02.FramingFault:
                 assert refused.get(fault.value, 0) >= 1, fault
+
+    with_daemon(test)
+
+
+LAST_EPOCH = 2**63 - 1
+LIES: dict[str, Message] = {
+    "it heard a later start of this robot": a_status((Heard(0, LAST_EPOCH, 0),)),
+    "it holds a log of a later start": a_status(logs=(LogState(0, LAST_EPOCH, 0, 0, 0),)),
+    "it heard this one at the end of time": a_status((Heard(0, 2**62, 2**62, 2**31 - 1),)),
+    "it has said all that can be said": an_entry(2**31 - 2, 1),
+    "it is at the end of its odometry": OdometryBatch(0, 2**31 - 2, np.zeros((1, 3))),
+}
+"""What a member, or a stranger where there is no key, may say in one datagram."""
+
+
+@pytest.mark.parametrize("epoch", [1, 2**53 + 2**32, LAST_EPOCH])
+def test_no_member_can_end_it_by_what_it_says(epoch: int) -> None:
+    async def test(team: RealTeam, robot: RealRobot) -> None:
+        assert robot.process is not None
+        before = await status(robot)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+            out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+            out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton("127.0.0.1"))
+            for liar, lie in enumerate(LIES.values(), start=3):
+                told = forged(lie, robot=liar, epoch=epoch, counter=7, secret=team_key(None))
+                out.sendto(lc02.encode(1, *told), (GROUP, team.port))
+        await asyncio.sleep(4.0)
+        after = await status(robot)
+        assert after["epoch"] == before["epoch"]
+        judged = sum(after["network"]["refused"].values()) + after["network"]["accepted"]
+        assert judged == len(LIES)
+        assert await robot.stop() == 0
+        store = StateStore(robot.socket.parent, 0)
+        assert store.load()["epoch"] == before["epoch"]
+        assert store.fault == ""
+        await robot.start()
+        await robot.ready()
+        assert (await status(robot))["epoch"] > before["epoch"]
 
     with_daemon(test)
 

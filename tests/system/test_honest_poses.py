@@ -14,23 +14,12 @@ from lab.recordings import world
 from lab.reproduce import team_column
 from lab.reproduce.experiment import Trial
 from lab.reproduce.tally import Tally
+from lab.trust.worlds import CONFIGURED, RECORDED
 
 pytestmark = pytest.mark.slow
 
 SEEDS = range(100, 106)
 LEAST, MOST = 0.7, 1.4
-RECORDED = world.Scene(robots=3, seconds=75.0, odometry_hz=10, range_hz=10)
-"""As wrong as recorded sensors mostly are."""
-CONFIGURED = world.Scene(
-    robots=3,
-    seconds=75.0,
-    odometry_hz=10,
-    range_hz=10,
-    ranges=world.RangeModel(bias=0.30, slow=0.08, white=0.06, burst_share=0.0),
-    odometry=world.OdometryModel(scale=0.10),
-)
-"""Every constant drawn as wide as the configuration allows for: windows have to be honest here,
-because they know nothing else."""
 
 
 def claims(scene: world.Scene) -> Tally:

@@ -46,7 +46,8 @@ def main(arguments: list[str] | None = None) -> int:
         ("lint", [python, "-m", "ruff", "check", "drslamd", "tools", "tests"]),
         ("format", [python, "-m", "ruff", "format", "--check", "drslamd", "tools", "tests"]),
         ("types", [python, "-m", "mypy", "drslamd", "tools/lab", *_test_files()]),
-        ("quick tests", [python, "-m", "pytest", "-q", "-m", "not slow"]),
+        # as many at once as there are cores
+        ("quick tests", [python, "-m", "pytest", "-q", "-n", "auto", "-m", "not slow"]),
     ]
     if not options.quick:
         steps.append(("slow tests", [python, "-m", "pytest", "-q", "-m", "slow"]))

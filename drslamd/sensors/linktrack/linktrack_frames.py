@@ -74,7 +74,7 @@ class Layout(NamedTuple):
     end: int | None = None
 
 
-# ---- rows that several frames share ------------------------------------------------------------
+# rows that several frames share
 
 
 def _id(offset: int) -> tuple[Field, Field]:
@@ -135,7 +135,7 @@ def _user_data(size_at: int) -> Tail:
     return Tail("data", Field("size", size_at, U16), None)
 
 
-# ---- what repeats inside a frame ---------------------------------------------------------------
+# what repeats inside a frame
 
 _TAG_SLOT: Final = Block(
     27,
@@ -158,7 +158,7 @@ _LONG_RANGE: Final = (*_long_id(0), _distance(5), *_signal(8))
 _HEAD: Final = (*_id(4), _local_time(6), _system_time(10), _voltage(18))
 """NODE_FRAME3, NODE_FRAME4 and AOA_NODE_FRAME0 begin alike."""
 
-# ---- one row for each kind of frame ------------------------------------------------------------
+# one row for each kind of frame
 
 LAYOUTS: Final[dict[Kind, Layout]] = {
     Kind.ANCHOR_FRAME0: Layout(

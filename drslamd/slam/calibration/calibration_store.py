@@ -6,15 +6,18 @@ import math
 from collections.abc import Collection
 
 from drslamd.slam.calibration.sensor_calibration import (
+    CHANGED_ANTENNA_M,
     CHANGED_BIAS_M,
     CHANGED_SCALE,
+    CHANGED_TURN,
     CHANGED_YAW,
+    MOST_ANTENNA_M,
     MOST_BIAS_M,
     MOST_SCALE_ERROR,
+    MOST_TURN,
     MOST_YAW_RATE,
     NOTHING,
     UNLEARNED,
-    WIDENED,
     SensorCalibration,
     is_value,
 )
@@ -68,10 +71,28 @@ class CalibrationStore:
         yaw = Learned(used.yaw.value + turned.value, turned.sigma)
         is_better_scale = _is_better(scale, kept.scale, CHANGED_SCALE, MOST_SCALE_ERROR)
         is_better_yaw = _is_better(yaw, kept.yaw, CHANGED_YAW, MOST_YAW_RATE)
+        longer = estimate.turn.get(own, NOTHING)
+        turn = Learned((1 + used.turn.value) * (1 + longer.value) - 1, longer.sigma)
+        antenna = [
+            Learned(before.value + more.value, more.sigma)
+            for before, more in zip(
+                (used.antenna_x, used.antenna_y),
+                estimate.antenna_m.get(own, (NOTHING, NOTHING)),
+                strict=True,
+            )
+        ]
+        is_better_turn = _is_better(turn, kept.turn, CHANGED_TURN, MOST_TURN)
+        places = zip(antenna, (kept.antenna_x, kept.antenna_y), strict=True)
+        is_better_antenna = all(
+            _is_better(now, before, CHANGED_ANTENNA_M, MOST_ANTENNA_M) for now, before in places
+        )
         self.latest = SensorCalibration(
             scale=scale if is_better_scale else latest.scale,
             yaw=yaw if is_better_yaw else latest.yaw,
             bias=biases,
+            turn=turn if is_better_turn else latest.turn,
+            antenna_x=antenna[0] if is_better_antenna else latest.antenna_x,
+            antenna_y=antenna[1] if is_better_antenna else latest.antenna_y,
         )
 
     def on_saved(self) -> None:
@@ -84,14 +105,16 @@ class CalibrationStore:
         return (
             _has_moved(before.scale, now.scale, NEWS_SCALE)
             or _has_moved(before.yaw, now.yaw, NEWS_YAW)
+            or _has_moved(before.turn, now.turn, NEWS_SCALE)
+            or _has_moved(before.antenna_x, now.antenna_x, NEWS_BIAS_M)
+            or _has_moved(before.antenna_y, now.antenna_y, NEWS_BIAS_M)
             or any(_has_moved(before.bias_to(p), b, NEWS_BIAS_M) for p, b in now.bias.items())
         )
 
 
 def _is_better(now: Learned, kept: Learned, change: float, most: float) -> bool:
     """Does this start know more than the one before it did, seen from now?"""
-    widened = math.hypot(WIDENED * kept.sigma, change)
-    return is_value(now, most) and WIDENED * now.sigma < widened
+    return is_value(now, most) and now.sigma < math.hypot(kept.sigma, change)
 
 
 def _has_moved(before: Learned, now: Learned, step: float) -> bool:

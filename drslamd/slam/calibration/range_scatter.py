@@ -19,8 +19,14 @@ import numpy as np
 from drslamd.slam.se2 import Array, Index
 
 PRIOR_RANGES = 20
-"""m: as much as five independent ranges (see `RangeModel.shared`) would say, which leaves
+"""m: as much as five independent ranges would say (see `RangeModel.correlated_ratio`), which leaves
 what was configured uncertain by a third."""
+ROUNDS = 5
+"""Of weighing; each brings the ratio nearer to its end by a factor of three."""
+GAUSSIAN = 1.5
+"""What the weights take off the variance of a normal distribution, for a cut at 2.5 sigmas."""
+LEAST_SCATTER = 0.3
+"""No module is more than three times better than what must be allowed for."""
 PLAIN = 1.05
 """A range with a sigma so many times the smallest of its pair is doubted for reasons of its own,
 being short or blocked, and tells nothing of the others."""
@@ -52,3 +58,25 @@ def scatter_ratios(
     total = np.bincount(pair[plain], squares, pairs)
     count = np.bincount(pair[plain], minlength=pairs)
     return np.asarray(np.sqrt((PRIOR_RANGES + total) / (PRIOR_RANGES + count)))
+
+
+def inlier_scatter(
+    errors: Array, sigmas: Array, pair: Index, *, pairs: int, sigmas_cut: float
+) -> Array:
+    """(pairs,) the same of ranges that are no outliers, over the sigma that each was sent with.
+
+    Weights fall with the square of Cauchy's, so bursts leave no trace; never more than 1, because
+    what is configured must be allowed for.
+
+    Args:
+        sigmas_cut: where Cauchy's weight is a half.
+    """
+    squares = (errors / sigmas) ** 2
+    scatter = np.ones(pairs)
+    for _ in range(ROUNDS):
+        weights = (1 + squares / (sigmas_cut * scatter[pair]) ** 2) ** -2
+        total = np.bincount(pair, GAUSSIAN * weights * squares, pairs)
+        count = np.bincount(pair, weights, pairs)
+        scatter = np.sqrt((PRIOR_RANGES + total) / (PRIOR_RANGES + count))
+        scatter = np.minimum(np.maximum(scatter, LEAST_SCATTER), 1.0)
+    return scatter

@@ -5,11 +5,11 @@ driving do. Module 3 carries the bias of each pair, the near-range bias of the t
 each robot's odometry as unknowns. Here a window is rid of what is known of them, and its noise says
 what is still unknown:
 
-    r' = r - bias - near_bias exp(-r / L)     p' = (1 - scale) p
-    sigma'^-2 = sigma^-2 + (k s sigma_measured)^-2
+    r' = r - bias - near_bias exp(-r / L)     p' = (1 - scale) p     theta' = (1 + turn) theta
+    sigma'^2 = sigma_measured^2 + least^2
 
-k accounts for ranges that share their errors (`RangeModel.shared`), s is how much those of the pair
-scatter (`range_scatter`); nothing falls below what no constant can describe.
+Module 3's sigmas are those of all that it knows, its priors included. Nothing falls below what no
+constant can describe, nor rises above what was believed before.
 """
 
 from __future__ import annotations
@@ -19,10 +19,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from drslamd.slam import se2
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
+from drslamd.slam.odometry.correction import Correction
+from drslamd.slam.odometry.mounting import LEARNED, Repair
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.range_model import RangeNoise
 from drslamd.slam.relative_pose.estimate import PairNoise
+from drslamd.slam.relative_pose.what_if import Case
 from drslamd.slam.relative_pose.window import Window
 from drslamd.slam.se2 import Array
 
@@ -30,47 +34,111 @@ LEAST_SCALE = 0.01
 """Floors and loads change wheels by so much."""
 
 
+class EndCalibration(NamedTuple):
+    """What is known of the sensors of one robot of a pair.
+
+    Attributes:
+        scale: of its odometry, a fraction; turn: by which fraction turns are longer.
+        antenna: (2,) of its antenna beside its place, m.
+    """
+
+    scale: Learned = Learned()
+    turn: float = 0.0
+    antenna: tuple[float, float] = (0.0, 0.0)
+
+    @staticmethod
+    def of(estimate: TeamEstimate, robot: int) -> EndCalibration:
+        x, y = estimate.antenna_m.get(robot, (Learned(), Learned()))
+        return EndCalibration(
+            estimate.scale.get(robot, Learned()),
+            estimate.turn.get(robot, Learned()).value,
+            (x.value, y.value),
+        )
+
+    @staticmethod
+    def repaired(repair: Repair) -> EndCalibration:
+        """Where a search for mistakes has found one that is learned."""
+        if repair.fault not in LEARNED:
+            return EndCalibration()
+        return EndCalibration(Learned(1 - repair.way), repair.turn - 1)
+
+    @property
+    def correction(self) -> Correction:
+        """Of a long way, where wheels are not as configured; a usual scale is noise."""
+        return Correction(scale=self.scale.value, turn=self.turn) if self.turn else Correction()
+
+    def path(self, poses: Array, before: int) -> Array:
+        """(n, 3) poses of a window, seen from its reference time, as they should have been.
+
+        Args:
+            before: how many of them lie before the reference time.
+        """
+        whole = np.insert(poses, before, np.zeros(3), axis=0)
+        better = Correction(scale=self.scale.value, turn=self.turn).path(whole)
+        return np.delete(se2.between(better[before], better), before, axis=0)
+
+
 class PairCalibration(NamedTuple):
     """What is known of one pair's sensors.
 
     Attributes:
         bias: of the pair, m.
-        scale_a, scale_b: of both odometries, fractions.
+        a, b: of both robots.
         scatter: of the pair's ranges over the configured sigma, see `range_scatter`.
         near_bias: of the team, m at range 0, see `RangeModel.near_range_shape`.
     """
 
     bias: Learned = Learned()
-    scale_a: Learned = Learned()
-    scale_b: Learned = Learned()
+    a: EndCalibration = EndCalibration()
+    b: EndCalibration = EndCalibration()
     scatter: float = 1.0
     near_bias: Learned = Learned()
 
     @staticmethod
-    def of(estimate: TeamEstimate | None, a: int, b: int) -> PairCalibration:
-        """Of robots a and b, as the team's last solution has them, if it is one."""
+    def of(
+        estimate: TeamEstimate | None, a: int, b: int, found: Case | None = None
+    ) -> PairCalibration:
+        """Of robots a and b, as the team's last solution has them, if it is one.
+
+        Args:
+            found: what a search for mistakes found; it serves until module 3 has learned more.
+        """
+        if found is not None and not has_learned(estimate, (a, b), found):
+            a_end, b_end = (EndCalibration.repaired(repair) for repair in found)
+            return PairCalibration(a=a_end, b=b_end)
         if estimate is None or not estimate.converged:
             return PairCalibration()
         pair = (min(a, b), max(a, b))
         return PairCalibration(
             estimate.bias_m.get(pair, Learned()),
-            estimate.scale.get(a, Learned()),
-            estimate.scale.get(b, Learned()),
+            EndCalibration.of(estimate, a),
+            EndCalibration.of(estimate, b),
             estimate.scatter.get(pair, 1.0),
             estimate.near_bias_m,
         )
 
 
-def remaining(learned: Learned, before: float, least: float, widened: float) -> float:
+def has_learned(estimate: TeamEstimate | None, robots: tuple[int, int], found: Case) -> bool:
+    """Has module 3 gone most of the way to what was found?"""
+    if estimate is None or not estimate.converged:
+        return False
+    for robot, repair in zip(robots, found, strict=True):
+        start = EndCalibration.repaired(repair)
+        scale = estimate.scale.get(robot, Learned()).value
+        turn = estimate.turn.get(robot, Learned()).value
+        if abs(start.scale.value - scale) > abs(scale) or abs(start.turn - turn) > abs(turn):
+            return False
+    return True
+
+
+def remaining(learned: Learned, before: float, least: float) -> float:
     """Sigma of what is left of a constant when its learned value is taken out.
 
     Args:
         before: its sigma before anything was measured.
         least: what no constant can describe.
-        widened: how many times the learned sigma it is really as wrong by.
     """
-    spread = float(np.hypot(widened * learned.sigma, least))
-    return float((before**-2.0 + spread**-2.0) ** -0.5)
+    return float(min(before, np.hypot(learned.sigma, least)))
 
 
 def calibrated_window(
@@ -82,23 +150,19 @@ def calibrated_window(
     better = replace(
         window,
         ranges=window.ranges - known.bias.value - near,
-        a_poses=_scaled(window.a_poses, known.scale_a),
-        b_poses=_scaled(window.b_poses, known.scale_b),
+        a_poses=known.a.path(window.a_poses, window.before),
+        b_poses=known.b.path(window.b_poses, window.before),
+        a_antenna=window.a_antenna + known.a.antenna,
+        b_antenna=window.b_antenna + known.b.antenna,
     )
-    widened = model.shared * known.scatter
-    bias = remaining(known.bias, noise.ranges.bias_sigma, model.least_bias_m, widened)
+    bias = remaining(known.bias, noise.ranges.bias_sigma, model.least_bias_m)
     return better, PairNoise(
         RangeNoise(noise.ranges.sigma, bias, known.scatter),
-        _narrowed(noise.a, known.scale_a, widened),
-        _narrowed(noise.b, known.scale_b, widened),
+        _narrowed(noise.a, known.a.scale),
+        _narrowed(noise.b, known.b.scale),
         model,
     )
 
 
-def _scaled(poses: Array, scale: Learned) -> Array:
-    return np.asarray(poses * [1 - scale.value, 1 - scale.value, 1.0])
-
-
-def _narrowed(noise: OdometryNoise, scale: Learned, widened: float) -> OdometryNoise:
-    """As if the ranges of this pair alone had taught the scale, which those of all pairs did."""
-    return replace(noise, scale=remaining(scale, noise.scale, LEAST_SCALE, widened))
+def _narrowed(noise: OdometryNoise, scale: Learned) -> OdometryNoise:
+    return replace(noise, scale=remaining(scale, noise.scale, LEAST_SCALE))

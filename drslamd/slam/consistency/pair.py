@@ -18,20 +18,27 @@ from drslamd.slam import se2
 from drslamd.slam.consistency.pcm import Candidate, PairConsistency
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import ClosureMeasurement
+from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.relative_pose.estimate import RelativePoseEstimate
+from drslamd.slam.relative_pose.mounting_search import MOVED_M, MountingSearch, is_learned
 from drslamd.slam.relative_pose.pair_end import at_keyframes
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 from drslamd.slam.relative_pose.range_sampler import RangeSampler
 from drslamd.slam.relative_pose.window_request import WindowRequest
 from drslamd.slam.se2 import Array
 
+FEWEST_KEPT = 2
+"""Closures that agree before it is asked whether the pair is mounted as configured."""
 PENDING = 8
 """Estimates that wait for module 2, which runs as often as module 1 by default."""
 HISTORY = 2_000
 """Answers of module 1 that can be asked for: half an hour at one a second, 1 MB."""
 TELL_EVERY = 100
 """Grid samples between closures that are sent when the graph's edges are the ranges."""
+UNCORRECTED = (Correction(), Correction())
+ANOTHER_WAY = 0.03
+"""Of scale or turn: corrections that differ by more lead to ways that do not agree."""
 SHRINK = 1e-4
 """Of correlations, before rounding: far above a rounding of 6e-8, far below what anyone knows."""
 
@@ -43,10 +50,12 @@ class Agreement:
     Attributes:
         least: so many closures must agree.
         outnumber: and be so many times the largest set that contradicts them; 0 asks for nothing.
+        confirms: and must windows exclude that wheels run backwards?
     """
 
     least: int
     outnumber: int
+    confirms: bool
 
 
 @dataclass(frozen=True)
@@ -87,6 +96,7 @@ class PairTracker:
         kept: closures of the consistent set, as module 2 last left it.
         agreement: when they are believed.
         connected: are they?
+        search: for mistakes in the mountings, where windows disagree.
     """
 
     def __init__(
@@ -111,8 +121,11 @@ class PairTracker:
         self.closures_seen = 0
         self.kept: tuple[ClosureMeasurement, ...] = ()
         self.connected = False
+        self.search = MountingSearch()
         self._checked: Checked | None = None
         self._is_busy = False
+        self._is_obsolete = False
+        self._corrections = UNCORRECTED
         self._segments: tuple[Segment, Segment] | None = None
         self._pending: deque[tuple[int, WindowRequest, RelativePoseEstimate]]
         self._pending = deque(maxlen=PENDING)
@@ -120,7 +133,7 @@ class PairTracker:
         self._kept_before: set[int] = set()
         self._number = 0
 
-    # ---- module 1 ----
+    # module 1
 
     def count(self, verdict: str) -> None:
         """Remember what became of a window."""
@@ -130,20 +143,55 @@ class PairTracker:
     def on_estimate(self, request: WindowRequest, estimate: RelativePoseEstimate) -> None:
         """Module 1 has answered."""
         self.count(estimate.verdict.value)
+        self.search.on_verdict(estimate.verdict)
         self.history.append(WindowAnswer(self._number, request.utime, estimate))
         if estimate.hypotheses:
             self.closures_seen += 1
             self._pending.append((self._number, request, estimate))
             self._number += 1
 
-    # ---- module 2 ----
+    @property
+    def is_refused(self) -> bool:
+        """Is a robot of the pair wired so that nothing of the pair can be believed?"""
+        found = self.search.found
+        return found is not None and not is_learned(found)
+
+    @property
+    def awaits_confirmation(self) -> bool:
+        """Would it be connected if it was known to be mounted as configured?"""
+        return len(self.kept) >= FEWEST_KEPT and not self.connected
+
+    def on_costs(self, request: WindowRequest, costs: Array, way_m: float) -> None:
+        """A search for mistakes has answered.
+
+        Args:
+            way_m: how far the robot drove that drove less.
+        """
+        if self.search.on_costs(costs, len(request.window), way_m > MOVED_M):
+            # what was found with odometry as configured is worth nothing
+            self._pending.clear()
+            self._checked, self.connected, self.kept = None, False, ()
+            self._is_obsolete = self._is_busy
+
+    # module 2
 
     def begin_check(
-        self, own: ChainData, peer: ChainData, noise: OdometryNoise
+        self,
+        own: ChainData,
+        peer: ChainData,
+        noise: OdometryNoise,
+        known: tuple[Correction, Correction] | None = None,
     ) -> Callable[[], Checked] | None:
-        """Module 2 on what came in since; the pair's set belongs to the job until `on_check`."""
+        """Module 2 on what came in since; the pair's set belongs to the job until `on_check`.
+
+        Args:
+            known: of our odometry and the peer's; what was known before where nothing is said.
+        """
         if self._is_busy:
             return None
+        if known is not None and _differ(known, self._corrections):
+            self._corrections = known
+            self._begin_anew()
         work: list[tuple[Candidate, ClosureMeasurement]] = []
         while self._pending:
             number, request, estimate = self._pending.popleft()
@@ -153,9 +201,8 @@ class PairTracker:
             )
             if segments != self._segments:
                 # odometry broke: what was kept stays in the graph, a new set begins
-                self._kept_before = self.accepted() if self.connected else self._kept_before
-                self._segments, self._checked, work = segments, None, []
-                self.connected, self.kept = False, ()
+                self._segments, work = segments, []
+                self._begin_anew()
             work += self._candidates(number, request, estimate, own, peer)
         if not work or self._segments is None:
             return None
@@ -167,6 +214,11 @@ class PairTracker:
             checked.renew_sums(own, peer)
         self._is_busy, self._checked = True, None
         return partial(extended, checked, work)
+
+    def _begin_anew(self) -> None:
+        """What is kept now stays in the graph, a new set begins."""
+        self._kept_before = self.accepted() if self.connected else self._kept_before
+        self._checked, self.connected, self.kept = None, False, ()
 
     def _candidates(
         self,
@@ -181,6 +233,11 @@ class PairTracker:
         b, b_there = peer.keyframes.find(np.array([float(request.b.n)]))
         if not (a_there[0] and b_there[0]):
             return []
+        a_pose, b_pose = (
+            correction.path(data.keyframes.poses[: row[0] + 1])[-1]
+            for correction, data, row in zip(self._corrections, (own, peer), (a, b), strict=True)
+        )
+        scales, turns = zip(*((c.scale, c.turn) for c in self._corrections), strict=True)
         out = []
         for hypothesis in estimate.hypotheses:
             pose, covariance = at_keyframes(
@@ -195,13 +252,14 @@ class PairTracker:
                 b_n=request.b.n,
                 a_T_b=(x, y, theta),
                 covariance=se2.packed(sendable(covariance)),
+                corrected=(scales[0], turns[0], scales[1], turns[1]),
             )
             candidate = Candidate(
                 closure=number,
                 a_T_b=pose,
                 covariance=covariance,
-                a_pose=own.keyframes.poses[a[0]],
-                b_pose=peer.keyframes.poses[b[0]],
+                a_pose=a_pose,
+                b_pose=b_pose,
                 a_sums=own.sums[a[0]],
                 b_sums=peer.sums[b[0]],
             )
@@ -211,13 +269,18 @@ class PairTracker:
     def on_check(self, checked: Checked) -> None:
         """Module 2 has answered: is the pair connected now?"""
         self._is_busy = False
+        if self._is_obsolete:
+            self._is_obsolete = False
+            return
         self._checked, self.kept = checked, checked.kept()
         enough = len(self.kept) >= self.agreement.least
         if self.connected and enough:
             return
         # the rivals are searched last: that takes a while
         rivals = self.agreement.outnumber and checked.consistency.rivals()
-        self.connected = enough and len(self.kept) >= self.agreement.outnumber * rivals
+        outnumbers = len(self.kept) >= self.agreement.outnumber * rivals
+        is_sure = self.search.is_confirmed or not self.agreement.confirms
+        self.connected = enough and outnumbers and is_sure and not self.search.disagrees
 
     def accepted(self) -> set[int]:
         """Numbers of all closures that are kept, of earlier segments too, back to `history`."""
@@ -225,7 +288,7 @@ class PairTracker:
         now = {m.number for m in self.kept}
         return {number for number in self._kept_before | now if number >= oldest}
 
-    # ---- what the team hears ----
+    # what the team hears
 
     def tell(self, every: bool) -> list[ClosureMeasurement]:
         """Take what the team must hear: closures that are now kept, those that no longer are.
@@ -236,7 +299,8 @@ class PairTracker:
         """
         if self._checked is None:
             return []
-        kept = {m.number: m for m in self.kept} if self.connected else {}
+        believed = self.connected and not self.is_refused
+        kept = {m.number: m for m in self.kept} if believed else {}
         remembered = min((m.number for m in self._checked.measurements), default=0)
         gone = [
             replace(m, kept=False)
@@ -258,6 +322,11 @@ class PairTracker:
                 self._told[number] = m
                 recent = max(recent, m.a_n)
         return gone + new
+
+
+def _differ(one: tuple[Correction, Correction], other: tuple[Correction, Correction]) -> bool:
+    apart = np.array(one) - np.array(other)
+    return bool(np.abs(apart).max() > ANOTHER_WAY)
 
 
 def sendable(covariance: Array) -> Array:

@@ -5,7 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+import numpy as np
+
 from drslamd.conventions import Chain, Segment
+from drslamd.slam import se2
+from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.se2 import Array
 
 
@@ -24,18 +28,28 @@ class Lifted:
 
     Attributes:
         n: (k,) its keyframes; rows: (k, 2 r) their lifted poses.
-        anchor: (2 r,) lifted pose that is the origin of the team's frame.
+        anchor: (2 r,) the lifted pose that anchors the frame of the team; origin: (3,) where in
+            that frame it is.
         carriers: (m,) keyframes that carry closures and are therefore public.
+        weights: (m, 2) how stiffly closures hold rotation and position of these, 1 and 1/m^2.
+        ends: how many closures were counted.
+        quiet: how many moves were made on the very same keyframes and closures.
+        gain: share of its cost that the last move brought, or would have.
     """
 
     n: Array
     rows: Array
     anchor: Array
+    origin: Array
     carriers: Array
+    weights: Array
+    ends: int
+    quiet: int
+    gain: float
 
 
 class Learned(NamedTuple):
-    """A constant of a sensor, and the sigma of what was measured of it (infinite of nothing)."""
+    """A constant of a sensor, and its sigma, all that is known counted (infinite: nothing is)."""
 
     value: float = 0.0
     sigma: float = float("inf")
@@ -55,23 +69,77 @@ class TeamEstimate:
 
     Attributes:
         trajectories: by robot.
-        covariances: (3, 3) of each robot's last pose.
+        joint: (3 k, 3 k) covariance of x, y, theta of the last poses of the first k robots in the
+            order of `trajectories`; of the others nothing is claimed.
         bias_m: range bias of each pair, m.
         scale, yaw: of each robot's odometry, fraction and rad/m.
         near_bias_m: of the team, at range 0 (`RangeModel.near_range_shape`).
+        team_bias_m: what the biases of all pairs have in common.
+        turn: by which fraction turns are longer than odometry says; antenna_m: where the antenna is
+            beside its place, x and y; both of robots that are not mounted as configured.
         scatter: how many times the configured sigma the ranges of a pair scatter.
+        odometry_level: how many times the sigma of a robot's odometry is what is configured, of
+            late, as far as it must be feared; 1 where none is named.
+        late_level: likewise, of the last seconds only.
+        contradicted: pairs whose ranges of late do not fit the rest.
+        is_explained: is the model, with what was learned, one of what was measured?
         lifted: state of the relaxation, with `rbcd`.
     """
 
     frame: Segment
     trajectories: dict[int, Trajectory]
-    covariances: dict[int, Array] = field(default_factory=dict)
+    joint: Array = field(default_factory=lambda: np.zeros((0, 0)))
     bias_m: dict[tuple[int, int], Learned] = field(default_factory=dict)
     scale: dict[int, Learned] = field(default_factory=dict)
     yaw: dict[int, Learned] = field(default_factory=dict)
     near_bias_m: Learned = field(default_factory=Learned)
+    team_bias_m: Learned = field(default_factory=Learned)
+    turn: dict[int, Learned] = field(default_factory=dict)
+    antenna_m: dict[int, tuple[Learned, Learned]] = field(default_factory=dict)
     scatter: dict[tuple[int, int], float] = field(default_factory=dict)
+    odometry_level: dict[int, float] = field(default_factory=dict)
+    late_level: dict[int, float] = field(default_factory=dict)
+    contradicted: frozenset[tuple[int, int]] = frozenset()
+    is_explained: bool = True
     cost: float = 0.0
     iterations: int = 0
     converged: bool = True
     lifted: Lifted | None = None
+
+    def covariance(self, robot: int) -> Array | None:
+        """(3, 3) of the last pose of a robot; None where nothing is known of it."""
+        at = self._rows(robot)
+        return None if at is None else np.asarray(self.joint[at, at])
+
+    def joint_of(self, a: int, b: int) -> Array | None:
+        """(6, 6) of the last poses of two robots."""
+        rows = self._rows(a), self._rows(b)
+        if rows[0] is None or rows[1] is None:
+            return None
+        at = np.r_[rows[0], rows[1]]
+        return np.asarray(self.joint[np.ix_(at, at)])
+
+    def relative(self, a: int, b: int) -> tuple[Array, Array] | None:
+        """a_T_b (3,) of the last poses of two robots, and its covariance (3, 3) in frame a."""
+        joint = self.joint_of(a, b)
+        if joint is None:
+            return None
+        w_T_a, w_T_b = (self.trajectories[robot].poses[-1] for robot in (a, b))
+        a_T_b = se2.between(w_T_a, w_T_b)
+        a_T_b[2] = se2.wrap(a_T_b[2])
+        turn = np.eye(3)
+        turn[:2, :2] = se2.rotate(-w_T_a[2], np.eye(2)).T
+        by_a = -turn
+        by_a[0, 2], by_a[1, 2] = a_T_b[1], -a_T_b[0]
+        j = np.hstack([by_a, turn])
+        return a_T_b, j @ joint @ j.T
+
+    def correction(self, robot: int) -> Correction:
+        """Of a robot's odometry."""
+        parts = (self.scale, self.yaw, self.turn)
+        return Correction(*(part.get(robot, Learned()).value for part in parts))
+
+    def _rows(self, robot: int) -> slice | None:
+        robots = list(self.trajectories)
+        at = 3 * robots.index(robot) if robot in robots else len(self.joint)
+        return slice(at, at + 3) if at < len(self.joint) else None

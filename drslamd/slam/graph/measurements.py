@@ -21,7 +21,12 @@ class Keyframe:
 
 @dataclass(frozen=True)
 class RangeMeasurement:
-    """One distance between two keyframes; q is the antenna in their body frames, metres."""
+    """One distance between two keyframes.
+
+    Attributes:
+        q_a, q_b: the antennas in the body frames of the keyframes, m.
+        turn_a, turn_b: how the robots stood turned against their keyframes, rad.
+    """
 
     a_n: int
     peer: Chain
@@ -30,11 +35,18 @@ class RangeMeasurement:
     q_b: tuple[float, float]
     range_m: float
     sigma_m: float
+    turn_a: float = 0.0
+    turn_b: float = 0.0
 
 
 @dataclass(frozen=True)
 class ClosureMeasurement:
-    """One relative pose a_T_b between two keyframes, kept or withdrawn."""
+    """One relative pose a_T_b between two keyframes, kept or withdrawn.
+
+    Attributes:
+        covariance: xx xy xt yy yt tt.
+        corrected: with which scale and turn of a and of b it was found, fractions; 0 as configured.
+    """
 
     number: int
     kept: bool
@@ -43,7 +55,7 @@ class ClosureMeasurement:
     b_n: int
     a_T_b: tuple[float, float, float]
     covariance: tuple[float, ...]
-    """xx xy xt yy yt tt."""
+    corrected: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

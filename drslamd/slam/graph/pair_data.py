@@ -5,15 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from drslamd.conventions import Chain
+from drslamd.slam.graph.clocks import Ahead, ClockDifferences
 from drslamd.slam.graph.measurements import ClosureMeasurement, RangeMeasurement
-from drslamd.slam.graph.tables import RANGE_COLUMNS, KeyedRows, RangeTable
+from drslamd.slam.graph.tables import CLOSURE_COLUMNS, RANGE_COLUMNS, ClosureTable, RangeTable
+from drslamd.slam.graph.timed_rows import TimedRows
 
-MAX_RANGES = 20_000
-"""Of one pair, 1.6 MB; the oldest are forgotten."""
-MAX_CLOSURES = 4_000
-"""Of one pair."""
+MAX_RANGES = 40_000
+"""Of one pair, 3.5 MB: more than one a second for all the time that is held
+(`timed_rows.HELD_BLOCKS`)."""
+MAX_CLOSURES = 40_000
+"""Of one pair, 5.8 MB, likewise; those that were withdrawn are among them, because a withdrawal may
+come before what it withdraws."""
 PER_ENTRY = 4_096
-"""Above the number of ranges that any one entry of a log can hold."""
+"""Above the number of measurements that any one entry of a log can hold."""
 
 FARTHEST_M = 10_000.0
 """No radio of this kind reaches so far."""
@@ -29,35 +33,44 @@ class PairData:
 
     a: Chain
     b: Chain
-    closures: dict[int, tuple[int, ClosureMeasurement]] = field(default_factory=dict)
-    """By number: (seq of the log entry that said so, closure)."""
-    _ranges: KeyedRows = field(default_factory=lambda: KeyedRows(RANGE_COLUMNS, MAX_RANGES))
+    said_ranges: TimedRows = field(
+        default_factory=lambda: TimedRows(RANGE_COLUMNS, identity=2, most=MAX_RANGES)
+    )
+    said_closures: TimedRows = field(
+        default_factory=lambda: TimedRows(CLOSURE_COLUMNS, identity=2, most=MAX_CLOSURES)
+    )
+    _clocks_of_ranges: ClockDifferences = field(default_factory=ClockDifferences)
+    _clocks_of_closures: ClockDifferences = field(default_factory=ClockDifferences)
 
     def add_range(self, seq: int, place: int, r: RangeMeasurement) -> None:
         """A range at some place in the log of its owner."""
         if abs(r.range_m) < FARTHEST_M and r.sigma_m > 0:
-            key = seq * PER_ENTRY + place
-            self._ranges.add(RangeTable.row(key, r.a_n, r.b_n, r.q_a, r.q_b, r.range_m, r.sigma_m))
+            self.said_ranges.add(RangeTable.row(seq * PER_ENTRY + place, r))
 
-    def add_closure(self, seq: int, c: ClosureMeasurement) -> None:
+    def add_closure(self, seq: int, place: int, c: ClosureMeasurement) -> None:
         """A closure, or its withdrawal; of one number the latest word counts."""
-        if self.closures.get(c.number, (-1, c))[0] <= seq and _is_believable(c):
-            self.closures[c.number] = (seq, c)
-            while len(self.closures) > MAX_CLOSURES:
-                del self.closures[min(self.closures)]
+        if _is_believable(c):
+            self.said_closures.add(ClosureTable.row(seq * PER_ENTRY + place, c))
 
     @property
     def ranges(self) -> RangeTable:
         """All of them."""
-        return RangeTable(self._ranges.data)
+        return RangeTable(self.said_ranges.rows)
 
-    def replace_ranges(self, table: RangeTable) -> None:
-        """Let these be all."""
-        self._ranges.replace(table.rows)
+    @property
+    def closures(self) -> ClosureTable:
+        """Those that were not withdrawn."""
+        return ClosureTable(self.said_closures.rows).kept()
 
     def kept_closures(self) -> list[ClosureMeasurement]:
-        """Those that were not withdrawn, by number."""
-        return [c for _, (_, c) in sorted(self.closures.items()) if c.kept]
+        """The same one by one."""
+        return self.closures.measurements(self.b)
+
+    def ahead(self) -> Ahead | None:
+        """How the clocks of the two differ, None where nothing was measured."""
+        self._clocks_of_ranges.take(self.said_ranges, RangeTable.B_N)
+        self._clocks_of_closures.take(self.said_closures, ClosureTable.B_N)
+        return self._clocks_of_ranges.together(self._clocks_of_closures)
 
 
 def _is_believable(c: ClosureMeasurement) -> bool:

@@ -11,26 +11,37 @@ robot may send nonsense, and then only its own trajectory is nonsense.
 
 from __future__ import annotations
 
-from hashlib import blake2b
-
-import numpy as np
-
-from drslamd.conventions import Chain, Segment
+from drslamd.conventions import Chain
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pair_data import PairData
-from drslamd.slam.graph.tables import KeyframeTable
+from drslamd.slam.graph.thinning.graph_view import GraphView, Thinning
+from drslamd.slam.graph.thinning.time_cells import RECENT_S
 
 
 class PoseGraph:
     """All chains and pairs that this robot holds."""
 
-    def __init__(self) -> None:
+    def __init__(self, recent_s: int = RECENT_S) -> None:
+        """
+        Args:
+            recent_s: how long nothing is thinned.
+        """
         self.chains: dict[int, ChainData] = {}
         self.pairs: dict[tuple[int, int], PairData] = {}
+        self._thinning = Thinning(recent_s)
+        self._view: GraphView | None = None
+
+    @property
+    def view(self) -> GraphView:
+        """What module 3 solves: old times thinned, and the same for all who hold the same."""
+        if self._view is None:
+            self._view = self._thinning.view(self.chains, self.usable())
+        return self._view
 
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
         """Take one entry of a robot's log."""
+        self._view = None
         data = self.chains.get(origin.robot)
         if data is not None and origin.epoch < data.chain.epoch:
             return
@@ -45,10 +56,10 @@ class PoseGraph:
             pair = self._pair(origin, r.peer)
             if pair:
                 pair.add_range(entry.seq, place, r)
-        for c in entry.closures:
+        for place, c in enumerate(entry.closures):
             pair = self._pair(origin, c.peer)
             if pair:
-                pair.add_closure(entry.seq, c)
+                pair.add_closure(entry.seq, place, c)
 
     def _pair(self, a: Chain, b: Chain) -> PairData | None:
         """The pair's data; None for a start of b that is already past, and for a pair of one."""
@@ -62,6 +73,7 @@ class PoseGraph:
 
     def forget(self, robot: int) -> None:
         """Drop a robot's chain and what was measured by it."""
+        self._view = None
         self.chains.pop(robot, None)
         for key in [k for k, p in self.pairs.items() if p.a.robot == robot]:
             del self.pairs[key]
@@ -78,21 +90,6 @@ class PoseGraph:
         data = self.chains.get(chain.robot)
         return data is not None and data.chain == chain
 
-    def segment(self, segment: Segment) -> KeyframeTable:
-        """The keyframes of a segment."""
-        keyframes = self.chains[segment.robot].keyframes
-        return keyframes.chosen(keyframes.of_segment(segment.segment))
-
     def digest(self, robots: set[int]) -> int:
         """A number that two robots share when they hold the same graph of these robots."""
-        h = blake2b(digest_size=8)
-        for robot in sorted(robots & set(self.chains)):
-            data = self.chains[robot]
-            h.update(
-                repr(data.chain).encode() + np.ascontiguousarray(data.keyframes.rows).tobytes()
-            )
-        for pair in self.usable():
-            if {pair.a.robot, pair.b.robot} <= robots:
-                h.update(np.ascontiguousarray(pair.ranges.rows[:, 1:]).tobytes())
-                h.update(repr([c.number for c in pair.kept_closures()]).encode())
-        return int.from_bytes(h.digest(), "big", signed=True)
+        return self.view.digest(robots)

@@ -3,48 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drslamd.conventions import Chain
+from drslamd.slam.graph.measurements import ClosureMeasurement, RangeMeasurement
 from drslamd.slam.se2 import Array, Index
-
-WAITING = 1_024
-"""Rows that came in and are not yet sorted into their table."""
-
-
-class KeyedRows:
-    """Rows in the order of their first column, each value of it once, the last `most` of them."""
-
-    def __init__(self, width: int, most: int) -> None:
-        self._sorted = np.empty((0, width))
-        self._new: list[list[float]] = []
-        self._most = most
-
-    def add(self, row: list[float]) -> None:
-        self._new.append(row)
-        if len(self._new) >= WAITING:
-            self._merge()
-
-    @property
-    def data(self) -> Array:
-        """(k, width); the same array until something was added."""
-        if self._new:
-            self._merge()
-        return self._sorted
-
-    def replace(self, rows: Array) -> None:
-        """Let these rows, in order, be all."""
-        self._sorted, self._new = rows, []
-
-    def _merge(self) -> None:
-        rows = np.concatenate([self._sorted, np.array(self._new)])
-        self._new = []
-        if (np.diff(rows[:, 0]) <= 0).any():
-            # of rows with one key the smallest counts, whichever came first
-            rows = rows[np.lexsort(rows.T[::-1])]
-            rows = rows[np.unique(rows[:, 0], return_index=True)[1]]
-        self._sorted = rows[-self._most :]
 
 
 @dataclass(frozen=True)
@@ -56,10 +22,15 @@ class KeyframeTable:
     def __len__(self) -> int:
         return len(self.rows)
 
-    @property
+    @cached_property
     def n(self) -> Index:
         """(k,) samples of the 10 Hz grid."""
         return self.rows[:, 0].astype(np.int64)
+
+    @cached_property
+    def _keys(self) -> Array:
+        """The same as they are searched."""
+        return np.ascontiguousarray(self.rows[:, 0])
 
     @property
     def segment(self) -> Index:
@@ -76,11 +47,15 @@ class KeyframeTable:
 
     def find(self, n: Array) -> tuple[Index, NDArray[np.bool_]]:
         """Positions of keyframes n (m,), and which of them are there."""
-        return positions(self.rows[:, 0], n)
+        return positions(self._keys, n)
 
     def of_segment(self, segment: int) -> slice:
         """Which rows a segment is; empty when it is not there."""
         return slice(*np.searchsorted(self.rows[:, 1], [segment, segment + 1]).tolist())
+
+    def between(self, first: int, end: int) -> slice:
+        """Which rows are those of samples first .. end - 1."""
+        return slice(*np.searchsorted(self._keys, [first, end]).tolist())
 
 
 def positions(ascending: Array, wanted: Array) -> tuple[Index, NDArray[np.bool_]]:
@@ -90,44 +65,46 @@ def positions(ascending: Array, wanted: Array) -> tuple[Index, NDArray[np.bool_]
     return at, there
 
 
-RANGE_COLUMNS = 9
+RANGE_COLUMNS = 11
 """Of `RangeTable`."""
 
 
 @dataclass(frozen=True)
 class RangeTable:
-    """k ranges of one pair in the order of their owner's log, as rows (k, 9):
+    """k ranges of one pair by the keyframe of the owner and the place in its log, as rows
+    (k, 11):
 
-    key, a_n, b_n, q_a (2), q_b (2), range, sigma.
+    a_n, place in the log, b_n, q_a (2), q_b (2), range, sigma, turn_a, turn_b.
     """
 
     rows: Array
+
+    B_N = 2
+    """Column of b_n."""
 
     def __len__(self) -> int:
         return len(self.rows)
 
     @staticmethod
-    def row(
-        key: int,
-        a_n: int,
-        b_n: int,
-        q_a: tuple[float, float],
-        q_b: tuple[float, float],
-        range_m: float,
-        sigma_m: float,
-    ) -> list[float]:
+    def row(place: int, r: RangeMeasurement) -> list[float]:
         """One row."""
-        return [key, a_n, b_n, *q_a, *q_b, range_m, sigma_m]
+        ends = (*r.q_a, *r.q_b)
+        return [r.a_n, place, r.b_n, *ends, r.range_m, r.sigma_m, r.turn_a, r.turn_b]
 
     @property
     def a_n(self) -> Array:
         """(k,) keyframes of the owner."""
+        return self.rows[:, 0]
+
+    @property
+    def place(self) -> Array:
+        """(k,) where the owner's log says so; a number for each range."""
         return self.rows[:, 1]
 
     @property
     def b_n(self) -> Array:
         """(k,) keyframes of the peer."""
-        return self.rows[:, 2]
+        return self.rows[:, self.B_N]
 
     @property
     def q_a(self) -> Array:
@@ -147,9 +124,104 @@ class RangeTable:
     def sigma_m(self) -> Array:
         return self.rows[:, 8]
 
+    @property
+    def turn_a(self) -> Array:
+        """(k,) how the owner stood turned against its keyframe, rad."""
+        return self.rows[:, 9]
+
+    @property
+    def turn_b(self) -> Array:
+        """(k,) how the peer did."""
+        return self.rows[:, 10]
+
     def chosen(self, which: NDArray[np.bool_] | Index) -> RangeTable:
         return RangeTable(self.rows[which])
 
     def copy(self) -> RangeTable:
         """With columns that may be written to."""
         return RangeTable(self.rows.copy())
+
+
+CLOSURE_COLUMNS = 18
+"""Of `ClosureTable`."""
+
+
+@dataclass(frozen=True)
+class ClosureTable:
+    """k closures of one pair by the keyframe of the owner and their number, as rows (k, 18):
+
+    a_n, number, minus the place in the log of the word that counts, kept, b_n, a_T_b (3), xx xy xt
+    yy yt tt, corrected (4).
+    """
+
+    rows: Array
+
+    B_N = 4
+    """Column of b_n."""
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @staticmethod
+    def row(place: int, c: ClosureMeasurement) -> list[float]:
+        """One row; the smallest row of one number is that of the latest word."""
+        ends = c.a_n, c.number, -place, c.kept, c.b_n
+        return [*ends, *c.a_T_b, *c.covariance, *c.corrected]
+
+    @property
+    def a_n(self) -> Array:
+        """(k,) keyframes of the owner."""
+        return self.rows[:, 0]
+
+    @property
+    def number(self) -> Array:
+        """(k,) of the owner's closures."""
+        return self.rows[:, 1]
+
+    @property
+    def b_n(self) -> Array:
+        """(k,) keyframes of the peer."""
+        return self.rows[:, self.B_N]
+
+    @property
+    def a_T_b(self) -> Array:
+        """(k, 3)."""
+        return self.rows[:, 5:8]
+
+    @property
+    def packed(self) -> Array:
+        """(k, 6) covariances as `se2.packed` has them."""
+        return self.rows[:, 8:14]
+
+    @property
+    def corrected(self) -> Array:
+        """(k, 4) with which scale and turn of a and of b they were found."""
+        return self.rows[:, 14:]
+
+    @property
+    def covariance(self) -> Array:
+        """(k, 3, 3) of x, y, theta in the frame of a."""
+        return np.asarray(self.packed[:, [[0, 1, 2], [1, 3, 4], [2, 4, 5]]])
+
+    def kept(self) -> ClosureTable:
+        """Those that were not withdrawn."""
+        return self.chosen(self.rows[:, 3] == 1)
+
+    def chosen(self, which: NDArray[np.bool_] | Index) -> ClosureTable:
+        return ClosureTable(self.rows[which])
+
+    def measurements(self, peer: Chain) -> list[ClosureMeasurement]:
+        """One by one."""
+        return [
+            ClosureMeasurement(
+                number=int(number),
+                kept=bool(kept),
+                a_n=int(a_n),
+                peer=peer,
+                b_n=int(b_n),
+                a_T_b=(x, y, theta),
+                covariance=tuple(rest[:6]),
+                corrected=tuple(rest[6:]),
+            )
+            for a_n, number, _, kept, b_n, x, y, theta, *rest in self.rows.tolist()
+        ]

@@ -8,18 +8,23 @@ and a trajectory that was never placed is placed by its closures.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
 from drslamd.conventions import Segment
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
-from drslamd.slam.graph.measurements import ClosureMeasurement
-from drslamd.slam.graph.pair_data import PairData
 from drslamd.slam.graph.pose_graph import PoseGraph
-from drslamd.slam.graph.tables import KeyframeTable
-from drslamd.slam.se2 import Array
+from drslamd.slam.graph.tables import ClosureTable, KeyframeTable
+from drslamd.slam.odometry.correction import Correction
+from drslamd.slam.se2 import Array, Index
+
+NO_CORRECTIONS: Mapping[int, Correction] = MappingProxyType({})
+"""Everybody is mounted as configured."""
 
 
 @dataclass(frozen=True)
@@ -28,19 +33,17 @@ class Group:
 
     Attributes:
         members: its segments; frame: the one whose odometry frame is the team's.
-        shift_us: clock of each robot minus ours, us.
     """
 
     members: set[Segment]
     frame: Segment
-    shift_us: dict[int, int]
 
 
 def groups(graph: PoseGraph) -> list[set[Segment]]:
     """Sets of segments that closures join; a segment without closure is in none."""
     group_of: dict[Segment, set[Segment]] = {}
-    for a, b in dict.fromkeys((a, b) for _, a, b in joints(graph)):
-        joined = group_of.get(a, {a}) | group_of.get(b, {b})
+    for joint in joints(graph):
+        joined = group_of.get(joint.a, {joint.a}) | group_of.get(joint.b, {joint.b})
         for segment in joined:
             group_of[segment] = joined
     distinct: list[set[Segment]] = []
@@ -50,28 +53,29 @@ def groups(graph: PoseGraph) -> list[set[Segment]]:
     return distinct
 
 
-def joints(graph: PoseGraph) -> list[tuple[ClosureMeasurement, Segment, Segment]]:
-    """Kept closures whose both keyframes are held, with the segments that they join."""
+class Joint(NamedTuple):
+    """Two segments, and the closures that join them."""
+
+    a: Segment
+    b: Segment
+    closures: ClosureTable
+
+
+def joints(graph: PoseGraph) -> list[Joint]:
+    """Segments that are joined by closures whose both keyframes are held."""
     out = []
-    for pair in graph.usable():
-        kept = pair.kept_closures()
-        a = _segments(graph, pair, 0, [c.a_n for c in kept])
-        b = _segments(graph, pair, 1, [c.b_n for c in kept])
-        for closure, one, other in zip(kept, a, b, strict=True):
-            if one is not None and other is not None:
-                out.append((closure, one, other))
+    for pair in graph.view.pairs:
+        a, b = (graph.view.chains[chain.robot].keyframes for chain in (pair.a, pair.b))
+        at_a, _ = a.find(pair.closures.a_n)
+        at_b, _ = b.find(pair.closures.b_n)
+        ends = np.stack([a.segment[at_a], b.segment[at_b]], axis=-1)
+        for one, other in np.unique(ends, axis=0).tolist():
+            these = (ends == (one, other)).all(axis=1)
+            joint = Joint(
+                Segment(*pair.a, one), Segment(*pair.b, other), pair.closures.chosen(these)
+            )
+            out.append(joint)
     return out
-
-
-def _segments(graph: PoseGraph, pair: PairData, end: int, n: list[int]) -> list[Segment | None]:
-    chain = (pair.a, pair.b)[end]
-    keyframes = graph.chains[chain.robot].keyframes
-    at, there = keyframes.find(np.array(n, dtype=float))
-    numbers = keyframes.segment[at] if len(keyframes) else np.zeros(len(n))
-    return [
-        Segment(*chain, int(number)) if held else None
-        for number, held in zip(numbers, there, strict=True)
-    ]
 
 
 def gauge_segment(group: set[Segment], living: set[int]) -> Segment | None:
@@ -79,15 +83,24 @@ def gauge_segment(group: set[Segment], living: set[int]) -> Segment | None:
     return min((s for s in group if s.robot in living), default=None)
 
 
-# ---- where the optimiser starts ----------------------------------------------------------------
+# where the optimiser starts
 
 
-def placed(graph: PoseGraph, group: Group, previous: TeamEstimate | None) -> dict[Segment, Array]:
-    """w_T_k (k, 3) of all keyframes of each member."""
+def placed(
+    graph: PoseGraph,
+    group: Group,
+    previous: TeamEstimate | None,
+    corrections: Mapping[int, Correction] = NO_CORRECTIONS,
+) -> dict[Segment, Array]:
+    """w_T_k (k, 3) of all keyframes of each member.
+
+    Args:
+        corrections: of the odometry of robots that are not mounted as configured.
+    """
     out: dict[Segment, Array] = {}
     known = _in_frame(graph, group.frame, previous)
     for segment in sorted(group.members):
-        keyframes = graph.segment(segment)
+        keyframes = _corrected(graph, segment, corrections)
         trajectory = known.get(segment.robot)
         if trajectory is not None and trajectory.chain == segment.chain:
             there = np.isin(keyframes.n, trajectory.n)
@@ -95,11 +108,26 @@ def placed(graph: PoseGraph, group: Group, previous: TeamEstimate | None) -> dic
                 at = np.searchsorted(trajectory.n, keyframes.n[there])
                 out[segment] = by_odometry(keyframes, keyframes.chosen(there), trajectory.poses[at])
     if group.frame not in out:
-        out = {group.frame: graph.segment(group.frame).poses}
+        out = {group.frame: _corrected(graph, group.frame, corrections).poses}
     while len(out) < len(group.members):
-        segment, anchors, poses = _next_to_place(graph, group.members, out)
-        out[segment] = by_odometry(graph.segment(segment), anchors, poses)
+        segment, n, poses = _next_to_place(graph, group.members, out)
+        keyframes = _corrected(graph, segment, corrections)
+        anchors = keyframes.chosen(np.searchsorted(keyframes.n, n))
+        out[segment] = by_odometry(keyframes, anchors, poses)
     return out
+
+
+def _corrected(
+    graph: PoseGraph, segment: Segment, corrections: Mapping[int, Correction]
+) -> KeyframeTable:
+    """The keyframes of a segment where odometry should have had them."""
+    keyframes = graph.view.segment(segment)
+    correction = corrections.get(segment.robot)
+    if correction is None:
+        return keyframes
+    rows = keyframes.rows.copy()
+    rows[:, 2:] = correction.path(keyframes.poses)
+    return KeyframeTable(rows)
 
 
 def _in_frame(
@@ -113,7 +141,7 @@ def _in_frame(
     old = previous.trajectories.get(frame.robot)
     if old is None or old.chain != frame.chain:
         return {}
-    keyframes = graph.segment(frame)
+    keyframes = graph.view.segment(frame)
     known = keyframes.chosen(np.isin(keyframes.n, old.n))
     if not len(known):
         return {}
@@ -141,23 +169,26 @@ def by_odometry(keyframes: KeyframeTable, anchors: KeyframeTable, w_T_anchor: Ar
 
 def _next_to_place(
     graph: PoseGraph, members: set[Segment], done: dict[Segment, Array]
-) -> tuple[Segment, KeyframeTable, Array]:
-    """The segment that most closures join to what is placed: its anchors and their poses."""
+) -> tuple[Segment, Index, Array]:
+    """The segment that most closures join to what is placed: its anchors (m,), their poses."""
 
     def pose(segment: Segment, n: int) -> Array:
-        return np.asarray(done[segment][np.searchsorted(graph.segment(segment).n, n)])
+        return np.asarray(done[segment][np.searchsorted(graph.view.segment(segment).n, n)])
 
     found: dict[Segment, dict[int, Array]] = {}
-    for closure, a, b in joints(graph):
-        a_T_b = np.array(closure.a_T_b)
-        if a in done and b in members and b not in done:
-            w_T_b = se2.compose(pose(a, closure.a_n), a_T_b)
-            found.setdefault(b, {})[closure.b_n] = w_T_b
-        elif b in done and a in members and a not in done:
-            w_T_a = se2.compose(pose(b, closure.b_n), se2.inverse(a_T_b))
-            found.setdefault(a, {})[closure.a_n] = w_T_a
+    for joint in joints(graph):
+        a, b = joint.a in done, joint.b in done
+        if a == b or not {joint.a, joint.b} <= members:
+            continue
+        new = found.setdefault(joint.b if a else joint.a, {})
+        for a_n, b_n, a_T_b in zip(
+            joint.closures.a_n, joint.closures.b_n, joint.closures.a_T_b, strict=True
+        ):
+            if a:
+                new[int(b_n)] = se2.compose(pose(joint.a, a_n), a_T_b)
+            else:
+                new[int(a_n)] = se2.compose(pose(joint.b, b_n), se2.inverse(a_T_b))
     segment = max(found, key=lambda s: (len(found[s]), s))
-    keyframes, anchors = graph.segment(segment), found[segment]
+    anchors = found[segment]
     n = np.array(sorted(anchors))
-    at = np.searchsorted(keyframes.n, n)
-    return segment, keyframes.chosen(at), np.array([anchors[int(k)] for k in n])
+    return segment, n, np.array([anchors[int(k)] for k in n])

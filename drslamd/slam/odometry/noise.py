@@ -74,11 +74,11 @@ def growth(places: Array) -> Array:
     place = places[..., :2]
     before, after = place[..., :-1, :], place[..., 1:, :]
     sums = np.zeros((*place.shape[:-1], 6))
-    np.cumsum(_integrals(after - before, (after + before) / 2), axis=-2, out=sums[..., 1:, :])
+    np.cumsum(step_sums(after - before, (after + before) / 2), axis=-2, out=sums[..., 1:, :])
     return sums
 
 
-def _integrals(way: Array, middle: Array) -> Array:
+def step_sums(way: Array, middle: Array) -> Array:
     """(..., 6) the terms of `growth` over straight steps `way` (..., 2) about `middle` (..., 2)."""
     x, y = middle[..., 0], middle[..., 1]
     length = np.hypot(way[..., 0], way[..., 1])
@@ -140,13 +140,52 @@ def covariance_between(
     )
 
 
-def link_covariance(noise: OdometryNoise, i_T_j: Array) -> Array:
-    """(m, 3, 3): the same for straight links (m, 3) by themselves, in their frames i.
+def link_covariance(noise: OdometryNoise, i_T_j: Array, sums: Array) -> Array:
+    """(m, 3, 3): the same for links (m, 3) by themselves, in their frames i.
 
     Sums over a whole trajectory would lose the last digits of a short link far from the origin.
+
+    Args:
+        sums: (m, 6) of `growth` over the way that was driven from i to j, in frame i.
     """
-    way = i_T_j[:, :2]
-    return _matrices(twist_covariance(noise, way.T, _integrals(way, way / 2).T))
+    return _matrices(twist_covariance(noise, i_T_j[:, :2].T, sums.T))
+
+
+def seen_from(sums: Array, a_T_b: Array) -> Array:
+    """(m, 6) sums of `growth` over ways in frames b, as frames a have them.
+
+    Args:
+        sums: (m, 6) in b; a_T_b: (m, 3).
+    """
+    s, by, bx, yy, xy, xx = sums[:, 0], sums[:, 1], -sums[:, 2], sums[:, 3], -sums[:, 4], sums[:, 5]
+    x0, y0, theta = a_T_b.T
+    cos, sin = np.cos(theta), np.sin(theta)
+    # turned ...
+    x, y = cos * bx - sin * by, sin * bx + cos * by
+    twice = 2 * cos * sin * xy
+    txx, tyy = cos * cos * xx - twice + sin * sin * yy, sin * sin * xx + twice + cos * cos * yy
+    txy = cos * sin * (xx - yy) + (cos * cos - sin * sin) * xy
+    # ... and moved
+    columns = [
+        s,
+        y + s * y0,
+        -(x + s * x0),
+        tyy + y0 * (2 * y + s * y0),
+        -(txy + x0 * y + y0 * x + s * x0 * y0),
+        txx + x0 * (2 * x + s * x0),
+    ]
+    return np.stack(columns, axis=-1)
+
+
+def by_yaw_rate(sums: Array, end: Array) -> Array:
+    """(m, 3) how a relative pose moves with the constant yaw rate, per rad/m.
+
+    Args:
+        sums: (m, 6) of `growth` over the way from i to j, in frame i.
+        end: (m, 2) where the way, or a point that moves with its end, is in frame i.
+    """
+    s, y, x_neg = sums[:, 0], sums[:, 1], sums[:, 2]
+    return np.stack([y - s * end[:, 1], x_neg + s * end[:, 0], s], axis=-1)
 
 
 def _matrices(rows: Array) -> Array:

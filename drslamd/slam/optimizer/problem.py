@@ -10,13 +10,17 @@ that number. Errors are defined here once, so that every optimiser minimises the
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.slam import range_model, se2
+from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE, BiasPrior, cauchy_curvature
+from drslamd.slam.optimizer.mounting_prior import ANTENNA, TRACK
 from drslamd.slam.range_model import LINKTRACK, RangeModel
 from drslamd.slam.se2 import Array, Index
 
@@ -40,6 +44,18 @@ class BetweenFactors:
         columns = (self.i, self.j, self.measured, self.covariance)
         return BetweenFactors(*(column[which] for column in columns))
 
+    @staticmethod
+    def none() -> BetweenFactors:
+        """Of no poses."""
+        at = np.zeros(0, dtype=np.int64)
+        return BetweenFactors(at, at, np.zeros((0, 3)), np.zeros((0, 3, 3)))
+
+    @staticmethod
+    def joined(parts: Iterable[BetweenFactors]) -> BetweenFactors:
+        """All factors of all parts, at least one."""
+        columns = ((e.i, e.j, e.measured, e.covariance) for e in parts)
+        return BetweenFactors(*(np.concatenate(column) for column in zip(*columns, strict=True)))
+
     @cached_property
     def information(self) -> Array:
         """(m, 3, 3) inverse covariances, positive definite whatever rounding did to them."""
@@ -48,6 +64,10 @@ class BetweenFactors:
         inverse = np.linalg.inv(self.covariance / scale + RIDGE * np.eye(3)) / scale
         return np.asarray((inverse + np.swapaxes(inverse, 1, 2)) / 2)
 
+    def cost(self, errors: Array) -> float:
+        """Of errors (m, 3)."""
+        return float(np.vdot(errors, (self.information @ errors[..., None])[..., 0]))
+
 
 @dataclass(frozen=True)
 class OdometryFactors(BetweenFactors):
@@ -55,11 +75,38 @@ class OdometryFactors(BetweenFactors):
 
     Attributes:
         robot: (m,) the robot whose calibration applies, as the problem numbers them.
-        path: (m,) metres.
+        by_yaw: (m, 3) how `measured` moves with the constant yaw rate, per rad/m, over the way that
+            was driven; its last column is how long that is.
+        by_turn: (m, 3) likewise when turns are longer by a fraction.
     """
 
     robot: Index
-    path: Array
+    by_yaw: Array
+    by_turn: Array
+
+
+@dataclass(frozen=True)
+class CarriedEnds:
+    """Of ranges that odometry brought to other poses, whose ends move with its constants.
+
+    Attributes:
+        rows: (c,) which ranges, ascending.
+        moves: (c, 2, 2, 2) m: how q_i and q_j (second axis) move with the yaw rate (per rad/m) and
+            the scale of that robot (third axis).
+    """
+
+    rows: Index
+    moves: Array
+
+    @staticmethod
+    def none() -> CarriedEnds:
+        return CarriedEnds(np.zeros(0, dtype=np.int64), np.zeros((0, 2, 2, 2)))
+
+    def chosen(self, which: NDArray[np.bool_]) -> CarriedEnds:
+        """Those of the ranges `which` (m,)."""
+        stay = which[self.rows]
+        place = np.cumsum(which) - 1
+        return CarriedEnds(place[self.rows[stay]], self.moves[stay])
 
 
 @dataclass(frozen=True)
@@ -70,6 +117,9 @@ class RangeFactors:
         q_i, q_j: (m, 2) between which points, in the frames of poses i and j, m.
         measured, sigma: (m,) m.
         pair: (m,) the pair of robots whose bias applies, as the problem numbers them.
+        robots: (m, 2) whose poses i and j are, as the problem numbers them.
+        turned: (m, 2) by how much both robots stood turned against those poses, rad.
+        carried: those of them whose points move with the constants of odometry.
     """
 
     i: Index
@@ -79,39 +129,110 @@ class RangeFactors:
     measured: Array
     sigma: Array
     pair: Index
+    robots: Index
+    turned: Array
+    carried: CarriedEnds = field(default_factory=CarriedEnds.none)
 
     def __len__(self) -> int:
         return len(self.i)
 
     def chosen(self, which: NDArray[np.bool_]) -> RangeFactors:
-        columns = (self.i, self.j, self.q_i, self.q_j, self.measured, self.sigma, self.pair)
-        return RangeFactors(*(column[which] for column in columns))
+        return RangeFactors(
+            i=self.i[which],
+            j=self.j[which],
+            q_i=self.q_i[which],
+            q_j=self.q_j[which],
+            measured=self.measured[which],
+            sigma=self.sigma[which],
+            pair=self.pair[which],
+            robots=self.robots[which],
+            turned=self.turned[which],
+            carried=self.carried.chosen(which),
+        )
+
+    @property
+    def is_carried(self) -> NDArray[np.bool_]:
+        """(m,)"""
+        out = np.zeros(len(self), dtype=bool)
+        out[self.carried.rows] = True
+        return out
+
+    def arms(self, calibration: Calibration) -> tuple[Array, Array]:
+        """From the poses to the antennas, x + iy (m,) in the frames of i and j: yaw rate and scale
+        taken out, each antenna where it really is."""
+        ends, carried = np.stack([self.q_i, self.q_j]), self.carried
+        if len(carried.rows):
+            constants = np.stack([calibration.yaw, calibration.scale], axis=-1)
+            of_end = constants[self.robots[carried.rows]]
+            moved = (of_end[..., None] * carried.moves).sum(axis=2)
+            ends[:, carried.rows] -= np.swapaxes(moved, 0, 1)
+        beside = calibration.antenna @ [1, 1j]
+        arm_i, arm_j = ends @ [1, 1j] + (beside[self.robots] * np.exp(1j * self.turned)).T
+        return arm_i, arm_j
 
 
 @dataclass(frozen=True)
 class Priors:
-    """Sigmas of the sensors' constants before anything is measured.
+    """What is believed of the sensors' constants before anything is measured.
 
     Attributes:
-        bias: (pairs,) m, half widths of Cauchy's distribution (or sigmas of Gauss's).
-        scale: (robots,) fraction, likewise.
-        yaw: (robots,) rad/m.
-        near_bias: (1,) m, for the whole team: its modules are of one kind, and the near-range bias
+        bias: of the pairs' range biases.
+        scale: (robots,) sigmas as configured, a fraction.
+        scale_tails: the cost of a scale is Cauchy's, log(1 + (s / width)^2), with a width so many
+            times narrower than that.
+        yaw: (robots,) sigmas, rad/m.
+        near_bias: m, for the whole team: its modules are of one kind, and the near-range bias
             follows the power that is received.
-        has_cauchy_tails: have biases and scales?
     """
 
-    bias: Array
+    bias: BiasPrior
     scale: Array
+    scale_tails: float
     yaw: Array
-    near_bias: Array
-    has_cauchy_tails: bool = True
+    near_bias: float
 
-    def stiffness(self, values: Array, widths: Array) -> Array:
-        """Information that priors of these widths hold values with: the weight of their cost."""
-        if not self.has_cauchy_tails:
-            return np.asarray(widths**-2.0)
-        return np.asarray(1 / (widths**2 * (1 + (values / widths) ** 2)))
+    @property
+    def scale_width(self) -> Array:
+        """(robots,) half widths of Cauchy's cost, a fraction."""
+        return self.scale / self.scale_tails
+
+    def scale_pull(self, scale: Array) -> Array:
+        """(robots,) half the derivative of the cost by scales."""
+        return np.asarray(scale / (self.scale_width**2 + scale**2))
+
+    def scale_curvature(self, scale: Array, least: float = LEAST_CURVATURE) -> Array:
+        """(robots,) half the second derivative, kept positive."""
+        return cauchy_curvature(self.scale_width, scale, least)
+
+    def cost(self, calibration: Calibration) -> float:
+        """Of all that is learned of the sensors."""
+        team = float(calibration.team_bias[0])
+        scale = calibration.scale / self.scale_width
+        gaussian = np.concatenate(
+            [calibration.yaw / self.yaw, calibration.near_bias / self.near_bias]
+        )
+        return (
+            self.bias.cost(calibration.bias - team, team)
+            + float(np.log1p(scale**2).sum())
+            + float(gaussian @ gaussian)
+            + TRACK.cost(calibration.turn[:, None])
+            + ANTENNA.cost(calibration.antenna)
+        )
+
+
+@dataclass(frozen=True)
+class Doubted:
+    """Mountings that are unknowns of a problem: those of track and antenna, (robots,) each."""
+
+    track: NDArray[np.bool_]
+    antenna: NDArray[np.bool_]
+
+    @staticmethod
+    def none(robots: int) -> Doubted:
+        return Doubted(np.zeros(robots, dtype=bool), np.zeros(robots, dtype=bool))
+
+    def any(self) -> bool:
+        return bool(self.track.any() or self.antenna.any())
 
 
 @dataclass(frozen=True)
@@ -122,6 +243,9 @@ class Problem:
         robot, n: (k,) whose keyframe each pose is, and which.
         initial: (k, 3) w_T_k.
         gauge: the pose that is held where `initial` has it.
+        pairs: how many pairs of robots have ranges.
+        range_sigma: of a range, as configured, m.
+        doubted: whose mountings are unknowns; those of the others are as configured.
         model: of its ranges.
     """
 
@@ -129,26 +253,41 @@ class Problem:
     n: Index
     initial: Array
     gauge: int
+    pairs: int
     odometry: OdometryFactors
     closures: BetweenFactors
     ranges: RangeFactors
     priors: Priors
+    doubted: Doubted
+    range_sigma: float = 0.1
     model: RangeModel = LINKTRACK
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What an optimiser learned about the sensors, in the numbering of `Priors`."""
+    """What an optimiser learned about the sensors.
+
+    Attributes:
+        bias: (pairs,) m; team_bias: (1,) what they have in common.
+        scale, yaw: (robots,) fraction and rad/m.
+        near_bias: (1,) m.
+        turn: (robots,) by which fraction turns are longer than odometry says ...
+        antenna: (robots, 2) ... and where the antenna is beside its place, m, where mountings are
+            in doubt.
+    """
 
     bias: Array
     scale: Array
     yaw: Array
     near_bias: Array
+    team_bias: Array
+    turn: Array
+    antenna: Array
 
     @staticmethod
-    def zero(priors: Priors) -> Calibration:
-        sigmas = (priors.bias, priors.scale, priors.yaw, priors.near_bias)
-        return Calibration(*(np.zeros(len(sigma)) for sigma in sigmas))
+    def zero(pairs: int, robots: int) -> Calibration:
+        shapes = (pairs, robots, robots, 1, 1, robots, (robots, 2))
+        return Calibration(*(np.zeros(shape) for shape in shapes))
 
     def plus(self, step: Calibration) -> Calibration:
         return Calibration(
@@ -156,25 +295,10 @@ class Calibration:
             scale=self.scale + step.scale,
             yaw=self.yaw + step.yaw,
             near_bias=self.near_bias + step.near_bias,
+            team_bias=self.team_bias + step.team_bias,
+            turn=self.turn + step.turn,
+            antenna=self.antenna + step.antenna,
         )
-
-
-@dataclass(frozen=True)
-class Solution:
-    """Poses (k, 3) in the order of the problem, and how they were reached.
-
-    Attributes:
-        covariances: marginals (3, 3) of x, y, theta in w, for the poses that were asked for.
-        spread: sigmas of the calibration, priors included, where marginals were asked for.
-    """
-
-    poses: Array
-    calibration: Calibration
-    cost: float
-    iterations: int
-    converged: bool
-    covariances: dict[int, Array] = field(default_factory=dict)
-    spread: Calibration | None = None
 
 
 def pose_errors(poses: Array, factors: BetweenFactors, measured: Array) -> Array:
@@ -185,24 +309,42 @@ def pose_errors(poses: Array, factors: BetweenFactors, measured: Array) -> Array
 
 
 def corrected(odometry: OdometryFactors, calibration: Calibration) -> Array:
-    """(m, 3) odometry with scale and yaw rate taken out; the bend acts over half of the way."""
-    x, y, theta = odometry.measured.T
-    keep = 1 - calibration.scale[odometry.robot]
-    bend = calibration.yaw[odometry.robot] * odometry.path
-    return np.stack([keep * x + bend / 2 * y, keep * y - bend / 2 * x, theta - bend], axis=-1)
+    """(m, 3) odometry with scale, yaw rate and turn taken out."""
+    scale, yaw, turn = (
+        constant[odometry.robot, None]
+        for constant in (calibration.scale, calibration.yaw, calibration.turn)
+    )
+    out = odometry.measured - yaw * odometry.by_yaw + turn * odometry.by_turn
+    out[:, :2] -= scale * odometry.measured[:, :2]
+    return np.asarray(out)
+
+
+class RangeErrors(NamedTuple):
+    """Of m ranges, as complex numbers x + iy.
+
+    Attributes:
+        error: (m,) predicted minus measured, m.
+        direction: (m,) unit line of sight from i to j in w.
+        arm_i, arm_j: (m,) from the poses to the antennas in w.
+    """
+
+    error: Array
+    direction: Array
+    arm_i: Array
+    arm_j: Array
 
 
 def range_errors(
     poses: Array, ranges: RangeFactors, calibration: Calibration, model: RangeModel
-) -> tuple[Array, Array, Array, Array]:
-    """Errors (m,), unit line of sight from i to j in w (m,), and both arms in w (m,); x + iy."""
+) -> RangeErrors:
+    """Of all ranges."""
     arm_i, arm_j = (
-        np.exp(1j * poses[k, 2]) * (q[:, 0] + 1j * q[:, 1])
-        for k, q in ((ranges.i, ranges.q_i), (ranges.j, ranges.q_j))
+        np.exp(1j * poses[k, 2]) * arm
+        for k, arm in zip((ranges.i, ranges.j), ranges.arms(calibration), strict=True)
     )
     place = poses[:, 0] + 1j * poses[:, 1]
     sight = place[ranges.j] + arm_j - place[ranges.i] - arm_i
     error, direction = range_model.residuals(sight, ranges.measured)  # eq. (1)
     error += calibration.bias[ranges.pair]
     error += calibration.near_bias * model.near_range_shape(ranges.measured)
-    return error, direction, arm_i, arm_j
+    return RangeErrors(error, direction, arm_i, arm_j)

@@ -40,8 +40,13 @@ class Refined(NamedTuple):
     e: Array
 
 
-def refine(fit: RangeFit, noise: WindowNoise, centred: Array) -> Refined | None:
-    """Where the noise of the window puts some minima (k, 2); None where it leaves one vague."""
+def refine(
+    fit: RangeFit, noise: WindowNoise, centred: Array, wants_vague: bool = False
+) -> Refined | None:
+    """Where the noise of the window puts some minima (k, 2).
+
+    None where it leaves one vague, unless that is wanted too.
+    """
     x = centred
     made_at: tuple[Array, Array] | None = None
     for n in range(MOST_ITERATIONS):
@@ -56,7 +61,7 @@ def refine(fit: RangeFit, noise: WindowNoise, centred: Array) -> Refined | None:
         step = -(covariance @ normal[:, :3, 4:])[..., 0]
         promise = -(normal[:, 4, :3] * step).sum(axis=1)
         minima = Minima(x, covariance, np.where(sound, normal[:, 4, 4] - promise, np.inf))
-        if n == 0 and fit.is_vague(_as_they_scatter(minima, weighted, noise)):
+        if n == 0 and not wants_vague and fit.is_vague(_as_they_scatter(minima, weighted, noise)):
             return None
         size = np.abs(step).max(axis=1)
         x = stepped(x, step * np.minimum(1.0, LONGEST / (size + 1e-12))[:, None])

@@ -14,6 +14,7 @@ from drslamd.conventions import GRID_US
 from drslamd.slam import se2
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.odometry.track import Track
+from drslamd.slam.robot_model import RobotModel
 from drslamd.slam.se2 import Array
 
 NEAR_US = 1_500_000
@@ -90,12 +91,12 @@ def at_keyframes(a_T_b: Array, covariance: Array, a: Anchor, b: Anchor) -> tuple
     return np.append(moved[:2], se2.wrap(moved[2])), np.asarray(spread)
 
 
-def level(ranges: Array, a: PairEnd, b: PairEnd) -> Array:
+def level(ranges: Array, a: RobotModel, b: RobotModel) -> Array:
     """Ranges (n,) between antennas of different heights, as seen from above.
 
     What is shorter than the difference in height is the fault of a bias and stays as it is.
     """
-    rise = a.data.model.antenna_z_m - b.data.model.antenna_z_m
+    rise = a.antenna_z_m - b.antenna_z_m
     inside = np.maximum(ranges**2 - rise**2, 0.0)
     seen = np.copysign(np.sqrt(inside), ranges)
     return np.asarray(np.where(np.abs(ranges) > abs(rise), seen, ranges))

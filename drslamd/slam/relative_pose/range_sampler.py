@@ -35,9 +35,13 @@ class RangeSampler:
         self._place: Array | None = None
 
     def sample(
-        self, ranges: RangeBuffer, a: PairEnd, b: PairEnd, peer: Chain
+        self, ranges: RangeBuffer, a: PairEnd, b: PairEnd, peer: Chain, is_doubted: bool = False
     ) -> RangeMeasurement | None:
-        """Take one measurement for the graph; None when there is nothing new to say."""
+        """Take one measurement for the graph; None when there is nothing new to say.
+
+        Args:
+            is_doubted: is it doubtful that a robot stands whose odometry says so?
+        """
         last = newest(ranges, a, b)
         if last is None or last - self._utime < EVERY_US:
             return None
@@ -49,13 +53,13 @@ class RangeSampler:
         anchor_a, anchor_b = anchor(a, when), anchor(b, when)
         place = np.concatenate([a.poses(when)[0, :2], b.poses(when)[0, :2]])
         is_still = self._place is not None and np.abs(place - self._place).max() < STILL_M
-        is_early = is_still and last - self._utime < STANDING_US
+        is_early = is_still and not is_doubted and last - self._utime < STANDING_US
         if anchor_a is None or anchor_b is None or is_early:
             return None
         self._utime, self._place = last, place
         q_a = se2.transform(anchor_a.keyframe_T_body, a.data.model.antenna).tolist()
         q_b = se2.transform(anchor_b.keyframe_T_body, b.data.model.antenna).tolist()
-        metres = float(np.median(level(found.range_m, a, b)))
+        metres = float(np.median(level(found.range_m, a.data.model, b.data.model)))
         doubt = float(np.median(found.doubt_m))
         near = self._model.near_range_sigma(metres)
         return RangeMeasurement(
@@ -66,4 +70,6 @@ class RangeSampler:
             q_b=(q_b[0], q_b[1]),
             range_m=metres,
             sigma_m=float(np.hypot(np.hypot(self._sigma_m, near), doubt)),
+            turn_a=float(se2.wrap(anchor_a.keyframe_T_body[2])),
+            turn_b=float(se2.wrap(anchor_b.keyframe_T_body[2])),
         )

@@ -78,14 +78,19 @@ def solve(window: Window, noise: PairNoise, delta: float) -> RelativePoseEstimat
     return RelativePoseEstimate(verdict, hypotheses)
 
 
+def least_chi2(window: Window, noise: PairNoise, delta: float) -> float:
+    """How badly a window fits at its best: 2 log-likelihood, also where it is vague."""
+    fit = RangeFit(window.a_points, window.b_points, window.ranges)
+    descent = _descent(window, fit, noise, delta)
+    descent.run(ITERATIONS)
+    best = descent.minima().centred[:1]
+    refined = refine(fit, _window_noise(window, noise), best, wants_vague=True)
+    return float("inf") if refined is None else float(refined.minima.chi2[0])
+
+
 def _candidates(window: Window, fit: RangeFit, noise: PairNoise, delta: float) -> Array | None:
     """Centred poses (k, 2) of distinct minima; None as soon as it shows that the best is vague."""
-    nearest = np.argsort(np.abs(window.t), kind="stable")[:3]
-    rho = max(0.1, float(np.sort(window.ranges[nearest])[1]))
-    seeds = coarse_search.seeds(
-        window.a_points, window.b_points, window.ranges, rho=rho, delta=delta, most=SEEDS
-    )
-    descent = Descent(fit, fit.centred(seeds), noise.ranges, noise.model)
+    descent = _descent(window, fit, noise, delta)
     descent.run(FIRST_ITERATIONS)
     if fit.is_vague(descent.minima()):
         return None
@@ -96,6 +101,16 @@ def _candidates(window: Window, fit: RangeFit, noise: PairNoise, delta: float) -
         minima = np.concatenate([minima, fit.other_side(minima)])
         minima = minima[_distinct(fit.poses(minima))]
     return minima
+
+
+def _descent(window: Window, fit: RangeFit, noise: PairNoise, delta: float) -> Descent:
+    """From the seeds of the coarse search."""
+    nearest = np.argsort(np.abs(window.t), kind="stable")[:3]
+    rho = max(0.1, float(np.sort(window.ranges[nearest])[1]))
+    seeds = coarse_search.seeds(
+        window.a_points, window.b_points, window.ranges, rho=rho, delta=delta, most=SEEDS
+    )
+    return Descent(fit, fit.centred(seeds), noise.ranges, noise.model)
 
 
 def _window_noise(window: Window, noise: PairNoise) -> WindowNoise:

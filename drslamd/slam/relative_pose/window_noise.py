@@ -8,7 +8,7 @@ window is never worse than a shorter one, because old measurements lose weight b
 What odometry adds up between the reference time and a measurement is a twist, and the nearer of two
 measurements shares all of its twist with the farther one. So the covariance of two residuals is a
 product of one vector of the farther and one of the nearer: the lower triangle of all of it is one
-matrix product of rank ten.
+matrix product of rank fourteen.
 """
 
 from __future__ import annotations
@@ -26,27 +26,33 @@ _MATRIX = [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
 """Where a packed covariance has the elements of its matrix."""
 
 
-def way_twists(paths: Array, noises: Sequence[OdometryNoise], before: int) -> Array:
+def way_twists(
+    poses: Array, noises: Sequence[OdometryNoise], before: int, antenna_sigma: float = 0.0
+) -> Array:
     """What the noise of odometry adds up to between measurements and reference time.
 
     Args:
-        paths: (m, n, 2) body positions of m robots, each in its body frame at the reference time,
-            m; between them, and between them and the origin, the noise arises.
+        poses: (m, n, 3) of m robots, each in its body frame at the reference time; between them,
+            and between them and the origin, the noise arises.
         noises: sigmas of each robot.
         before: how many measurements lie before the reference time.
+        antenna_sigma: how far the point that ranges are measured from may be beside the antenna, m.
 
     Returns:
-        (m, 5, 3, n): covariance (3, 3) of the random part of the twist [x, y, theta], the twist of
-        one sigma of the yaw rate, and that of one sigma of the scale. (A twist is the same from one
-        end to the other as back, but for its sign.)
+        (m, 7, 3, n): covariance (3, 3) of the random part of the twist [x, y, theta], the twist of
+        one sigma of the yaw rate, that of one sigma of the scale, and those of the antenna by x and
+        y. (A twist is the same from one end to the other as back, but for its sign.)
     """
-    m, n = paths.shape[:2]
+    m, n = poses.shape[:2]
+    paths, heading = poses[:, :, :2], poses[:, :, 2]
     track, there = np.zeros((m, n + 1, 2)), np.arange(n)
     there[before:] += 1
     track[:, there] = paths
     sums = growth(track)
     sums = (sums[:, there] - sums[:, before, None]).transpose(0, 2, 1)
-    out = np.zeros((m, 5, 3, n))
+    out = np.zeros((m, 7, 3, n))
+    cos, sin = antenna_sigma * np.cos(heading), antenna_sigma * np.sin(heading)
+    out[:, 5, 0], out[:, 5, 1], out[:, 6, 0], out[:, 6, 1] = cos, sin, -sin, cos
     for robot, noise in enumerate(noises):
         way = sums[robot]
         out[robot, :3] = random_covariance(noise, np.where(way[0] < 0, -way, way))[_MATRIX]
@@ -65,7 +71,7 @@ def odometry_covariance(twist: Array, moment: Array, before: int) -> Array:
     """(k, n, n): what odometry noise does to the residuals; only the lower triangles are meant.
 
     Args:
-        twist: (m, 5, 3, n) `way_twists` of m robots.
+        twist: (m, 7, 3, n) `way_twists` of m robots.
         moment: (k, m, 3, n) `moments` of the antennas along the lines of sight.
         before: how many measurements lie before the reference time.
     """
@@ -104,8 +110,8 @@ class WindowNoise:
         self._t, self._model = window.t, model
         self._excess = ranges.scatter**2 - 1
         self._points = np.stack([_complex(a_points), _complex(b_points)])
-        paths = np.stack([window.a_poses[:, :2], window.b_poses[:, :2]])
-        self._twists = way_twists(paths, (a, b), self._before)
+        poses = np.stack([window.a_poses, window.b_poses])
+        self._twists = way_twists(poses, (a, b), self._before, model.antenna_sigma_m)
 
     def covariance(self, u: Array, heading: Array, weights: Array) -> Array:
         """(k, n, n), of which only the lower triangles are meant.

@@ -69,7 +69,8 @@ def request(
     if anchor_a is None or anchor_b is None:
         return "no keyframe near the window yet"
     seconds = (found.utime - at) / SECOND_US
-    t, distances, _ = binned(seconds, level(found.range_m, a, b), rule.bin_us / SECOND_US)
+    seen = level(found.range_m, a.data.model, b.data.model)
+    t, distances, _ = binned(seconds, seen, rule.bin_us / SECOND_US)
     when = at + t * SECOND_US
     window = Window(
         t=t,

@@ -77,4 +77,4 @@ def test_a_section_in_both_is_wrong_usage(
         main([str(tmp_path), "--without", "nlos", "--config", str(config)])
     assert end.value.code == 2
     assert "[relative_pose]" in capsys.readouterr().err
-    assert main([str(tmp_path), "--without", "cauchy-priors"]) == NO_INPUT
+    assert main([str(tmp_path), "--without", "narrow-priors"]) == NO_INPUT

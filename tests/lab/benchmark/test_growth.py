@@ -7,15 +7,18 @@ import pytest
 from lab.benchmark import growth
 
 
-def test_time_by_hours_is_a_row_for_each_mark_and_their_ratio(
+def test_time_by_hours_is_a_row_for_each_mark_their_ratio_and_what_it_takes_to_go_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(growth, "HOURS", {"1 min": 60, "2 min": 120, "1 h": 120})
     monkeypatch.setattr(growth, "AT_A_MARK", 2)
+    monkeypatch.setattr(growth, "RENEWED_S", 4)
     rows = list(growth.by_hours(quick=True))
-    assert [row.unit for row in rows] == ["ms", "ms", "ms", "ratio"]
+    assert [row.unit for row in rows] == ["ms", "ms", "ms", "ratio", "ms", "ms"]
     assert "186 keyframes" in rows[0].work
-    assert rows[-1].value == pytest.approx(rows[2].value / rows[0].value)
+    assert "372 keyframes" in rows[2].work
+    assert rows[3].value == pytest.approx(rows[2].value / rows[0].value)
+    assert all(0 < row.value < 50 for row in rows[4:])
 
 
 def test_in_a_crowd_nobody_measures_beyond_the_reach_of_the_radio(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pytest
 from lab.benchmark import traffic
 
 
+@pytest.mark.slow
 def test_traffic_is_counted_by_kind_and_is_what_the_robots_sent() -> None:
     kinds, _ = traffic.sent(1, 60.0)
     assert set(kinds) == {"graph", "odometry", "pose", "status"}

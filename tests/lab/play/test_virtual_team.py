@@ -11,7 +11,7 @@ from lab.recordings import world
 from lab.score.outcome import Outcome
 from teams import EASY
 
-SECONDS = 25.0
+SECONDS = 35.0
 
 
 @pytest.fixture(scope="module")

@@ -20,13 +20,6 @@ def test_a_claim_counts_on_the_right_side_of_each_threshold() -> None:
         assert tally["x/wild"].mean == wild
 
 
-def test_a_mahalanobis_error_crosses_the_half_turn_and_leaves_its_arguments() -> None:
-    pose, truth = np.array([0.0, 0.0, 3.1]), np.array([0.0, 0.0, -3.1])
-    squared = team_column.mahalanobis(pose, np.eye(3), truth)
-    assert squared == pytest.approx((2 * np.pi - 6.2) ** 2)
-    assert pose[2] == 3.1
-
-
 def test_only_closures_that_name_one_pose_are_held_to_their_claim() -> None:
     trial = experiment.trial(0)
     truth = trial.true_pairs(0, 1)[30]

@@ -62,7 +62,7 @@ def one_frame(uwb: LinkTrackInput, *peers: Peer) -> list[RangeSample]:
     return uwb.feed(node_frame3(OWN, peers, local_ms=1020, system_ms=1037), T0 + 20 * MS)
 
 
-# ---- which frames are believed -----------------------------------------------------------------
+# which frames are believed
 
 
 def test_the_first_frame_gives_no_range_the_second_does() -> None:
@@ -153,7 +153,7 @@ def test_ranges_go_on_over_the_wrap_of_both_clocks() -> None:
     assert [s.utime for s in samples] == [T0 + k * 20 * MS for k in range(1, 10)]
 
 
-# ---- which ranges are believed -----------------------------------------------------------------
+# which ranges are believed
 
 
 @pytest.mark.parametrize(
@@ -193,7 +193,7 @@ def test_the_power_gap_is_received_minus_first_path() -> None:
     assert sample.power_gap_db == 11.0
 
 
-# ---- time --------------------------------------------------------------------------------------
+# time
 
 
 def test_a_range_is_stamped_when_it_was_measured_not_when_it_came() -> None:
@@ -255,7 +255,7 @@ def test_dr_mode1_has_no_system_time(period_ms: int) -> None:
         assert uwb.system_offset_us(T0 + now_ms * MS) is None
 
 
-# ---- bookkeeping -------------------------------------------------------------------------------
+# bookkeeping
 
 
 def test_every_frame_and_every_entry_ends_in_exactly_one_count() -> None:
@@ -349,7 +349,7 @@ def test_counters_have_flat_names() -> None:
     }
 
 
-# ---- noise and damage --------------------------------------------------------------------------
+# noise and damage
 
 
 def outcome(reads: list[bytes]) -> tuple[object, ...]:

@@ -75,7 +75,7 @@ def frame(can_id: int, data: bytes, utime: int = T0, extended: bool = False) -> 
     return CanFrame(utime, can_id, extended, data)
 
 
-# ---- what is measured --------------------------------------------------------------------------
+# what is measured
 
 
 def test_counts_of_one_frame_are_taken_raw() -> None:
@@ -175,7 +175,7 @@ def test_the_node_is_what_stands_outside_the_mask_shifted_down() -> None:
     assert samples == [WheelSpeeds(T0, -0.25, 2.0)]
 
 
-# ---- what cannot be used -----------------------------------------------------------------------
+# what cannot be used
 
 
 def test_other_frames_are_ignored() -> None:

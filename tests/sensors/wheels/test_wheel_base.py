@@ -62,7 +62,7 @@ def total(moved: list[Motion]) -> tuple[float, float]:
     return sum(m.distance_m for m in moved), sum(m.turn_rad for m in moved)
 
 
-# ---- counters ----------------------------------------------------------------------------------
+# counters
 
 
 def test_the_first_sample_starts_a_track_without_a_motion() -> None:
@@ -128,7 +128,7 @@ def test_increments_are_the_same_wherever_a_counter_starts(
     assert len(run(start)) == len(steps)
 
 
-# ---- counters that jump ------------------------------------------------------------------------
+# counters that jump
 
 
 JITTER_MS = STAMP_JITTER_US // MS
@@ -230,7 +230,7 @@ def test_a_16_bit_counter_may_go_around_unseen(silence_ms: int, gap: bool) -> No
     assert base.gaps[Gap.WRAP] == gap
 
 
-# ---- silence -----------------------------------------------------------------------------------
+# silence
 
 
 @pytest.mark.parametrize(
@@ -267,7 +267,7 @@ def test_speeds_are_not_integrated_over_a_silence(silence_us: int, gap: bool) ->
     assert motion.distance_m == (0.0 if gap else 0.5)
 
 
-# ---- speeds, twist and turns -------------------------------------------------------------------
+# speeds, twist and turns
 
 
 def test_speeds_are_integrated_as_trapezoids() -> None:
@@ -313,7 +313,7 @@ def test_another_kind_of_sample_starts_anew() -> None:
     assert base.gaps[Gap.SOURCE] == 1
 
 
-# ---- time and values that make no sense --------------------------------------------------------
+# time and values that make no sense
 
 
 def test_of_counters_with_the_same_stamp_nothing_is_lost() -> None:

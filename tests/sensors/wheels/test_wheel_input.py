@@ -48,7 +48,7 @@ def odometry(utime: int, left: int, right: int) -> CanFrame:
     return CanFrame(utime, 0x311, False, struct.pack(">ii", left, right))
 
 
-# ---- every section -----------------------------------------------------------------------------
+# every section
 
 
 def test_there_is_a_driver_for_every_section_of_the_configuration() -> None:
@@ -113,7 +113,7 @@ def test_a_power_cycle_of_the_base_is_a_gap() -> None:
     assert motion.gap
 
 
-# ---- the wrong kind of input is a mistake of the programmer ------------------------------------
+# the wrong kind of input is a mistake of the programmer
 
 
 def test_a_serial_base_reads_no_can_frames() -> None:
@@ -128,7 +128,7 @@ def test_a_can_base_reads_no_bytes_and_asks_nothing() -> None:
     assert kobuki().poll(T0) == b""
 
 
-# ---- advice and counters -----------------------------------------------------------------------
+# advice and counters
 
 
 def driving(until_ms: int = 1000) -> WheelInput:

@@ -65,8 +65,8 @@ def test_nothing_is_taken_out_where_it_is_not_wanted_but_it_is_still_learned(
 
 
 def test_a_start_that_learns_less_keeps_what_there_was() -> None:
-    widened = math.hypot(2 * 0.03, CHANGED_BIAS_M)
-    less, more = (Learned(0.1, factor * widened / 2) for factor in (1.01, 0.99))
+    kept = math.hypot(0.03, CHANGED_BIAS_M)
+    less, more = (Learned(0.1, factor * kept) for factor in (1.01, 0.99))
     assert after(CalibrationStore(KEPT, True), bias=less) == KEPT
     assert after(CalibrationStore(KEPT, True), bias=more).bias[2].value == pytest.approx(-0.3)
     memory = CalibrationStore(KEPT, True)
@@ -75,8 +75,38 @@ def test_a_start_that_learns_less_keeps_what_there_was() -> None:
 
 
 def test_a_value_that_could_not_be_read_back_is_not_kept() -> None:
-    absurd = after(CalibrationStore(SensorCalibration(), True), scale=Learned(0.6, 0.001))
+    absurd = after(CalibrationStore(SensorCalibration(), True), scale=Learned(1.6, 0.001))
     assert absurd == SensorCalibration(bias={})
+    said = replace(
+        estimate(),
+        turn={5: Learned(1.6, 0.001)},
+        antenna_m={5: (Learned(0.1, 0.001), Learned(2.1, 0.001))},
+    )
+    memory = CalibrationStore(SensorCalibration(), True)
+    memory.update(said, 5, [2])
+    # of an antenna both coordinates are kept, or none
+    assert memory.latest == SensorCalibration(bias={})
+
+
+def test_turns_multiply_and_places_of_an_antenna_add_to_what_was_taken_out() -> None:
+    kept = replace(
+        KEPT,
+        turn=Learned(0.2, 0.02),
+        antenna_x=Learned(0.1, 0.02),
+        antenna_y=Learned(-0.3, 0.02),
+    )
+    memory = CalibrationStore(kept, True)
+    said = replace(
+        estimate(),
+        turn={5: Learned(0.1, 0.01)},
+        antenna_m={5: (Learned(0.05, 0.01), Learned(0.02, 0.01))},
+    )
+    assert not memory.is_news()
+    memory.update(said, 5, [2])
+    assert memory.latest.turn == pytest.approx(Learned(0.32, 0.01))
+    assert memory.latest.antenna_x == pytest.approx(Learned(0.15, 0.01))
+    assert memory.latest.antenna_y == pytest.approx(Learned(-0.28, 0.01))
+    assert memory.is_news()
 
 
 def test_only_pairs_that_we_own_are_kept() -> None:

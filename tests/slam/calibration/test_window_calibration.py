@@ -7,23 +7,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from slam_scenes import NOISE, Array, curved_window, same_pose
+from slam_scenes import NOISE, Array, curved_window, inverted, product, same_pose
 
 from drslamd.conventions import Segment
 from drslamd.slam.calibration.window_calibration import (
     LEAST_SCALE,
+    EndCalibration,
     PairCalibration,
     calibrated_window,
     remaining,
 )
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
+from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.range_model import LINKTRACK, RangeNoise
 from drslamd.slam.relative_pose.estimate import PairNoise
 from drslamd.slam.relative_pose.solver import solve
 from drslamd.slam.relative_pose.window import Window
 
 SENSORS = PairNoise(RangeNoise(0.10, 0.30), NOISE, NOISE)
-KNOWN = PairCalibration(Learned(-0.4, 0.01), Learned(0.15, 0.001), Learned(-0.05, 0.001))
+KNOWN = PairCalibration(
+    Learned(-0.4, 0.01),
+    EndCalibration(Learned(0.15, 0.001)),
+    EndCalibration(Learned(-0.05, 0.001)),
+)
 
 
 def uncalibrated(seed: int) -> tuple[Window, Array]:
@@ -46,6 +52,90 @@ def test_a_calibrated_window_gives_the_exact_pose(seed: int) -> None:
     assert not before or not same_pose(before[0].a_T_b, true, 0.1)
 
 
+def mounted(seed: int, before: int) -> tuple[Window, Window]:
+    """A window of two robots on curves as it should be, and as it is with tracks and antennas that
+    are not as configured; so many measurements lie before its reference time.
+
+    Wheels of a tell two thirds of each turn and those of b one and a quarter of it, in steps so
+    small that their ways are the same.
+    """
+    rng = np.random.default_rng(seed)
+    n, fine = 40, 50
+    right, wrong = [], []
+    for scale, turn in ((1.0, 1.5), (0.8, 0.8)):
+        bends = np.repeat(rng.normal(0, 0.2, n - 1), fine) / fine
+        ends = []
+        for each, way in ((bends, 0.25 / fine), (bends / turn, 0.25 / fine / scale)):
+            heading = 0.7 + np.append(0.0, np.cumsum(each))
+            middle = heading[:-1] + each / 2
+            place = way * np.cumsum(np.stack([np.cos(middle), np.sin(middle)], axis=-1), axis=0)
+            path = np.column_stack([np.vstack([[0, 0], place]), heading])[::fine]
+            ends.append(np.array([product(inverted(path[before - 1]), p) for p in path]))
+        right.append(ends[0])
+        wrong.append(ends[1])
+    t = 0.5 * (np.arange(n) - before + 1)
+    antennas = np.array([0.1, 0.0]), np.array([0.0, -0.2])
+    ranges = np.full(n, 5.0)
+    beside = np.array([0.2, -0.1]), np.array([0.0, 0.3])
+    told = Window(t, ranges, wrong[0], wrong[1], antennas[0], antennas[1])
+    return replace(
+        told,
+        a_poses=right[0],
+        b_poses=right[1],
+        a_antenna=antennas[0] + beside[0],
+        b_antenna=antennas[1] + beside[1],
+    ), told
+
+
+MOUNTED = PairCalibration(
+    a=EndCalibration(turn=0.5, antenna=(0.2, -0.1)),
+    b=EndCalibration(Learned(0.2, 0.001), turn=-0.2, antenna=(0.0, 0.3)),
+)
+
+
+@pytest.mark.parametrize("before", [40, 30, 1])
+def test_tracks_and_antennas_of_a_window_become_what_they_are(before: int) -> None:
+    """On both sides of the reference time, from which everything is seen."""
+    real, told = mounted(1, before)
+    assert told.before == before
+    better, noise = calibrated_window(told, SENSORS, MOUNTED)
+    for name in ("a_poses", "b_poses"):
+        expected, found, raw = (getattr(w, name) for w in (real, better, told))
+        # half of a turn acts over the way of a step, of which there are fine ones between
+        assert np.hypot(*(found - expected)[:, :2].T).max() < 0.03
+        assert found[:, 2] == pytest.approx(expected[:, 2], abs=1e-6)
+        assert np.hypot(*(raw - expected)[:, :2].T).max() > 0.3
+    assert better.a_antenna == pytest.approx(real.a_antenna)
+    assert better.b_antenna == pytest.approx(real.b_antenna)
+    assert np.array_equal(better.ranges, told.ranges)
+    # a known turn makes no noise smaller
+    assert noise.a == SENSORS.a
+
+
+def test_a_window_without_turns_is_scaled_and_no_more() -> None:
+    window, _ = uncalibrated(6)
+    better, _ = calibrated_window(window, SENSORS, KNOWN)
+    assert np.allclose(better.a_poses, window.a_poses * [0.85, 0.85, 1], atol=1e-12)
+    assert np.allclose(better.b_poses, window.b_poses * [1.05, 1.05, 1], atol=1e-12)
+    assert np.array_equal(better.a_antenna, window.a_antenna)
+
+
+@pytest.mark.parametrize(
+    ("known", "correction"),
+    [
+        (EndCalibration(), Correction()),
+        # a scale that is nearly right is noise over a long way, and bends nothing
+        (EndCalibration(Learned(0.2, 0.01)), Correction()),
+        (EndCalibration(Learned(0.2, 0.01), turn=0.1), Correction(scale=0.2, turn=0.1)),
+        (EndCalibration(antenna=(0.1, 0.2)), Correction()),
+    ],
+)
+def test_a_long_way_is_corrected_where_turns_are_not_as_configured(
+    known: EndCalibration, correction: Correction
+) -> None:
+    assert known.correction == correction
+
+
 def test_what_was_never_measured_changes_nothing() -> None:
     window, _ = uncalibrated(3)
     same, noise = calibrated_window(window, SENSORS, PairCalibration.of(None, 0, 1))
@@ -57,33 +147,41 @@ def test_what_was_never_measured_changes_nothing() -> None:
 
 def test_what_is_left_is_never_below_what_no_constant_describes() -> None:
     _, noise = calibrated_window(uncalibrated(4)[0], SENSORS, KNOWN)
-    assert noise.ranges.bias_sigma == pytest.approx(1 / math.hypot(1 / 0.3, 1 / 0.0539), rel=1e-3)
-    assert noise.ranges.bias_sigma > 0.98 * LINKTRACK.least_bias_m
-    assert 0.9 * LEAST_SCALE < noise.b.scale < NOISE.scale
+    assert noise.ranges.bias_sigma == pytest.approx(math.hypot(0.01, LINKTRACK.least_bias_m))
+    assert noise.b.scale == pytest.approx(math.hypot(0.001, LEAST_SCALE))
+    assert noise.b.scale < NOISE.scale
     assert noise.a.yaw_rad_per_m == NOISE.yaw_rad_per_m
 
 
 @pytest.mark.parametrize("scatter", [0.5, 1.0, 1.3])
-def test_ranges_that_scatter_less_have_taught_more(scatter: float) -> None:
+def test_what_module_3_says_of_its_sigmas_is_taken_as_it_is(scatter: float) -> None:
+    """How much the ranges of the pair scatter is part of those sigmas, and does not count twice."""
     window, _ = uncalibrated(5)
-    learned = PairCalibration(Learned(0.1, 0.08), Learned(0.05, 0.02), Learned(0.0, 0.01), scatter)
-    same, noise = calibrated_window(window, SENSORS, learned)
+    a, b = EndCalibration(Learned(0.05, 0.02)), EndCalibration(Learned(0.0, 0.01))
+    learned = PairCalibration(Learned(0.1, 0.08), a, b, scatter)
+    wide = replace(NOISE, scale=0.1)
+    same, noise = calibrated_window(window, replace(SENSORS, a=wide, b=wide), learned)
     assert np.allclose(same.ranges, window.ranges - 0.1)
     # weights are those that the configuration asks for, claims those of what was learned
     assert noise.ranges.sigma == SENSORS.ranges.sigma
     assert noise.ranges.scatter == scatter
-    spread = math.hypot(2 * scatter * 0.08, 0.05)
-    assert noise.ranges.bias_sigma**-2 == pytest.approx(0.3**-2 + spread**-2)
-    spread = math.hypot(2 * scatter * 0.02, 0.01)
-    assert noise.a.scale**-2 == pytest.approx(NOISE.scale**-2 + spread**-2)
-    spread = math.hypot(2 * scatter * 0.01, 0.01)
-    assert noise.b.scale**-2 == pytest.approx(NOISE.scale**-2 + spread**-2)
+    assert noise.ranges.bias_sigma == pytest.approx(math.hypot(0.08, LINKTRACK.least_bias_m))
+    assert noise.a.scale == pytest.approx(math.hypot(0.02, LEAST_SCALE))
+    assert noise.b.scale == pytest.approx(math.hypot(0.01, LEAST_SCALE))
 
 
-@pytest.mark.parametrize("sigma", [0.01, 0.1, 10.0])
-def test_knowledge_adds_up_as_information(sigma: float) -> None:
-    left = remaining(Learned(0.2, sigma), before=0.3, least=0.0, widened=2.0)
-    assert left**-2 == pytest.approx(0.3**-2 + (2.0 * sigma) ** -2)
+@pytest.mark.parametrize(
+    ("sigma", "least", "left"),
+    [(0.01, 0.0, 0.01), (0.03, 0.04, 0.05), (0.299, 0.0, 0.299), (0.301, 0.0, 0.3)],
+)
+def test_what_is_left_is_what_was_learned_and_what_changes_but_no_more_than_before(
+    sigma: float, least: float, left: float
+) -> None:
+    assert remaining(Learned(0.2, sigma), before=0.3, least=least) == pytest.approx(left)
+
+
+def test_of_what_was_never_measured_all_is_left() -> None:
+    assert remaining(Learned(), before=0.3, least=0.05) == 0.3
 
 
 def test_what_strong_signals_do_is_taken_out_of_near_ranges_alone() -> None:
@@ -109,7 +207,16 @@ def test_a_pair_is_found_whoever_owns_it() -> None:
     assert sensors.scatter == 0.7
     assert PairCalibration.of(estimate, 0, 1).scatter == 1.0
     assert sensors.near_bias == (-0.1, 0.03)
-    assert sensors.scale_a.value == 0.1
-    assert math.isinf(sensors.scale_b.sigma)
+    assert sensors.a.scale.value == 0.1
+    assert math.isinf(sensors.b.scale.sigma)
+    assert sensors.b == EndCalibration()
+    turned = replace(
+        estimate,
+        turn={1: Learned(0.3, 0.05)},
+        antenna_m={2: (Learned(0.1, 0.02), Learned(-0.2, 0.02))},
+    )
+    sensors = PairCalibration.of(turned, 2, 1)
+    assert sensors.a == EndCalibration(Learned(0.1, 0.01), 0.0, (0.1, -0.2))
+    assert sensors.b == EndCalibration(turn=0.3)
     # where module 3 has not come to an end, nothing has been learned
     assert PairCalibration.of(replace(estimate, converged=False), 2, 1) == PairCalibration()

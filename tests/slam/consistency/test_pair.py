@@ -17,7 +17,7 @@ from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import Keyframe
 from drslamd.slam.settings import closure_method
 
-TWO = Agreement(least=2, outnumber=2)
+TWO = Agreement(least=2, outnumber=2, confirms=False)
 
 
 def chosen(algorithm: str) -> Agreement:
@@ -29,6 +29,7 @@ def chosen(algorithm: str) -> Agreement:
 def rivalled(agreement: Agreement, agreeing: int, contradicting: int) -> OwnedPair:
     """Windows that agree with each other, after others that agree on something else."""
     pair = OwnedPair(agreement)
+    pair.confirm()
     poses = [MIRRORED] * contradicting + [BESIDE] * agreeing
     for k, pose in enumerate(poses, start=1):
         pair.answer(10 * k, pose)
@@ -62,8 +63,8 @@ def test_a_pair_is_connected_by_enough_closures_that_outnumber_all_others(
 
 @pytest.mark.parametrize(("agreeing", "is_connected"), [(2, False), (3, True)])
 def test_any_agreement_counts_as_it_is_stated(agreeing: int, is_connected: bool) -> None:
-    assert rivalled(Agreement(3, 3), agreeing, 1).tracker.connected is is_connected
-    assert not rivalled(Agreement(3, 3), 5, 2).tracker.connected
+    assert rivalled(Agreement(3, 3, confirms=False), agreeing, 1).tracker.connected is is_connected
+    assert not rivalled(Agreement(3, 3, confirms=False), 5, 2).tracker.connected
 
 
 def test_a_pair_that_was_connected_stays_so_while_enough_agree() -> None:
@@ -198,7 +199,7 @@ def test_a_closure_is_left_out_when_either_keyframe_is_not_held() -> None:
 
 
 def test_a_closure_is_of_the_keyframes_and_not_of_the_bodies() -> None:
-    pair = OwnedPair(Agreement(1, 0))
+    pair = OwnedPair(Agreement(1, 0, confirms=False))
     bodies = ((0.3, 0.1, 0.2), (-0.2, 0.4, -0.1))
     pair.tracker.on_estimate(asked_at(20, bodies=bodies), estimate_of((1.0, 3.0, 3.0)))
     pair.check()
@@ -259,7 +260,7 @@ def test_a_new_set_is_believed_for_its_own_merits() -> None:
 
 
 def test_of_a_piece_that_was_never_believed_nothing_is_accepted_later() -> None:
-    pair = OwnedPair(Agreement(3, 2))
+    pair = OwnedPair(Agreement(3, 2, confirms=False))
     pair.see(BESIDE, 2)
     pair.answer(40, BESIDE, segments=(1, 0))
     pair.check()
@@ -279,7 +280,7 @@ def test_a_covariance_stays_one_when_it_is_rounded_to_be_sent() -> None:
     turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
     bad = turn @ np.diag([100.0, 1e-8, 1e-8]) @ turn.T
     assert least_when_rounded(se2.packed(bad)) <= 0
-    pair = OwnedPair(Agreement(1, 0))
+    pair = OwnedPair(Agreement(1, 0, confirms=False))
     pair.tracker.on_estimate(asked_at(20), estimate_of(BESIDE, covariance=bad))
     pair.check()
     (said,) = pair.measurements()

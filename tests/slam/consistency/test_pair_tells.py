@@ -8,7 +8,7 @@ from pair_scenes import BESIDE, MIRRORED, OwnedPair
 from drslamd.slam.consistency import pcm
 from drslamd.slam.consistency.pair import TELL_EVERY, Agreement
 
-TWO = Agreement(least=2, outnumber=2)
+TWO = Agreement(least=2, outnumber=2, confirms=False)
 
 
 def test_nothing_is_said_of_a_pair_that_is_not_connected() -> None:
@@ -47,7 +47,7 @@ def test_where_ranges_are_the_edges_one_in_a_while_is_said(
 
 
 def test_of_closures_that_are_believed_at_once_one_in_a_while_is_said() -> None:
-    pair = OwnedPair(Agreement(19, 2))
+    pair = OwnedPair(Agreement(19, 2, confirms=False))
     pair.see(BESIDE, 19)
     assert pair.told(every=False) == [(0, True), (TELL_EVERY // 10, True)]
 

@@ -11,7 +11,7 @@ import pytest
 from slam_scenes import NOISE, keyframes, model_of, wander
 
 from drslamd.conventions import Chain
-from drslamd.slam.graph import chain_data
+from drslamd.slam.graph import chain_data, timed_rows
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import Keyframe
 from drslamd.slam.odometry.noise import growth
@@ -28,27 +28,45 @@ def test_keyframes_come_in_steps_and_are_kept_in_metres_and_radians() -> None:
     assert data.keyframes.poses[0] == pytest.approx([1.0, -2.0, math.pi], abs=1e-5)
 
 
-def test_a_chain_keeps_the_last_keyframes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chain_data, "MAX_KEYFRAMES", 50)
-    items = ChainData(A)
-    path = wander(np.random.default_rng(3), 80, 0.4)
-    for k in keyframes(range(80), path):
-        items.add(k)
-        assert len(items.keyframes.rows) == min(50, k.n + 1)
-    assert items.keyframes.n.tolist() == list(range(30, 80))
-
-
 def sums_between(items: ChainData, i: int, k: int) -> np.ndarray:
     at, there = items.keyframes.find(np.array([i, k], dtype=float))
     assert there.all()
     return np.asarray(items.sums[at[1]] - items.sums[at[0]])
 
 
-def test_sums_are_those_of_the_whole_chain_however_it_came(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def forty_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Chains hold the newest four blocks of ten samples."""
+    monkeypatch.setattr(timed_rows, "BLOCK", 10)
+    monkeypatch.setattr(timed_rows, "HELD_BLOCKS", 4)
+
+
+@pytest.mark.usefixtures("forty_held")
+def test_a_chain_holds_the_newest_blocks_of_keyframes() -> None:
+    items = ChainData(A)
+    for k in keyframes(range(85), wander(np.random.default_rng(3), 85, 0.4)):
+        items.add(k)
+        first = max(0, k.n // 10 - 3) * 10
+        assert items.keyframes.n.tolist() == list(range(first, k.n + 1))
+
+
+def test_a_chain_that_says_more_than_fits_gives_up_its_oldest_blocks(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(timed_rows, "BLOCK", 10)
+    # the bound is taken when the chain is made
+    monkeypatch.setattr(chain_data, "MAX_KEYFRAMES", 30)
+    items = ChainData(A)
+    for k in keyframes(range(80), wander(np.random.default_rng(3), 80, 0.4)):
+        items.add(k)
+    assert items.keyframes.n.tolist() == list(range(50, 80))
+
+
+@pytest.mark.usefixtures("forty_held")
+def test_sums_are_those_of_the_whole_chain_however_it_came() -> None:
     path = wander(np.random.default_rng(4), 60, 0.4)
     frames = keyframes(range(60), path)
     expected = growth(np.array([[k.x, k.y, k.theta] for k in frames]) * 1e-4)
-    monkeypatch.setattr(chain_data, "MAX_KEYFRAMES", 40)
     shuffle = random.Random(5)
     for _ in range(10):
         order = list(frames)
@@ -58,24 +76,39 @@ def test_sums_are_those_of_the_whole_chain_however_it_came(monkeypatch: pytest.M
             items.add(k)
             if shuffle.random() < 0.5:
                 assert len(items.sums) == len(items.keyframes.rows)
+        assert items.keyframes.n.tolist() == list(range(20, 60))
         assert np.allclose(sums_between(items, 25, 55), expected[55] - expected[25])
 
 
-def test_what_came_late_or_was_dropped_does_not_move_the_sums(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+@pytest.mark.usefixtures("forty_held")
+def test_what_came_late_or_was_dropped_does_not_move_the_sums() -> None:
     """Candidates of module 2 remember them."""
-    monkeypatch.setattr(chain_data, "MAX_KEYFRAMES", 40)
-    frames = keyframes(range(60), wander(np.random.default_rng(6), 60, 0.4))
+    frames = keyframes(range(70), wander(np.random.default_rng(6), 70, 0.4))
     items = ChainData(A)
     for k in frames[20:45]:
         items.add(k)
     remembered = items.sums[items.keyframes.find(np.array([30.0]))[0][0]].copy()
-    for part in (frames[5:20], frames[45:], frames[0:5]):
+    for part in (frames[15:20], frames[45:60], frames[10:15], frames[60:]):
         for k in part:
             items.add(k)
         now = items.sums[items.keyframes.find(np.array([30.0]))[0][0]]
         assert np.allclose(now, remembered, atol=1e-9)
+    assert items.keyframes.n[0] == 30
+
+
+def test_keyframes_that_somebody_took_stay_as_they_were_when_others_come_late() -> None:
+    """A job of another thread may still read them."""
+    frames = keyframes(range(0, 100, 10), wander(np.random.default_rng(7), 10, 0.4))
+    items = ChainData(A)
+    for k in frames[:4] + frames[5:]:
+        items.add(k)
+    taken, sums = items.keyframes.rows, items.sums
+    before, sums_before = taken.copy(), sums.copy()
+    items.add(frames[4])
+    assert len(items.keyframes) == 10
+    assert len(items.sums) == 10
+    assert np.array_equal(taken, before)
+    assert np.array_equal(sums, sums_before)
 
 
 def test_a_segment_never_comes_back_whatever_a_robot_says() -> None:
@@ -90,20 +123,12 @@ def test_a_segment_never_comes_back_whatever_a_robot_says() -> None:
     ]
 
 
-def test_what_was_thinned_out_moves_no_sum_of_what_stays() -> None:
-    """Not even of keyframes that come afterwards."""
-    frames = keyframes(range(60), wander(np.random.default_rng(7), 60, 0.4))
-    whole, thinned = ChainData(A), ChainData(A)
-    for k in frames[:50]:
-        whole.add(k)
-        thinned.add(k)
-    thinned.keep(np.arange(50) % 10 == 0)
-    assert thinned.keyframes.n.tolist() == [0, 10, 20, 30, 40]
-    for k in frames[50:]:
-        whole.add(k)
-        thinned.add(k)
-    for ends in ((0, 40), (10, 30), (50, 59)):
-        assert np.allclose(sums_between(thinned, *ends), sums_between(whole, *ends))
+def test_a_segment_that_ended_minutes_ago_does_not_come_back_either() -> None:
+    """However often somebody looked in between."""
+    items = ChainData(A)
+    for n, segment, expected in ((0, 4, [4]), (9_000, 2, [4, 4]), (18_000, 5, [4, 4, 5])):
+        items.add(Keyframe(n, segment, 0, 0, 0))
+        assert items.keyframes.segment.tolist() == expected
 
 
 def test_until_it_has_spoken_a_robot_is_like_any_other() -> None:

@@ -1,4 +1,4 @@
-"""Where one robot was, also at keyframes that the graph no longer holds."""
+"""Where a robot was, also at keyframes that module 3 no longer solves."""
 
 from __future__ import annotations
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from slam_scenes import closure, range_item
 
 from drslamd.conventions import Chain
-from drslamd.slam.graph import pair_data
+from drslamd.slam.graph import pair_data, timed_rows
+from drslamd.slam.graph.clocks import Ahead
 from drslamd.slam.graph.pair_data import BEST_SIGMA, FARTHEST_M, WORST_SIGMA, PairData
 
 A, B = Chain(0, 5), Chain(1, 6)
@@ -19,11 +19,11 @@ A, B = Chain(0, 5), Chain(1, 6)
 def with_closures(*numbers: int) -> PairData:
     pair = PairData(A, B)
     for number in numbers:
-        pair.add_closure(number, closure(number, 10 * number, B, 0, (0.0, 0.0, 0.0)))
+        pair.add_closure(number, 0, closure(number, 10 * number, B, 0, (0.0, 0.0, 0.0)))
     return pair
 
 
-def test_ranges_stand_in_the_order_of_the_log_and_each_place_once() -> None:
+def test_ranges_of_one_keyframe_stand_in_the_order_of_the_log_and_each_place_once() -> None:
     pair = PairData(A, B)
     for seq, place, metres in ((2, 0, 5.0), (1, 1, 4.0), (1, 0, 3.0), (2, 0, 5.0)):
         pair.add_range(seq, place, range_item(0, B, 0, metres))
@@ -35,9 +35,9 @@ def test_a_closure_may_be_withdrawn_whichever_word_comes_first() -> None:
     for order in (((3, said), (5, withdrawn)), ((5, withdrawn), (3, said))):
         pair = PairData(A, B)
         for seq, item in order:
-            pair.add_closure(seq, item)
+            pair.add_closure(seq, 0, item)
         assert pair.kept_closures() == []
-    pair.add_closure(6, said)
+    pair.add_closure(6, 0, said)
     assert pair.kept_closures() == [said]
 
 
@@ -46,24 +46,40 @@ def test_closures_are_given_by_their_numbers() -> None:
 
 
 @pytest.mark.parametrize("count", [9, 10, 11])
-def test_the_last_ranges_and_closures_are_kept(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_so_many_ranges_and_closures_are_held(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The oldest blocks, here of one keyframe of the owner, go first."""
+    monkeypatch.setattr(timed_rows, "BLOCK", 10)
+    # the bounds are taken when the pair is made
     monkeypatch.setattr(pair_data, "MAX_RANGES", 10)
     monkeypatch.setattr(pair_data, "MAX_CLOSURES", 10)
     pair = with_closures(*range(count))
-    # the bound of ranges is taken when the pair is made
     for seq in reversed(range(count)):
-        pair.add_range(seq, 0, range_item(seq, B, seq, 1.0))
+        pair.add_range(seq, 0, range_item(10 * seq, B, seq, 1.0))
     kept = list(range(max(0, count - 10), count))
-    assert pair.ranges.a_n.tolist() == kept
+    assert pair.ranges.a_n.tolist() == [10 * seq for seq in kept]
     assert [c.number for c in pair.kept_closures()] == kept
 
 
-def test_ranges_that_replace_others_are_all_there_is() -> None:
+def test_a_word_of_a_closure_counts_by_its_place_in_the_log() -> None:
+    """One entry may say a closure and withdraw it."""
+    said = closure(4, 0, B, 0, (1, 0, 0))
+    for places, kept in (((0, 1), []), ((1, 0), [said])):
+        pair = PairData(A, B)
+        pair.add_closure(3, places[0], said)
+        pair.add_closure(3, places[1], replace(said, kept=False))
+        assert pair.kept_closures() == kept
+
+
+def test_measurements_say_how_the_clocks_of_the_two_differ() -> None:
     pair = PairData(A, B)
-    for seq in range(3):
-        pair.add_range(seq, 0, range_item(seq, B, seq, 1.0 + seq))
-    pair.replace_ranges(pair.ranges.chosen(np.array([0, 2])))
-    assert pair.ranges.range_m.tolist() == [1.0, 3.0]
+    assert pair.ahead() is None
+    for k in range(4):
+        pair.add_range(k, 0, range_item(10 * k, B, 10 * k + 700, 5.0))
+    pair.add_closure(4, 0, closure(0, 40, B, 741, (1, 0, 0)))
+    assert pair.ahead() == Ahead(700.2, 5)
+    # robot b stood still for a while
+    pair.add_range(5, 0, range_item(50, B, 110, 5.0))
+    assert pair.ahead() == Ahead(700.2, 5)
 
 
 @pytest.mark.parametrize(
@@ -107,7 +123,7 @@ def test_every_part_of_a_closure_is_as_good_as_can_be_measured(
     covariance[place] = sigma**2
     item = replace(closure(0, 0, B, 0, (1, 2, 3)), covariance=tuple(covariance))
     pair = PairData(A, B)
-    pair.add_closure(0, item)
+    pair.add_closure(0, 0, item)
     assert bool(pair.kept_closures()) is is_taken
 
 
@@ -120,5 +136,5 @@ def test_no_closure_leads_out_of_the_world(axis: int, value: float, is_taken: bo
     pose = [1.0, 2.0, 3.0]
     pose[axis] = value
     pair = PairData(A, B)
-    pair.add_closure(0, closure(0, 0, B, 0, pose))
+    pair.add_closure(0, 0, closure(0, 0, B, 0, pose))
     assert bool(pair.kept_closures()) is is_taken

@@ -45,7 +45,7 @@ def some_entries() -> list[tuple[Chain, GraphEntry]]:
     return out
 
 
-# ---- idempotent and free of order ----
+# idempotent and free of order
 
 
 def test_a_repeated_entry_changes_nothing() -> None:
@@ -115,7 +115,7 @@ def test_keyframes_that_contradict_each_other_are_settled_the_same_way_everywher
     )
 
 
-# ---- epochs ----
+# epochs
 
 
 def test_a_new_epoch_forgets_the_old_chain_and_what_it_measured() -> None:
@@ -127,6 +127,7 @@ def test_a_new_epoch_forgets_the_old_chain_and_what_it_measured() -> None:
     assert [key for key in graph.pairs if key[0] == 0] == []
     # what others measured to the old chain is of no use until they name the new one
     assert [(p.a.robot, p.b.robot) for p in graph.usable()] == [(1, 2)]
+    assert [(p.a.robot, p.b.robot) for p in graph.view.pairs] == [(1, 2)]
 
 
 def test_an_old_epoch_is_not_listened_to() -> None:
@@ -145,7 +146,7 @@ def test_ranges_to_an_old_start_of_a_peer_are_dropped_whichever_comes_first() ->
         assert pair.ranges.range_m.tolist() == [2.0]
 
 
-# ---- what waits, what is bounded ----
+# what waits, what is bounded
 
 
 def test_an_item_may_name_a_keyframe_that_has_not_come_yet() -> None:
@@ -159,21 +160,18 @@ def test_an_item_may_name_a_keyframe_that_has_not_come_yet() -> None:
     assert items.keyframes.find(np.array([10.0, 9.0, 11.0]))[1].tolist() == [True, False, False]
 
 
-# ---- sums ----
-
-
-# ---- segments ----
+# segments
 
 
 def test_rows_of_a_segment_are_found_and_of_one_that_is_not_there_are_none() -> None:
     graph = graph_of(*some_entries())
     assert graph.chains[0].keyframes.of_segment(0) == slice(0, 12)
     assert graph.chains[0].keyframes.of_segment(1) == slice(12, 20)
-    assert graph.segment(Segment(*A, 1)).n.tolist() == list(range(120, 200, 10))
-    assert len(graph.segment(Segment(*A, 7))) == 0
+    assert graph.view.segment(Segment(*A, 1)).n.tolist() == list(range(120, 200, 10))
+    assert len(graph.view.segment(Segment(*A, 7))) == 0
 
 
-# ---- nonsense is not taken in ----
+# nonsense is not taken in
 
 
 def test_nobody_is_a_pair_with_himself() -> None:

@@ -1,59 +1,24 @@
-"""Rows in the order of their keys, and columns by their names."""
+"""Columns of measurements by their names, and where in them something is."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
-import pytest
+from slam_scenes import closure, range_item
 
-from drslamd.slam.graph import tables
-from drslamd.slam.graph.tables import KeyedRows, KeyframeTable, RangeTable, positions
+from drslamd.conventions import Chain
+from drslamd.slam import se2
+from drslamd.slam.graph.tables import (
+    CLOSURE_COLUMNS,
+    RANGE_COLUMNS,
+    ClosureTable,
+    KeyframeTable,
+    RangeTable,
+    positions,
+)
 
-
-@pytest.mark.parametrize("count", [29, 30, 31, 75])
-def test_rows_keep_the_last_ones_in_the_order_of_their_keys(count: int) -> None:
-    shuffled = np.random.default_rng(2).permutation(count)
-    for looked in (False, True):
-        rows = KeyedRows(2, 30)
-        for key in shuffled:
-            rows.add([float(key), -float(key)])
-            if looked:
-                assert len(rows.data) <= 30
-        assert rows.data[:, 0].tolist() == list(range(max(0, count - 30), count))
-        assert np.array_equal(rows.data[:, 0], -rows.data[:, 1])
-
-
-def test_rows_that_nobody_looks_at_are_bounded_too() -> None:
-    rows = KeyedRows(2, 100)
-    for key in range(5_000):
-        rows.add([float(key), 0.0])
-        assert len(rows._new) < tables.WAITING
-    assert len(rows.data) == 100
-
-
-def test_of_rows_with_one_key_the_smallest_counts_whichever_came_first() -> None:
-    for values in ((5.0, 3.0, 4.0), (3.0, 4.0, 5.0)):
-        rows = KeyedRows(2, 10)
-        for value in values:
-            rows.add([7.0, value])
-            assert len(rows.data) == 1
-        assert rows.data.tolist() == [[7.0, 3.0]]
-
-
-def test_rows_are_the_same_array_until_something_was_added() -> None:
-    rows = KeyedRows(2, 10)
-    rows.add([1.0, 0.0])
-    before = rows.data
-    assert rows.data is before
-    rows.add([2.0, 0.0])
-    assert rows.data is not before
-
-
-def test_rows_that_replace_others_are_all_there_is() -> None:
-    rows = KeyedRows(2, 10)
-    rows.add([1.0, 0.0])
-    rows.replace(np.array([[3.0, 1.0], [4.0, 2.0]]))
-    rows.add([2.0, 9.0])
-    assert rows.data.tolist() == [[2.0, 9.0], [3.0, 1.0], [4.0, 2.0]]
+PEER = Chain(1, 6)
 
 
 def test_positions_are_those_of_values_that_are_there() -> None:
@@ -84,14 +49,23 @@ def test_a_segment_is_a_block_of_rows_and_one_that_is_not_there_is_empty() -> No
     assert [len(FRAMES.chosen(FRAMES.of_segment(s))) for s in (0, 1, 2, 3)] == [2, 0, 1, 0]
 
 
+def test_the_samples_between_two_are_a_block_of_rows() -> None:
+    places = [FRAMES.between(*ends) for ends in ((0, 100), (10, 30), (11, 30), (31, 40))]
+    assert [FRAMES.n[place].tolist() for place in places] == [[10, 20, 30], [10, 20], [20], []]
+
+
 def test_a_range_is_read_as_it_was_written() -> None:
-    rows = [
-        RangeTable.row(5, 10, 11, (0.1, 0.2), (0.3, 0.4), 6.0, 0.07),
-        RangeTable.row(6, 20, 21, (0.5, 0.6), (0.7, 0.8), 7.0, 0.08),
-    ]
-    table = RangeTable(np.array(rows))
+    one = range_item(10, PEER, 11, 6.0, (0.1, 0.2), (0.3, 0.4), 0.07)
+    other = range_item(20, PEER, 21, 7.0, (0.5, 0.6), (0.7, 0.8), 0.08)
+    other = replace(other, turn_a=0.9, turn_b=-1.1)
+    table = RangeTable(np.array([RangeTable.row(5, one), RangeTable.row(6, other)]))
+    assert table.rows.shape == (2, RANGE_COLUMNS)
+    assert table.turn_a.tolist() == [0, 0.9]
+    assert table.turn_b.tolist() == [0, -1.1]
+    assert len(table) == 2
+    assert table.place.tolist() == [5, 6]
     assert table.a_n.tolist() == [10, 20]
-    assert table.b_n.tolist() == [11, 21]
+    assert table.b_n.tolist() == [11, 21] == table.rows[:, RangeTable.B_N].tolist()
     assert table.q_a.tolist() == [[0.1, 0.2], [0.5, 0.6]]
     assert table.q_b.tolist() == [[0.3, 0.4], [0.7, 0.8]]
     assert table.range_m.tolist() == [6.0, 7.0]
@@ -100,6 +74,32 @@ def test_a_range_is_read_as_it_was_written() -> None:
 
 
 def test_a_copy_may_be_written_to() -> None:
-    table = RangeTable(np.array([RangeTable.row(5, 10, 11, (0, 0), (0, 0), 6.0, 0.07)]))
+    table = RangeTable(np.array([RangeTable.row(5, range_item(10, PEER, 11, 6.0, sigma=0.07))]))
     table.copy().sigma_m[0] = 9.0
     assert table.sigma_m.tolist() == [0.07]
+
+
+def test_closures_come_out_one_by_one_as_they_were_written() -> None:
+    upper = (0.4, 0.01, -0.02, 0.5, 0.03, 0.6)
+    said = [
+        replace(closure(number, 10 * number, PEER, 9, (1.0, -2.0, 3.0)), covariance=upper)
+        for number in (4, 7)
+    ]
+    said.append(replace(said[1], number=8, kept=False, corrected=(0.1, 0.2, -0.3, 0.4)))
+    table = ClosureTable(np.array([ClosureTable.row(k, c) for k, c in enumerate(said)]))
+    assert table.measurements(PEER) == said
+    assert table.kept().measurements(PEER) == said[:2]
+    assert table.a_n.tolist() == [40, 70, 70]
+    assert table.number.tolist() == [4, 7, 8]
+    assert table.b_n.tolist() == [9, 9, 9] == table.rows[:, ClosureTable.B_N].tolist()
+    assert table.a_T_b.tolist() == [[1.0, -2.0, 3.0]] * 3
+    assert np.array_equal(table.covariance[0], se2.unpacked(upper))
+    assert table.rows.shape == (3, CLOSURE_COLUMNS)
+    assert table.corrected.tolist() == [[0, 0, 0, 0], [0, 0, 0, 0], [0.1, 0.2, -0.3, 0.4]]
+
+
+def test_of_two_words_on_one_closure_the_row_of_the_later_is_the_smaller() -> None:
+    said = closure(4, 40, PEER, 9, (1.0, -2.0, 3.0))
+    withdrawn = replace(said, kept=False)
+    assert ClosureTable.row(8, withdrawn) < ClosureTable.row(7, said)
+    assert ClosureTable.row(9, said) < ClosureTable.row(8, withdrawn)

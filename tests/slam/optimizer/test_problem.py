@@ -7,12 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from slam_problems import no_ranges, pose_edges, team_problem
+from slam_problems import no_ranges, pose_edges, straight_by_turn, team_problem
 from slam_scenes import inverted, matrix, product, wander
 
+from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.problem import (
     BetweenFactors,
     Calibration,
+    Doubted,
     OdometryFactors,
     Priors,
     RangeFactors,
@@ -72,15 +74,73 @@ def test_scale_shortens_a_link_and_yaw_rate_bends_it_over_half_of_the_way() -> N
         np.array([[*chord[:2], turn], [*chord[:2], turn]]),
         np.tile(np.eye(3), (2, 1, 1)),
         robot=np.array([0, 1]),
-        path=np.array([way, way]),
+        by_yaw=np.tile([-way / 2 * chord[1], way / 2 * chord[0], way], (2, 1)),
+        by_turn=np.zeros((2, 3)),
     )
-    known = Calibration(np.zeros(0), np.array([0.0, scale]), np.array([0.0, yaw]), np.zeros(1))
+    known = replace(Calibration.zero(0, 2), scale=np.array([0.0, scale]), yaw=np.array([0.0, yaw]))
     right = corrected(odometry, known)
     assert right[0] == pytest.approx([*chord[:2], turn])
     # turned back by half of what the yaw rate added, to first order in it and in scale
     expected = matrix((0, 0, -yaw * way / 2)) @ [*(1 - scale) * chord[:2], 1]
     assert right[1, :2] == pytest.approx(expected[:2], abs=2 * scale * yaw)
     assert right[1, 2] == pytest.approx(turn - yaw * way)
+
+
+def test_turns_that_are_longer_turn_a_link_on_by_half_of_what_they_lack() -> None:
+    """A turn of 0.3 rad that was one of 0.36, along an arc whose chord then stands 0.03 rad more
+    to the left; in the other direction the same."""
+    chords = np.array([[2.0, 0.3, 0.3], [2.0, -0.3, -0.3], [2.0, 0.3, 0.3]])
+    one = np.zeros(3, dtype=int)
+    odometry = OdometryFactors(
+        one,
+        one,
+        chords,
+        np.tile(np.eye(3), (3, 1, 1)),
+        robot=np.array([1, 1, 0]),
+        by_yaw=np.zeros((3, 3)),
+        by_turn=straight_by_turn(chords),
+    )
+    right = corrected(odometry, replace(Calibration.zero(0, 2), turn=np.array([0.0, 0.2])))
+    for link, sign in zip(right[:2], (1, -1), strict=True):
+        expected = product((0.0, 0.0, sign * 0.03), (2.0, sign * 0.3, sign * 0.33))
+        # to first order
+        assert link == pytest.approx(expected, abs=1e-3)
+        assert link[2] == pytest.approx(sign * 0.36)
+    assert right[2] == pytest.approx(chords[2])
+
+
+def test_an_antenna_beside_its_place_moves_with_the_robot_as_it_stood() -> None:
+    """Against poses multiplied as matrices; robots stood turned against their keyframes, and what
+    odometry carried is where its constants let it be."""
+    problem, _ = team_problem(2, robots=3, count=4, is_thinned=True)
+    poses, rng = problem.initial, np.random.default_rng(3)
+    ranges = replace(problem.ranges, turned=rng.normal(0, 0.5, problem.ranges.turned.shape))
+    antenna = np.array([[0.2, -0.1], [0.0, 0.3], [-0.2, -0.2]])
+    yaw, scale = np.array([0.01, -0.03, 0.02]), np.array([0.1, 0.05, -0.2])
+    known = replace(Calibration.zero(3, 3), antenna=antenna, yaw=yaw, scale=scale)
+    found = range_errors(poses, ranges, known, LINKTRACK)
+    moves = np.zeros((len(ranges), 2, 2, 2))
+    moves[ranges.carried.rows] = ranges.carried.moves
+    assert len(ranges.carried.rows) == 4
+    for m, robots in enumerate(ranges.robots):
+        ends = []
+        for end, (k, q) in enumerate(((ranges.i, ranges.q_i), (ranges.j, ranges.q_j))):
+            by_yaw, by_scale = moves[m, end]
+            there = q[m] - yaw[robots[end]] * by_yaw - scale[robots[end]] * by_scale
+            turn = (*there, ranges.turned[m, end])
+            ends.append(product(poses[k[m]], turn, (*antenna[robots[end]], 0.0))[:2])
+        apart = float(np.hypot(*(ends[1] - ends[0])))
+        assert found.error[m] == pytest.approx(apart - ranges.measured[m])
+        arms = ends[0] - poses[ranges.i[m], :2], ends[1] - poses[ranges.j[m], :2]
+        assert (found.arm_i[m], found.arm_j[m]) == pytest.approx(tuple(complex(*a) for a in arms))
+
+
+def test_doubts_are_of_any_track_or_antenna() -> None:
+    none, one = np.zeros(2, dtype=bool), np.array([False, True])
+    assert not Doubted.none(2).any()
+    assert Doubted.none(2).track.tolist() == Doubted.none(2).antenna.tolist() == [False, False]
+    assert Doubted(one, none).any()
+    assert Doubted(none, one).any()
 
 
 @pytest.mark.parametrize("model", [LINKTRACK, RangeModel(near_reach_m=6.0)])
@@ -90,7 +150,10 @@ def test_an_error_of_a_range_is_predicted_minus_measured_with_its_biases(
     problem, _ = team_problem(2, robots=3, count=4)
     poses, r = problem.initial, problem.ranges
     bias = np.array([0.2, -0.1, 0.3])
-    known = Calibration(bias, np.zeros(3), np.zeros(3), np.array([-0.25]))
+    # what biases have in common is part of them, and does not count twice
+    known = replace(
+        Calibration.zero(3, 3), bias=bias, near_bias=np.array([-0.25]), team_bias=np.array([0.7])
+    )
     error, sight, arm_i, arm_j = range_errors(poses, r, known, model)
     for m in range(len(r)):
         i, j = (product(poses[k], (*q, 0.0)) for k, q in ((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m])))
@@ -104,11 +167,18 @@ def test_an_error_of_a_range_is_predicted_minus_measured_with_its_biases(
 
 
 def test_some_of_the_factors_are_chosen_with_all_their_columns() -> None:
-    problem, _ = team_problem(3, robots=2, count=5)
-    which = np.arange(len(problem.ranges)) % 2 == 0
+    problem, _ = team_problem(3, robots=2, count=5, is_thinned=True)
+    which = np.array([True, True, False, False, True])
     few = problem.ranges.chosen(which)
     assert len(few) == 3
-    for name in ("i", "j", "q_i", "q_j", "measured", "sigma", "pair"):
+    # of five the second and the last were carried
+    assert problem.ranges.is_carried.tolist() == [False, True, False, False, True]
+    assert few.carried.rows.tolist() == [1, 2]
+    assert np.array_equal(few.carried.moves, problem.ranges.carried.moves)
+    one = problem.ranges.chosen(~which | (np.arange(5) == 4)).carried
+    assert one.rows.tolist() == [2]
+    assert np.array_equal(one.moves, problem.ranges.carried.moves[1:])
+    for name in ("i", "j", "q_i", "q_j", "measured", "sigma", "pair", "robots", "turned"):
         assert np.array_equal(getattr(few, name), getattr(problem.ranges, name)[which])
     closures = problem.closures.chosen(np.array([False, True, False]))
     assert np.array_equal(closures.measured, problem.closures.measured[1:2])
@@ -116,21 +186,76 @@ def test_some_of_the_factors_are_chosen_with_all_their_columns() -> None:
     assert isinstance(few, RangeFactors)
 
 
-PRIORS = Priors(np.array([0.3]), np.array([0.03]), np.array([0.01]), np.array([0.05]))
+def test_what_errors_cost_is_their_information() -> None:
+    edges = pose_edges(
+        np.random.default_rng(5), np.zeros((3, 3)), [(0, 1), (1, 2)], (0.1, 0.2, 0.3)
+    )
+    errors = np.array([[0.1, -0.2, 0.3], [0.0, 0.4, -0.1]])
+    expected = sum(
+        float(e @ np.linalg.solve(c, e)) for e, c in zip(errors, edges.covariance, strict=True)
+    )
+    assert edges.cost(errors) == pytest.approx(expected, rel=1e-6)
+    assert edges.chosen(np.zeros(2, dtype=bool)).cost(np.zeros((0, 3))) == 0
 
 
-@pytest.mark.parametrize(("value", "share"), [(0.0, 1.0), (0.3, 0.5), (0.9, 0.1)])
-def test_the_hold_of_a_prior_with_heavy_tails_gives_way(value: float, share: float) -> None:
-    """Half of it at one width, a tenth at three."""
-    values = np.array([value])
-    assert PRIORS.stiffness(values, PRIORS.bias) == pytest.approx([share / 0.09])
-    gauss = replace(PRIORS, has_cauchy_tails=False)
-    assert gauss.stiffness(values, PRIORS.bias) == pytest.approx([1 / 0.09])
+PRIORS = Priors(
+    bias=BiasPrior(sigma=0.3, spread=0.08, dof=3.0, team=0.02),
+    scale=np.array([0.03, 0.3]),
+    scale_tails=3.0,
+    yaw=np.array([0.01, 0.02]),
+    near_bias=0.05,
+)
+
+
+def test_priors_cost_the_sum_of_what_each_constant_is_off() -> None:
+    """Scales by Cauchy with a third of what is configured, yaw rates and near range by Gauss."""
+    known = Calibration(
+        bias=np.array([0.13, 0.05]),
+        scale=np.array([0.01, 0.3]),
+        yaw=np.array([0.02, -0.02]),
+        near_bias=np.array([0.1]),
+        team_bias=np.array([0.05]),
+        turn=np.array([0.01, -0.01]),
+        antenna=np.array([[0.012, -0.016], [0.0, 0.0]]),
+    )
+    own = np.array([0.08, 0.0])
+    of_scales = math.log(2) + math.log(10)
+    of_others = 4 + 1 + 4
+    # half widths of 0.01 and 0.02 m, and tails of 0.5
+    of_mountings = 2 * (math.log(2) + 0.02**2) + 1.5 * math.log(2) + 0.04**2
+    expected = PRIORS.bias.cost(own, 0.05) + of_scales + of_others + of_mountings
+    assert PRIORS.cost(known) == pytest.approx(expected)
+    assert PRIORS.cost(Calibration.zero(2, 2)) == 0
+
+
+@pytest.mark.parametrize("times", [-0.5, 0.0, 0.3, 5.0])
+def test_the_pull_on_a_scale_is_half_the_derivative_of_its_cost(times: float) -> None:
+    scale, h = times * PRIORS.scale / 3, 1e-7
+    for robot, unit in enumerate(np.eye(2)):
+        ends = [
+            PRIORS.cost(replace(Calibration.zero(2, 2), scale=scale + step * unit))
+            for step in (h, -h)
+        ]
+        assert PRIORS.scale_pull(scale)[robot] == pytest.approx(
+            (ends[0] - ends[1]) / (4 * h), rel=1e-5, abs=1e-4
+        )
+
+
+def test_the_curvature_of_a_scale_is_the_derivative_of_its_pull_and_stays_positive() -> None:
+    scale, h = 0.2 * PRIORS.scale, 1e-7
+    true = (PRIORS.scale_pull(scale + h) - PRIORS.scale_pull(scale - h)) / (2 * h)
+    assert PRIORS.scale_curvature(scale) == pytest.approx(true, rel=1e-5)
+    assert (PRIORS.scale_curvature(10 * PRIORS.scale) > 0).all()
 
 
 def test_what_was_learned_adds_up() -> None:
-    zero = Calibration.zero(PRIORS)
-    assert [len(part) for part in (zero.bias, zero.scale, zero.yaw, zero.near_bias)] == [1] * 4
-    step = Calibration(np.array([1.0]), np.array([2.0]), np.array([3.0]), np.array([4.0]))
-    twice = zero.plus(step).plus(step)
-    assert (twice.bias[0], twice.scale[0], twice.yaw[0], twice.near_bias[0]) == (2, 4, 6, 8)
+    names = ("bias", "scale", "yaw", "near_bias", "team_bias", "turn", "antenna")
+    zero = Calibration.zero(3, 2)
+    shapes = [(3,), (2,), (2,), (1,), (1,), (2,), (2, 2)]
+    assert [getattr(zero, name).shape for name in names] == shapes
+    assert not any(getattr(zero, name).any() for name in names)
+    values = {name: np.array([k + 1.0]) for k, name in enumerate(names[:-1])}
+    step = replace(Calibration.zero(1, 1), **values, antenna=np.array([[7.0, 8.0]]))
+    twice = Calibration.zero(1, 1).plus(step).plus(step)
+    assert [getattr(twice, name)[0] for name in names[:-1]] == [2, 4, 6, 8, 10, 12]
+    assert twice.antenna.tolist() == [[14, 16]]

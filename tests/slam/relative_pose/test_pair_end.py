@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 from slam_scenes import NOISE, model_of
 
-from drslamd.conventions import Chain
-from drslamd.slam.graph.chain_data import ChainData
-from drslamd.slam.odometry.track import Track
-from drslamd.slam.relative_pose.pair_end import PairEnd, level
+from drslamd.slam.relative_pose.pair_end import level
 
 
 @pytest.mark.parametrize(
@@ -21,9 +18,7 @@ from drslamd.slam.relative_pose.pair_end import PairEnd, level
 def test_ranges_between_antennas_of_different_heights_are_seen_from_above(
     measured: float, from_above: float
 ) -> None:
-    low, high = ChainData(Chain(0, 1)), ChainData(Chain(1, 1))
-    low.take_model(0, model_of(NOISE, height=0.5))
-    high.take_model(0, model_of(NOISE, height=3.5))
-    a, b = PairEnd(Track(10), low), PairEnd(Track(10), high)
-    assert level(np.array([measured]), a, b)[0] == pytest.approx(from_above)
-    assert level(np.array([measured]), a, a)[0] == pytest.approx(measured)
+    low, high = model_of(NOISE, height=0.5), model_of(NOISE, height=3.5)
+    for a, b in ((low, high), (high, low)):
+        assert level(np.array([measured]), a, b)[0] == pytest.approx(from_above)
+    assert level(np.array([measured]), low, low)[0] == pytest.approx(measured)

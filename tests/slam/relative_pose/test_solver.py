@@ -55,7 +55,7 @@ def nees(estimate: RelativePoseEstimate, true: Array) -> float:
     return float(error @ np.linalg.solve(best.covariance, error))
 
 
-# ---- what curved motion fixes ----
+# what curved motion fixes
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3, 4, 5, 6, 7, 8, 10])
@@ -110,7 +110,7 @@ def test_bursts_on_a_fifth_of_the_ranges_are_tolerated(seed: int) -> None:
     assert np.hypot(*moved) < 0.25
 
 
-# ---- what it does not fix ----
+# what it does not fix
 
 
 def mirrored(pose: Array) -> Array:
@@ -213,7 +213,7 @@ def test_ranges_that_are_nonsense_fit_nothing(seed: int) -> None:
     assert solved(with_ranges(window, nonsense)) == RelativePoseEstimate(Verdict.POOR_FIT)
 
 
-# ---- on both sides of each threshold ----
+# on both sides of each threshold
 
 
 def chi2_per_degree(window: Window, monkeypatch: pytest.MonkeyPatch) -> float:
@@ -263,7 +263,7 @@ def test_a_pose_is_observable_just_below_the_largest_sigma(
     assert (solved(window).verdict is Verdict.UNIQUE) is observable
 
 
-# ---- the parts ----
+# the parts
 
 
 def test_the_jacobian_of_the_residuals_is_that_of_finite_differences() -> None:
@@ -361,7 +361,7 @@ def test_absurd_odometry_of_a_peer_raises_nothing() -> None:
     assert se2.wrap(0.0) == 0
 
 
-# ---- a pose is that of the end of its window ----
+# a pose is that of the end of its window
 
 
 @pytest.mark.parametrize(("off", "verdict"), [(0.15, Verdict.UNIQUE), (0.6, Verdict.POOR_FIT)])

@@ -21,6 +21,8 @@ from drslamd.slam.relative_pose.window_noise import (
 )
 
 QUIET = OdometryNoise(1e-12, 1e-12, 1e-12, 1e-12)
+ANTENNA = 0.03
+"""m; of each robot, by x and y, see `RangeModel.antenna_sigma_m`."""
 PARTS = {
     "scale": replace(QUIET, scale=0.03),
     "yaw": replace(QUIET, yaw_rad_per_m=math.radians(0.15)),
@@ -36,10 +38,15 @@ def from_lower(lower: Array) -> Array:
 
 
 def of_one_robot(
-    points: Array, path: Array, directions: Array, noise: OdometryNoise, before: int
+    points: Array,
+    path: Array,
+    directions: Array,
+    noise: OdometryNoise,
+    before: int,
+    antenna_sigma: float = 0.0,
 ) -> Array:
     moment = moments(points @ [1, 1j], directions @ [1, 1j])
-    twist = way_twists(path[None], [noise], before)
+    twist = way_twists(path[None], [noise], before, antenna_sigma)
     return from_lower(odometry_covariance(twist, moment[None, None], before)[0])
 
 
@@ -82,7 +89,7 @@ def test_what_odometry_does_to_residuals_is_what_noisy_drives_do(part: str, refe
     # first order: the range changes by the error along the line of sight
     residuals = -np.sum((wrong - points) * directions, axis=2)
     seen = residuals.T @ residuals / drives
-    predicted = of_one_robot(points, true[:, :2], directions, noise, reference + 1)
+    predicted = of_one_robot(points, true, directions, noise, reference + 1)
     sigma = np.sqrt(np.diag(predicted) + 1e-6)  # of less than a millimetre nothing is claimed
     assert np.abs((seen - predicted) / np.outer(sigma, sigma)).max() < 0.13
     assert sigma[0] > 2 * sigma[reference - 4]
@@ -91,13 +98,36 @@ def test_what_odometry_does_to_residuals_is_what_noisy_drives_do(part: str, refe
 def test_the_measurement_at_the_reference_time_is_not_touched_by_odometry() -> None:
     path = seen_from_last(wander(np.random.default_rng(12), 20, 0.25))
     directions = np.tile([0.6, 0.8], (20, 1))
-    covariance = of_one_robot(path[:, :2], path[:, :2], directions, NOISE, 20)
+    covariance = of_one_robot(path[:, :2], path, directions, NOISE, 20)
     assert np.abs(covariance[-1]).max() < 1e-15
 
 
 def test_one_measurement_has_no_odometry_in_it() -> None:
     one = np.zeros((1, 2))
-    assert of_one_robot(one, one, np.array([[1.0, 0.0]]), NOISE, 1).tolist() == [[0.0]]
+    still = np.zeros((1, 3))
+    assert of_one_robot(one, still, np.array([[1.0, 0.0]]), NOISE, 1).tolist() == [[0.0]]
+
+
+@pytest.mark.parametrize("reference", [39, 30])
+def test_an_antenna_that_is_beside_its_place_moves_all_ranges_by_where_it_is_then(
+    reference: int,
+) -> None:
+    """Drawn 4 cm beside it in many windows: the error turns with the robot."""
+    rng = np.random.default_rng(17)
+    path = wander(rng, 40, 0.25)
+    true = se2.between(path[reference], path)
+    directions = rng.normal(size=(40, 2))
+    directions /= np.hypot(*directions.T)[:, None]
+    beside = rng.normal(0, 0.04, (20_000, 2))
+    cos, sin = np.cos(true[:, 2]), np.sin(true[:, 2])
+    moved_x = beside[:, :1] * cos - beside[:, 1:] * sin
+    moved_y = beside[:, :1] * sin + beside[:, 1:] * cos
+    residuals = moved_x * directions[:, 0] + moved_y * directions[:, 1]
+    seen = residuals.T @ residuals / len(residuals)
+    found = of_one_robot(true[:, :2], true, directions, QUIET, reference + 1, 0.04)
+    assert np.abs(found - seen).max() < 0.04 * 0.04**2
+    assert np.allclose(np.diag(found), 0.04**2)
+    assert of_one_robot(true[:, :2], true, directions, QUIET, reference + 1).max() < 1e-12
 
 
 def drive(reference: int) -> tuple[Window, Array, Array]:
@@ -125,8 +155,8 @@ def test_the_noise_of_a_window_is_that_of_its_ranges_and_both_robots(reference: 
         in_b = se2.rotate(-heading[k], in_a)
         expected = (
             LINKTRACK.covariance(window.t, window.ranges, ranges)
-            + of_one_robot(a, window.a_poses[:, :2], in_a, NOISE, reference + 1)
-            + of_one_robot(b, window.b_poses[:, :2], in_b, of_b, reference + 1)
+            + of_one_robot(a, window.a_poses, in_a, NOISE, reference + 1, ANTENNA)
+            + of_one_robot(b, window.b_poses, in_b, of_b, reference + 1, ANTENNA)
         )
         assert np.allclose(from_lower(covariance[k]), expected, rtol=0, atol=1e-12)
         assert np.linalg.eigvalsh(expected)[0] > 0
@@ -138,8 +168,8 @@ def test_an_outlier_that_weighs_a_quarter_is_twice_as_uncertain() -> None:
     weights = np.ones((2, 40))
     weights[1, 7] = 0.25
     plain, thinned = noise.covariance(np.ones((2, 40)) + 0j, np.ones(2) + 0j, weights)
-    assert plain[7, 7] == pytest.approx(0.1**2 + 0.3**2)
-    assert thinned[7, 7] == pytest.approx(0.2**2 + 0.3**2)
+    assert plain[7, 7] == pytest.approx(0.1**2 + 0.3**2 + 2 * ANTENNA**2)
+    assert thinned[7, 7] == pytest.approx(0.2**2 + 0.3**2 + 2 * ANTENNA**2)
     assert np.count_nonzero(np.tril(thinned - plain)) == 1
 
 

@@ -43,18 +43,12 @@ PIECES = {
         "relative_pose",
         "self_calibration = false",
     ),
-    "range-scatter": Piece(
-        "closures claim what the configured sigma of ranges says",
-        tuning=Tuning(learns_scatter=False),
-    ),
     "nlos": Piece("the power of the first path is not looked at", "relative_pose", "nlos_db = 0.0"),
     "long-windows": Piece("windows of 30 s", "relative_pose", "window_max_s = 30.0"),
     "wide-scale": Piece("odometry scale has a sigma of 3 %", "odometry", "scale_sigma = 0.03"),
-    "cauchy-priors": Piece(
-        "Gauss's priors with the configured sigmas on bias and scale",
-        tuning=Tuning(
-            ranges=replace(LINKTRACK, bias_tails=1.0), scale_tails=1.0, has_cauchy_priors=False
-        ),
+    "narrow-priors": Piece(
+        "biases and scales are believed to be anything that is configured",
+        tuning=Tuning(ranges=replace(LINKTRACK, spread_share=1.0, team_share=1.0), scale_tails=1.0),
     ),
     "closure-dating": Piece("a window names the pose at its end", tuning=Tuning(confirm_us=0)),
     "short-range-doubt": Piece(

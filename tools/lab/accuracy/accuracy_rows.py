@@ -67,7 +67,7 @@ def _median(figures: Iterable[list[Figure]]) -> list[Figure]:
     ]
 
 
-# ---- TIERS ----
+# TIERS
 
 TIERS = "tiers_turtlebots/tiers_4robots_cora.pyfg"
 
@@ -98,7 +98,7 @@ def _tiers_wronged(data: Path, setup: Setup) -> list[Figure]:
     return _median(map(once, SEEDS))
 
 
-# ---- pairs ----
+# pairs
 
 
 def _pair_figures(
@@ -210,7 +210,7 @@ def _murp(data: Path, setup: Setup) -> list[Figure]:
     return figures
 
 
-# ---- edges ----
+# edges
 
 PRECISION = {0.10: 0.99, 0.20: 0.99, 0.40: 0.97}
 RECALL, RATIO = 0.95, 1.2

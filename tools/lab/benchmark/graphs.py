@@ -94,7 +94,7 @@ class Graph:
         return ComplexFactors(i, j, np.exp(1j * theta), x + 1j * y, self.kappa, self.tau)
 
 
-def load(name: str, robots: int | None = None) -> Graph:
+def load(name: str, robots: int | None = None, folder: Path | None = None) -> Graph:
     """Read one graph.
 
     Raises:
@@ -102,7 +102,7 @@ def load(name: str, robots: int | None = None) -> Graph:
         BadRecording: it is no pose graph.
     """
     known = GRAPHS[name]
-    read = g2o.read(FOLDER / known.file)
+    read = g2o.read((folder or FOLDER) / known.file)
     count, robots = len(read.ids), robots or known.robots
     each = count // robots
     robot = np.minimum(np.arange(count) // each, robots - 1)

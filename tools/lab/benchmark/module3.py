@@ -41,7 +41,7 @@ def rows(quick: bool) -> Iterator[Row]:
     yield from plain_block_descent(graphs.load("team3_400"), 40 if quick else 400)
 
 
-# ---- on one core -------------------------------------------------------------------------------
+# on one core
 
 
 def central(graph: Graph, quick: bool) -> Iterator[Row]:
@@ -121,7 +121,7 @@ def gtsam_solver(graph: Graph, start: Array) -> dict[str, Callable[[], object]]:
     return {GTSAM: run}
 
 
-# ---- over messages -----------------------------------------------------------------------------
+# over messages
 
 
 def shared(graph: Graph, quick: bool) -> Iterator[Row]:
@@ -194,7 +194,6 @@ def _descended(graph: Graph, lifted: Array, robot: Array, number: int) -> Array:
         len(mine),
     )
     out = lifted.copy()
-    out[mine] = riemannian_descent.rows(
-        riemannian_descent.descend(block, riemannian_descent.stacked(lifted[mine]))
-    )
+    descended, _ = riemannian_descent.descend(block, riemannian_descent.stacked(lifted[mine]))
+    out[mine] = riemannian_descent.rows(descended)
     return np.asarray(out)

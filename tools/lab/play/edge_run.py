@@ -19,16 +19,18 @@ from drslamd.conventions import GRID_HZ, ROTATION_STEP_RAD, TRANSLATION_STEP_M, 
 from drslamd.slam import se2, settings
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.consistency.pcm import Candidate, PairConsistency
+from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import ClosureMeasurement, GraphEntry, Keyframe
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.odometry.noise import OdometryNoise, growth
+from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.robot_model import RobotModel
 from drslamd.slam.tuning import DEFAULTS, Tuning
+from lab.play.turns import EPOCH, Turns
 from lab.recordings.recording import Array, EdgeRecording, Trail
 from lab.score import metrics
 from lab.score.outcome import Closure, Outcome, Path
 
-EPOCH = 1
 EARLIER = 1_000
 """Grid samples added to all times, so that none is negative."""
 MOST_ROUNDS = 600
@@ -155,26 +157,31 @@ def _logs(
     return logs
 
 
+class _Member:
+    """A robot that knows the whole log and hears everybody."""
+
+    def __init__(self, back: BackEnd, robots: set[int]) -> None:
+        self.back, self.exchange, self._robots = back, back.exchange, robots
+
+    def begin(self, utime: int) -> Job | None:
+        return self.back.begin(self._robots, self._robots, utime)
+
+    def on_solution(self, result: TeamEstimate, utime: int) -> list[PublicPoses]:
+        return self.back.on_solution(result, utime)
+
+    def hear(self, origin: Chain, message: PublicPoses) -> None:
+        self.back.hear(origin, message)
+
+
 def _optimise(backs: dict[int, BackEnd], progress: Callable[[float], None] | None) -> None:
-    """Rounds of block descent, each robot hearing at once what the others sent."""
-    robots = set(backs)
-    public: dict[int, PublicPoses] = {}
-    for turn in range(MOST_ROUNDS):
-        jobs = 0
-        for robot, back in backs.items():
-            others = {k: p for k, p in public.items() if k != robot}
-            job = back.begin(robots, dict.fromkeys(robots, 0), others)
-            if job is None:
-                continue
-            jobs += 1
-            result = job()
-            back.on_solution(result)
-            poses = back.public_poses()
-            if poses is not None and (robot not in public or not result.converged):
-                public[robot] = poses
+    """Rounds of block descent until nobody moves."""
+    members = {robot: _Member(back, set(backs)) for robot, back in backs.items()}
+    turns = Turns(members)
+    for number in range(MOST_ROUNDS):
+        goes_on = turns.round()
         if progress:
-            progress(turn)
-        if not jobs:
+            progress(number)
+        if not goes_on:
             break
 
 

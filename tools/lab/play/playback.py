@@ -16,9 +16,12 @@ from lab.play.emulators import (
     RoboteqEmulator,
     WheelEmulator,
 )
-from lab.recordings.recording import Recording, wheel_paths
+from lab.recordings.recording import Array, Recording, wheel_paths
 
 BASES: tuple[type, ...] = (KobukiEmulator, RoboteqEmulator, AsciiEmulator)
+
+Wiring = Callable[[Array, Array, Array], tuple[Array, Array]]
+"""What counters say, m, of times s and the ways of the left and the right wheel, m, (m,) each."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,7 @@ class Hardware:
         self.uwb = LinkTrackEmulator(robot, frame, power_up_s=11.0 + 7 * robot)
         self.antenna = recording.antennas.get(robot, (0.0, 0.0))
         self.antenna_z_m = 0.0
+        self.wiring: Wiring = lambda t, left, right: (left, right)
         self._recording = recording
 
     def uwb_chunks(self) -> Iterator[Chunk]:
@@ -54,7 +58,7 @@ class Hardware:
     def wheel_chunks(self) -> Iterator[Chunk]:
         """One message for each stamp of the odometry (empty where the base has to be asked)."""
         trail = self._recording.trails[self.robot]
-        left, right = wheel_paths(trail, self.base.track_m)
+        left, right = self.wiring(trail.t, *wheel_paths(trail, self.base.track_m))
         for t, one, other in zip(trail.t.tolist(), left.tolist(), right.tolist(), strict=True):
             yield Chunk(t, "wheels", partial(self.base.stream, t, one, other))
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from drslamd.config import GossipSection
 from drslamd.gossip import lc02, messages
+from drslamd.gossip.message_types import PoseState
 from drslamd.io.multicast import open_group
 from drslamd.io.status_socket import ask
 from lab.play.playback import Chunk, Hardware, equip, robot_toml
@@ -210,7 +211,7 @@ class RealTeam:
         channel, payload = framed
         if messages.kind_of_channel(channel) == "POSE":
             message = messages.decode("POSE", payload)
-            if isinstance(message, messages.Pose) and message.state:
+            if isinstance(message, messages.Pose) and message.state == PoseState.LOCALISED:
                 self._live[int(channel.rpartition("_")[2])].append(message)
 
     async def play(self, progress: Callable[[float], None] | None = None) -> None:

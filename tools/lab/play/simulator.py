@@ -224,7 +224,7 @@ class Simulator:
         elif isinstance(effect, Save):
             member.traces.saved.append(effect)
         elif isinstance(effect, Restart):
-            member.robot = member.renew(effect.epoch)
+            member.robot = member.renew(effect.above + 1)
 
     def _send(self, sender: Member, effect: Send) -> None:
         data = lc02.encode(next(self._sequence), effect.channel, effect.payload)

@@ -9,6 +9,7 @@ import numpy as np
 
 from drslamd import report
 from drslamd.gossip import messages
+from drslamd.gossip.message_types import PoseState
 from drslamd.slam.tuning import DEFAULTS, Tuning
 from lab.play.playback import Hardware, equip, robot_config
 from lab.play.simulator import Clock, Member, Network, Simulator
@@ -47,11 +48,34 @@ def play(
     solve_us: int | None = 20_000,
     tuning: Tuning = DEFAULTS,
 ) -> Simulator:
-    """Play the whole recording.
+    """Play the whole recording; arguments as in `start`.
+
+    Args:
+        progress: told the seconds that have passed.
+    """
+    simulator = start(recording, seed, network, extra, hardware, solve_us, tuning)
+    end = recording.duration + SETTLE_S
+    for second in range(1, int(end) + 1):
+        simulator.run(min(second, end))
+        if progress:
+            progress(second)
+    simulator.run(end)
+    return simulator
+
+
+def start(
+    recording: Recording,
+    seed: int = 0,
+    network: Network | None = None,
+    extra: str = "",
+    hardware: dict[int, Hardware] | None = None,
+    solve_us: int | None = 20_000,
+    tuning: Tuning = DEFAULTS,
+) -> Simulator:
+    """Every robot switched on and its devices about to print; no time has passed.
 
     Args:
         extra: TOML sections that every robot's configuration gets.
-        progress: told the seconds that have passed.
         solve_us: how long a computation takes there; None as long as it takes here.
         tuning: of every robot's estimator.
     """
@@ -60,12 +84,6 @@ def play(
     for device in (hardware or equip(recording)).values():
         member = simulator.add(robot_config(device, extra), skewed_clock(rng), device)
         simulator.play(member, device.chunks())
-    end = recording.duration + SETTLE_S
-    for second in range(1, int(end) + 1):
-        simulator.run(min(second, end))
-        if progress:
-            progress(second)
-    simulator.run(end)
     return simulator
 
 
@@ -120,7 +138,7 @@ def _live(member: Member) -> Path:
     for _, channel, payload in member.traces.sent:
         if messages.kind_of_channel(channel) == "POSE":
             message = messages.decode("POSE", payload)
-            if isinstance(message, messages.Pose) and message.state:
+            if isinstance(message, messages.Pose) and message.state == PoseState.LOCALISED:
                 t = member.clock.world(message.pose_utime) / 1e6
                 rows.append([t, *message.pose, message.frame])
     return live_path(rows)

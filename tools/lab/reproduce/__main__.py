@@ -1,7 +1,7 @@
 """The command line of tools/reproduce.
 
-Exit codes: 0 done and everything reached, 1 done and something not reached, 2 wrong usage,
-130 broken off (what is done is kept).
+Exit codes: 0 done and everything reached, 1 done and something not reached, 2 wrong usage, 66 no
+recordings there, 130 broken off (what is done is kept).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 from lab.progress import Progress
-from lab.reproduce import experiment, pages, pictures, plan, verdict
+from lab.reproduce import experiment, pages, pictures, plan, rbcd_table, verdict
 from lab.reproduce.state import State
 
 EXAMPLES = """\
@@ -20,11 +20,13 @@ examples:
   tools/reproduce --quick                   one seed, under three minutes
   tools/reproduce                           20 seeds, all tables; goes on where it stopped
   tools/reproduce --seeds 40 --out /tmp/x   more of them, elsewhere
+  tools/reproduce --rbcd data               module 3 against its centralised optimum, 15 minutes
+  tools/reproduce --rbcd data --quick       one recorded case and one graph of them
   tools/reproduce --calibrate               the noise for which odometry is as wrong as the paper's
 
 The folder gets results.md, results.json (with the verdict) and pictures.
 """
-BROKEN_OFF = 130
+NO_INPUT, BROKEN_OFF = 66, 130
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -34,6 +36,8 @@ def main(arguments: list[str] | None = None) -> int:
         model = experiment.calibrated(range(options.seeds))
         print(f"scale = {model.scale:.3f}, yaw_deg_per_m = {model.yaw_deg_per_m:.3f}")
         return 0
+    if options.rbcd is not None:
+        return rbcd(options.rbcd, options.quick)
     out = options.out or Path("out/reproduce-quick" if options.quick else "out/reproduce")
     pieces = plan.quick() if options.quick else plan.full(options.seeds)
     state = State(out / "state.json")
@@ -50,6 +54,20 @@ def main(arguments: list[str] | None = None) -> int:
     return 0 if all(check.ok for check in checks) else 1
 
 
+def rbcd(data: Path, quick: bool) -> int:
+    """Print how near module 3 comes to the optimum of the same edges; the exit code."""
+    reached: list[bool] = []
+    for line in rbcd_table.lines(data, quick, lambda what: print(what, file=sys.stderr)):
+        if not reached:
+            print(rbcd_table.markdown(rbcd_table.HEAD, "reached"))
+            print(rbcd_table.markdown(("---",) * len(rbcd_table.HEAD), "---"))
+        reached.append(line.is_reached)
+        print(rbcd_table.markdown(line.cells, "yes" if line.is_reached else "**no**"), flush=True)
+    if not reached:
+        return NO_INPUT
+    return 0 if all(reached) else 1
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="tools/reproduce",
@@ -60,6 +78,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--quick", action="store_true", help="one seed, fewer rows")
     parser.add_argument("--seeds", type=int, default=plan.SEEDS, metavar="N", help="default 20")
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="default out/reproduce[-quick]")
+    parser.add_argument(
+        "--rbcd", type=Path, metavar="DATA", help="hold module 3 against its centralised optimum"
+    )
     parser.add_argument("--calibrate", action="store_true", help="print the noise and end")
     return parser
 

@@ -1,10 +1,10 @@
-"""The paper's module 3 on one seed: DPGO's cost, brought to its minimum.
+"""The paper's module 3 on one seed: DPGO's cost, and its minimum.
 
     min  sum kappa |z_j - z_i z_ij|^2 + tau |p_j - p_i - z_i t_ij|^2,   |z_k| = 1
 
-with weights and notation of `riemannian_descent`. Block coordinate descent needs hundreds of rounds
-to get there, and how far it came is no property of the method; so the tables show the minimum
-itself: chordal initialisation as in DPGO, then Levenberg-Marquardt.
+with weights and notation of `riemannian_descent`. Block coordinate descent is run as the daemon
+runs it, each robot on its block and in turns, over datagrams. Beside it stands what a centralised
+solver makes of the same edges: chordal initialisation as in DPGO, then Levenberg-Marquardt.
 """
 
 from __future__ import annotations
@@ -18,10 +18,12 @@ from scipy.sparse.linalg import spsolve
 from drslamd.conventions import ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import Keyframe
+from drslamd.slam.graph.thinning.chain_view import ChainView, whole
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.optimizer.factors import chain_links
 from drslamd.slam.optimizer.problem import BetweenFactors
 from drslamd.slam.robot_model import RobotModel
+from lab.play.block_team import SplitGraph
 from lab.recordings.recording import Array
 from lab.reproduce.paper_column import NOISE, Closures
 
@@ -39,14 +41,14 @@ class Graph:
     edges: ComplexFactors
 
 
-def chain(odometry: Array, robot: int) -> ChainData:
+def chain(odometry: Array, robot: int) -> ChainView:
     """Dead-reckoned poses (n, 3) as keyframes."""
     items = ChainData(Chain(robot, 1))
     items.model = RobotModel(NOISE)
     steps = np.array([TRANSLATION_STEP_M, TRANSLATION_STEP_M, ROTATION_STEP_RAD])
     for n, (x, y, theta) in enumerate(np.round(odometry / steps).astype(int).tolist()):
         items.add(Keyframe(n, 0, x, y, theta))
-    return items
+    return whole(items)
 
 
 def graph(odometry: dict[int, Array], kept: dict[tuple[int, int], Closures]) -> Graph:
@@ -66,9 +68,20 @@ def graph(odometry: dict[int, Array], kept: dict[tuple[int, int], Closures]) -> 
 
 
 def solve(problem: Graph) -> dict[int, Array]:
-    """Poses (n, 3) of each robot, robot 0's first one being the origin."""
-    poses = minimum(problem, chordal(problem)).reshape(-1, problem.robots, 3)
-    return {r: poses[:, r] for r in range(problem.robots)}
+    """Poses (n, 3) of each robot at the minimum, robot 0's first one being the origin."""
+    return by_robot(problem, minimum(problem, chordal(problem)))
+
+
+def by_robot(problem: Graph, poses: Array) -> dict[int, Array]:
+    """All poses (size, 3), sorted."""
+    sorted_out = poses.reshape(-1, problem.robots, 3)
+    return {r: sorted_out[:, r] for r in range(problem.robots)}
+
+
+def split(problem: Graph) -> SplitGraph:
+    """The same graph, and whose its poses are."""
+    number = np.arange(problem.size)
+    return SplitGraph(number % problem.robots, number // problem.robots, problem.edges)
 
 
 def chordal(problem: Graph) -> Array:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from drslamd.gossip import messages
+from drslamd.gossip.message_types import PoseState
 from drslamd.slam import se2
 from lab.play import virtual_team
 from lab.play.simulator import Simulator
@@ -18,10 +19,9 @@ from lab.recordings.recording import Array, Recording
 from lab.reproduce.experiment import PAIRS, POSE_TIMES, Trial, pose_errors
 from lab.reproduce.tally import Tally
 from lab.score import metrics, outcome
+from lab.score.claims import ELLIPSE_95, mahalanobis
 from lab.score.outcome import Closure, Outcome
 
-ELLIPSE_95 = 5.991
-"""Chi-squared quantile with two degrees of freedom: the ellipse that ought to hold 95 %."""
 CLAIM_98, CLAIM_WORST = 14.2, 50.0
 """Squared Mahalanobis errors: 98 % of honest closures stay below one, all below the other (the
 first is the 99.7 % quantile with three degrees of freedom)."""
@@ -81,13 +81,6 @@ def claim(tally: Tally, name: str, pose: Array, covariance: Array, truth: Array)
     tally.add(f"{name}/wild", float(squared > CLAIM_WORST))
 
 
-def mahalanobis(pose: Array, covariance: Array, truth: Array) -> float:
-    """Squared error of a pose (3,) in units of its covariance (3, 3)."""
-    error = pose - truth
-    error[2] = metrics.wrapped(error[2])
-    return float(error @ np.linalg.solve(covariance, error))
-
-
 def published(tally: Tally, recording: Recording, simulator: Simulator) -> None:
     """Every published pose against its own covariance, in the frame that it names.
 
@@ -99,7 +92,7 @@ def published(tally: Tally, recording: Recording, simulator: Simulator) -> None:
             if messages.kind_of_channel(channel) != "POSE":
                 continue
             message = messages.decode("POSE", payload)
-            if not isinstance(message, messages.Pose) or not message.state:
+            if not isinstance(message, messages.Pose) or message.state != PoseState.LOCALISED:
                 continue
             t = np.array([member.clock.world(message.pose_utime) / 1e6])
             origin = recording.trails[message.frame].truth[0]

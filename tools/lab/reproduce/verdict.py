@@ -18,6 +18,8 @@ BEST_M, BEST_DEG = 0.20, 2.0
 BEST_ROW = (50, 0.5)
 LIKE_PRINTED = 1.5
 CALIBRATED = 0.15
+LIKE_LEAST, FEW_ROUNDS = 1.1, 40
+"""Of DPGO: joint ATE against that of its minimum, rounds until it is near it."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,13 @@ def _number(value: float) -> float | None:
 
 def checks(total: Tally) -> list[Check]:
     """All of them, for the rows that were computed."""
-    return [*_data(total), *_shape(total), *_beaten(total), *_honest(total)]
+    return [
+        *_data(total),
+        *_shape(total),
+        *_optimised(total),
+        *_beaten(total),
+        *_honest(total),
+    ]
 
 
 def _data(total: Tally) -> list[Check]:
@@ -95,6 +103,23 @@ def _shape(total: Tally) -> list[Check]:
         words = f"paper, DPGO at tau 50, epsilon 0.5, {unit}"
         reached = total[f"table2/{BEST_ROW[0]}/{BEST_ROW[1]}/after/{unit}"].mean
         out.append(within(words, reached, wanted / LIKE_PRINTED, wanted * LIKE_PRINTED))
+    return out
+
+
+def _optimised(total: Tally) -> list[Check]:
+    """Does DPGO, as the daemon runs it, come to its minimum and say no more than printed?"""
+    out = []
+    for tau, epsilon in _computed(total):
+        row = f"table2/{tau}/{epsilon}"
+        words = f"paper, tau {tau}, epsilon {epsilon}: DPGO in turns"
+        least, rounds = (total[f"{row}/{name}"].mean for name in ("least/ate", "rounds"))
+        ate = total[f"{row}/ate"].mean
+        out.append(at_most(f"{words}, joint ATE against the minimum's", ate, LIKE_LEAST * least))
+        out.append(at_most(f"{words}, rounds to within 1 % of the minimum", rounds, FEW_ROUNDS))
+    said = "table4/paper/1/bytes"
+    if said in total:
+        most = 1e6 * printed.TABLE_4_MB["1"]
+        out.append(at_most("paper, three daemons at 1 Hz, bytes", total[said].mean, most))
     return out
 
 

@@ -2,9 +2,9 @@
 
 Closures and ranges join poses of the same time and odometry joins neighbouring times, so with all
 poses of all robots in the order of time J' W J is banded. The border takes the unknowns that touch
-everything: the bias of each pair, the near-range bias, scale and yaw rate of each robot, and the
-few poses that reach far (a robot that stands still while others drive about has one pose for all
-that time).
+everything: the bias of each pair and what they have in common, the near-range bias, scale and yaw
+rate of each robot, and the few poses that reach far (a robot that stands still while others drive
+about has one pose for all that time).
 """
 
 from __future__ import annotations
@@ -13,9 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drslamd.slam.optimizer.problem import Calibration, Problem
+from drslamd.slam.optimizer.problem import Calibration, OdometryFactors, Problem, RangeFactors
 from drslamd.slam.optimizer.vertex_cover import vertex_cover
 from drslamd.slam.se2 import Array, Index
+
+NOWHERE = -1
+"""The number of what is no unknown."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,8 @@ class BandLayout:
 
     Attributes:
         poses: (k, 3) of each pose.
-        bias, scale, yaw: of each pair and robot; near_bias: of the team.
+        bias, scale, yaw: of each pair and robot; near_bias, team_bias: of the team.
+        turn: (robots,), antenna: (robots, 2); `NOWHERE` for what is no unknown.
         band, border: how many unknowns are in each.
         width: diagonals of the band, the main one included.
     """
@@ -34,41 +38,74 @@ class BandLayout:
     scale: Index
     yaw: Index
     near_bias: Index
+    team_bias: Index
+    turn: Index
+    antenna: Index
     band: int
     border: int
     width: int
 
     @staticmethod
     def of(problem: Problem) -> BandLayout:
-        count, priors = len(problem.initial), problem.priors
+        count, robots = len(problem.initial), len(problem.priors.scale)
         factors = (problem.odometry, problem.closures, problem.ranges)
         i = np.concatenate([f.i for f in factors])
         j = np.concatenate([f.j for f in factors])
-        apart = border_poses(i, j, narrow=8 + 4 * len(priors.scale))
+        apart = border_poses(i, j, narrow=8 + 4 * robots)
         inside = np.ones(count, dtype=bool)
         inside[apart] = False
         place = np.where(inside, np.cumsum(inside) - 1, 0)
         place[apart] = count - len(apart) + np.arange(len(apart))
         both = inside[i] & inside[j]
         reach = int(np.abs(place[i] - place[j])[both].max(initial=0))
-        sizes = [len(p) for p in (priors.bias, priors.scale, priors.yaw, priors.near_bias)]
+        doubted = problem.doubted
+        turns, antennas = int(doubted.track.sum()), 2 * int(doubted.antenna.sum())
+        sizes = [problem.pairs, robots, robots, 1, 1, turns, antennas]
         numbers = 3 * count + np.arange(sum(sizes))
-        bias, scale, yaw, near_bias = np.split(numbers, np.cumsum(sizes)[:-1])
+        *shared, turn, antenna = np.split(numbers, np.cumsum(sizes)[:-1])
+        bias, scale, yaw, near_bias, team_bias = shared
+        all_turns, all_antennas = np.full(robots, NOWHERE), np.full((robots, 2), NOWHERE)
+        all_turns[doubted.track], all_antennas[doubted.antenna] = turn, antenna.reshape(-1, 2)
         return BandLayout(
             poses=3 * place[:, None] + np.arange(3),
             bias=bias,
             scale=scale,
             yaw=yaw,
             near_bias=near_bias,
+            team_bias=team_bias,
+            turn=all_turns,
+            antenna=all_antennas,
             band=3 * (count - len(apart)),
             border=3 * len(apart) + sum(sizes),
             width=3 * reach + 3,
         )
 
+    def odometry_unknowns(self, odometry: OdometryFactors) -> Index:
+        """(m, 9) on which each link depends: both poses, scale, yaw rate and turn."""
+        sensors = np.stack([self.scale, self.yaw, self.turn], axis=-1)[odometry.robot]
+        return np.hstack([self.poses[odometry.i], self.poses[odometry.j], sensors])
+
+    def range_unknowns(self, ranges: RangeFactors) -> Index:
+        """(m, 12) likewise: both poses, bias, near-range bias and both antennas."""
+        near_bias = np.tile(self.near_bias, (len(ranges), 1))
+        antennas = self.antenna[ranges.robots].reshape(-1, 4)
+        constants = np.column_stack([self.bias[ranges.pair], near_bias, antennas])
+        return np.hstack([self.poses[ranges.i], self.poses[ranges.j], constants])
+
+    def carried_unknowns(self, ranges: RangeFactors) -> Index:
+        """(c, 16) of those that odometry has carried: yaw rate and scale of both robots besides."""
+        carried = ranges.chosen(ranges.is_carried)
+        constants = np.stack([self.yaw, self.scale], axis=-1)[carried.robots].reshape(-1, 4)
+        return np.hstack([self.range_unknowns(carried), constants])
+
     def calibration(self, unknowns: Array) -> Calibration:
         """The part of a vector over all unknowns that belongs to the sensors."""
-        parts = (self.bias, self.scale, self.yaw, self.near_bias)
-        return Calibration(*(unknowns[numbers] for numbers in parts))
+        parts = (self.bias, self.scale, self.yaw, self.near_bias, self.team_bias)
+        mountings = (
+            np.where(numbers == NOWHERE, 0.0, unknowns[numbers])
+            for numbers in (self.turn, self.antenna)
+        )
+        return Calibration(*(unknowns[numbers] for numbers in parts), *mountings)
 
 
 def border_poses(i: Index, j: Index, narrow: int) -> Index:

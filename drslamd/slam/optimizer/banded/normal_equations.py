@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from drslamd.slam.optimizer.banded.layout import BandLayout
+from drslamd.slam.optimizer.banded import linearised
+from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout
+from drslamd.slam.optimizer.banded.linearised import Linearised
+from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
+from drslamd.slam.optimizer.mounting_prior import ANTENNA, TRACK
 from drslamd.slam.optimizer.problem import (
-    BetweenFactors,
     Calibration,
     Problem,
-    corrected,
     pose_errors,
-    range_errors,
 )
 from drslamd.slam.se2 import Array, Index
 
@@ -23,39 +26,38 @@ GAUGE_SIGMA = 1e-5
 
 @dataclass
 class System:
-    """Lower band (w, n), border (n, b), corner (b, b), gradient (n + b,) and cost at some point."""
+    """A symmetric matrix: lower band (w, n), border (n, b) and corner (b, b)."""
 
     band: Array
     border: Array
     corner: Array
-    gradient: Array
-    cost: float
 
     @staticmethod
     def empty(layout: BandLayout) -> System:
         n, b = layout.band, layout.border
-        return System(
-            np.zeros((layout.width, n)), np.zeros((n, b)), np.zeros((b, b)), np.zeros(n + b), 0.0
-        )
+        return System(np.zeros((layout.width, n)), np.zeros((n, b)), np.zeros((b, b)))
 
-    def add_gaussian_prior(self, unknowns: Index, error: Array, stiffness: Array | float) -> None:
-        """Add independent priors."""
-        stiffness = np.broadcast_to(stiffness, error.shape)
+    def add_prior(self, unknowns: Index, stiffness: Array | float) -> None:
+        """Add independent priors by the information with which they hold unknowns (k,)."""
+        stiffness = np.broadcast_to(stiffness, unknowns.shape)
         inside = unknowns < len(self.border)
         self.band[0, unknowns[inside]] += stiffness[inside]
         outside = unknowns[~inside] - len(self.border)
         self.corner[outside, outside] += stiffness[~inside]
-        self.gradient[unknowns] += stiffness * error
-        self.cost += float(np.sum(stiffness * error**2))
 
-    def add_cauchy_prior(self, unknowns: Index, error: Array, sigma: Array) -> None:
-        """Add independent priors with the tails of Cauchy's: log(1 + (e / sigma)^2) by its weight.
+    def add_blocks(self, unknowns: Index, stiffness: Array) -> None:
+        """Hold m groups of unknowns (m, d) of the border with information (m, d, d)."""
+        at = unknowns - len(self.border)
+        self.corner[at[:, :, None], at[:, None, :]] += stiffness
 
-        Where little is measured the unknown stays near zero; where much is, the prior gives way.
-        """
-        scaled = (error / sigma) ** 2
-        self.add_gaussian_prior(unknowns, error, 1 / (sigma**2 * (1 + scaled)))
-        self.cost += float(np.sum(np.log1p(scaled) - scaled / (1 + scaled)))
+    def add_difference(self, unknowns: Index, one: Index, stiffness: Array) -> None:
+        """Hold unknowns (k,) of the border beside one other (1,) with information (k, k)."""
+        n = len(self.border)
+        many, single = unknowns - n, one - n
+        self.corner[np.ix_(many, many)] += stiffness
+        self.corner[many, single] -= stiffness.sum(axis=0)
+        self.corner[single, many] -= stiffness.sum(axis=0)
+        self.corner[single, single] += stiffness.sum()
 
 
 class _Assembly:
@@ -67,122 +69,225 @@ class _Assembly:
             unknowns: (m, c) on which each factor depends.
         """
         n, b = layout.band, layout.border
-        row, column = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
-        self._unknowns = unknowns.ravel()
-        self._in_band = (row >= column) & (row < n)
-        self._in_border = (row < n) & (column >= n)
-        self._in_corner = (row >= n) & (column >= n)
+        # the mountings come last, and most often none of them is an unknown
+        self._columns = int(np.flatnonzero((unknowns != NOWHERE).any(axis=0)).max(initial=-1)) + 1
+        unknowns = unknowns[:, : self._columns]
+        shape = (*unknowns.shape, unknowns.shape[1])
+        row = np.broadcast_to(unknowns[:, :, None], shape).ravel()
+        column = np.broadcast_to(unknowns[:, None, :], shape).ravel()
+        self._known = np.flatnonzero(unknowns.ravel() != NOWHERE)
+        self._unknowns = unknowns.ravel()[self._known]
+        self._in_band = np.flatnonzero((row >= column) & (row < n) & (column != NOWHERE))
+        self._in_border = np.flatnonzero((row < n) & (row != NOWHERE) & (column >= n))
+        self._in_corner = np.flatnonzero((row >= n) & (column >= n))
         self._band = ((row - column) * n + column)[self._in_band]
         self._border = (row * b + column - n)[self._in_border]
         self._corner = ((row - n) * b + column - n)[self._in_corner]
 
-    def add(self, system: System, error: Array, jacobian: Array, information: Array) -> None:
-        """Add J' W J, J' W e and e' W e.
-
-        Args:
-            error: (m, d); jacobian: (m, d, c); information: (m, d, d).
-        """
-        weighted = np.swapaxes(information @ jacobian, 1, 2)
-        blocks = weighted @ jacobian
+    def add_matrix(self, system: System, factors: Linearised) -> None:
+        """Add J' W J."""
+        jacobian = factors.jacobian[:, :, : self._columns]
+        blocks = (np.swapaxes(jacobian, 1, 2) @ (factors.information @ jacobian)).ravel()
         system.band += _sums(self._band, blocks[self._in_band], system.band)
         system.border += _sums(self._border, blocks[self._in_border], system.border)
         system.corner += _sums(self._corner, blocks[self._in_corner], system.corner)
-        gradient = (weighted @ error[..., None]).ravel()
-        system.gradient += _sums(self._unknowns, gradient, system.gradient)
-        system.cost += float(np.vdot(error, information @ error[..., None]))
+
+    def add_gradient(self, gradient: Array, factors: Linearised) -> None:
+        """Add J' f."""
+        each = (factors.pull[:, None, :] @ factors.jacobian[:, :, : self._columns]).ravel()
+        gradient += _sums(self._unknowns, each[self._known], gradient)
 
 
 def _sums(at: Index, values: Array, like: Array) -> Array:
     return np.bincount(at, values, like.size).reshape(like.shape)
 
 
+@dataclass(frozen=True)
+class _Where:
+    """The assemblies of one problem."""
+
+    odometry: _Assembly
+    closures: _Assembly
+    ranges: _Assembly
+    carried: _Assembly
+
+    @staticmethod
+    def of(problem: Problem, layout: BandLayout) -> _Where:
+        ranges = problem.ranges
+        ends = layout.poses[np.stack([problem.closures.i, problem.closures.j], axis=-1)]
+        return _Where(
+            _Assembly(layout, layout.odometry_unknowns(problem.odometry)),
+            _Assembly(layout, ends.reshape(-1, 6)),
+            _Assembly(layout, layout.range_unknowns(ranges.chosen(~ranges.is_carried))),
+            _Assembly(layout, layout.carried_unknowns(ranges)),
+        )
+
+    def of_ranges(
+        self, problem: Problem, point: Point, ranges: Linearised
+    ) -> Iterator[tuple[_Assembly, Linearised]]:
+        """Ranges as they were measured, and those that odometry has carried.
+
+        Args:
+            ranges: all of them, as if none was carried.
+        """
+        if not len(problem.ranges.carried.rows):
+            yield self.ranges, ranges
+            return
+        yield self.ranges, ranges.chosen(~problem.ranges.is_carried)
+        yield self.carried, linearised.carried_part(problem, point, ranges)
+
+
 class Equations:
     """The normal equations of one problem, at any point."""
 
-    def __init__(self, problem: Problem) -> None:
-        self._problem = problem
-        self.layout = layout = BandLayout.of(problem)
+    def __init__(self, problem: Problem, like: Equations | None = None) -> None:
+        """
+        Args:
+            like: of a problem with the same factors and unknowns, whatever it believes of them.
+        """
+        self.problem = problem
+        self.layout: BandLayout = like.layout if like else BandLayout.of(problem)
+        self._where: _Where = like._where if like else _Where.of(problem, self.layout)
+
+    def cost(self, point: Point, threshold: Array) -> float:
+        """Of all factors and priors.
+
+        Args:
+            threshold: (pairs,) sigmas beyond which a range loses weight.
+        """
+        problem = self.problem
         odometry, closures, ranges = problem.odometry, problem.closures, problem.ranges
-        poses = layout.poses
-        sensors = np.stack([layout.scale[odometry.robot], layout.yaw[odometry.robot]], axis=-1)
-        self._odometry = _Assembly(
-            layout, np.hstack([poses[odometry.i], poses[odometry.j], sensors])
-        )
-        self._closures = _Assembly(layout, np.hstack([poses[closures.i], poses[closures.j]]))
-        shared = np.tile(layout.near_bias, (len(ranges), 1))
-        self._ranges = _Assembly(
-            layout,
-            np.column_stack([poses[ranges.i], poses[ranges.j], layout.bias[ranges.pair], shared]),
+        poses, calibration = point.poses, point.calibration
+        moved = poses[problem.gauge] - problem.initial[problem.gauge]
+        c = threshold[ranges.pair]
+        return (
+            odometry.cost(point.link)
+            + closures.cost(pose_errors(poses, closures, closures.measured))
+            + float(np.sum(c**2 * np.log1p((point.sight.error / (c * ranges.sigma)) ** 2)))
+            + problem.priors.cost(calibration)
+            + float(moved @ moved) * GAUGE_SIGMA**-2
         )
 
-    def at(self, poses: Array, calibration: Calibration) -> System:
-        """Sum of J' W J and J' W e over all factors and priors."""
-        system = System.empty(self.layout)
-        self._add_odometry(system, poses, calibration)
-        self._add_closures(system, poses)
-        self._add_ranges(system, poses, calibration)
-        layout, priors = self.layout, self._problem.priors
-        for unknowns, values, widths in (
-            (layout.bias, calibration.bias, priors.bias),
-            (layout.scale, calibration.scale, priors.scale),
-        ):
-            if priors.has_cauchy_tails:
-                system.add_cauchy_prior(unknowns, values, widths)
-            else:
-                system.add_gaussian_prior(unknowns, values, widths**-2.0)
-        system.add_gaussian_prior(layout.yaw, calibration.yaw, priors.yaw**-2.0)
-        system.add_gaussian_prior(layout.near_bias, calibration.near_bias, priors.near_bias**-2.0)
-        gauge = self._problem.gauge
-        moved = poses[gauge] - self._problem.initial[gauge]
-        system.add_gaussian_prior(layout.poses[gauge], moved, GAUGE_SIGMA**-2)
+    def gradient(self, point: Point) -> Array:
+        """(n + b,) half the derivative of the cost."""
+        gradient = np.zeros(self.layout.band + self.layout.border)
+        for where, factors in self._factors(point, LEAST_CURVATURE):
+            where.add_gradient(gradient, factors)
+        self._add_pull_of_priors(gradient, point)
+        return gradient
+
+    def at(self, point: Point, least: float = LEAST_CURVATURE) -> tuple[System, Array]:
+        """A matrix close to half the second derivative of the cost, and the gradient.
+
+        Args:
+            least: see `bias_prior.LEAST_CURVATURE`.
+        """
+        layout = self.layout
+        system, gradient = System.empty(layout), np.zeros(layout.band + layout.border)
+        for where, factors in self._factors(point, least):
+            where.add_matrix(system, factors)
+            where.add_gradient(gradient, factors)
+        self._add_heavy_priors(system, point.calibration, least)
+        self._add_gaussian_priors(system)
+        self._add_pull_of_priors(gradient, point)
+        return system, gradient
+
+    def claimed(self, point: Point, claims: Array) -> System:
+        """What is known at the solution: a system whose inverse is the covariance to be claimed.
+
+        Weights that make a good estimate are no honest claim. Here ranges that share their errors
+        count as such, and priors are as wide as they are configured.
+
+        Args:
+            claims: see `linearised.weighed_ranges`.
+        """
+        layout, priors = self.layout, self.problem.priors
+        system = self._weighed(point, claims)
+        system.add_prior(layout.bias, priors.bias.sigma**-2)
+        system.add_prior(layout.team_bias, priors.bias.sigma**-2)
+        system.add_prior(layout.scale, priors.scale**-2.0)
+        self._add_mounting_priors(system, point.calibration, LEAST_CURVATURE)
         return system
 
-    def _add_odometry(self, system: System, poses: Array, calibration: Calibration) -> None:
-        odometry = self._problem.odometry
-        error = pose_errors(poses, odometry, corrected(odometry, calibration))
-        x, y = odometry.measured[:, 0], odometry.measured[:, 1]
-        jacobian = np.zeros((len(odometry), 3, 8))
-        jacobian[:, :, :6] = _pose_jacobians(poses, odometry)
-        jacobian[:, 0, 6], jacobian[:, 1, 6] = x, y
-        jacobian[:, 0, 7] = -odometry.path / 2 * y
-        jacobian[:, 1, 7] = odometry.path / 2 * x
-        jacobian[:, 2, 7] = odometry.path
-        self._odometry.add(system, error, jacobian, odometry.information)
+    def bias_belief(self, point: Point) -> Array:
+        """(b, b) what the border gains where biases are as believed instead of as claimed."""
+        layout, prior = self.layout, self.problem.priors.bias
+        gain = System.empty(layout)
+        self._add_bias_prior(gain, point.calibration, LEAST_CURVATURE)
+        gain.add_prior(layout.bias, -(prior.sigma**-2))
+        gain.add_prior(layout.team_bias, -(prior.sigma**-2))
+        return gain.corner
 
-    def _add_closures(self, system: System, poses: Array) -> None:
-        closures = self._problem.closures
-        error = pose_errors(poses, closures, closures.measured)
-        self._closures.add(system, error, _pose_jacobians(poses, closures), closures.information)
+    def weighed(self, point: Point) -> System:
+        """What the factors say by their weights: what is left of an outlier's counts still."""
+        claims = np.ones(self.problem.pairs)
+        system = self._weighed(point, claims)
+        self._add_heavy_priors(system, point.calibration, LEAST_CURVATURE)
+        return system
 
-    def _add_ranges(self, system: System, poses: Array, calibration: Calibration) -> None:
-        ranges, model = self._problem.ranges, self._problem.model
-        error, u, arm_i, arm_j = range_errors(poses, ranges, calibration, model)
-        jacobian = np.ones((len(ranges), 1, 8))
-        jacobian[:, 0, 0], jacobian[:, 0, 1] = -u.real, -u.imag
-        jacobian[:, 0, 2] = u.real * arm_i.imag - u.imag * arm_i.real
-        jacobian[:, 0, 3], jacobian[:, 0, 4] = u.real, u.imag
-        jacobian[:, 0, 5] = u.imag * arm_j.real - u.real * arm_j.imag
-        jacobian[:, 0, 7] = model.near_range_shape(ranges.measured)
-        # Cauchy's cost c^2 log(1 + (e / c)^2) by its weight; e and c in sigmas
-        c = model.cauchy_sigmas
-        scaled = (error / (c * ranges.sigma)) ** 2
-        weight = 1 / (1 + scaled)
-        information = (weight / ranges.sigma**2)[:, None, None]
-        self._ranges.add(system, error[:, None], jacobian, information)
-        robust = float(np.sum(c**2 * np.log1p(scaled)))
-        system.cost += robust - float(np.sum(weight * (error / ranges.sigma) ** 2))
+    def _weighed(self, point: Point, claims: Array) -> System:
+        problem = self.problem
+        system = System.empty(self.layout)
+        self._where.odometry.add_matrix(system, linearised.odometry_at(problem, point))
+        if len(problem.closures):
+            self._where.closures.add_matrix(system, linearised.closures_at(problem, point.poses))
+        ranges = linearised.weighed_ranges(problem, point, claims)
+        for where, factors in self._where.of_ranges(problem, point, ranges):
+            where.add_matrix(system, factors)
+        self._add_gaussian_priors(system)
+        return system
 
+    def _factors(self, point: Point, least: float) -> Iterator[tuple[_Assembly, Linearised]]:
+        problem = self.problem
+        yield self._where.odometry, linearised.odometry_at(problem, point)
+        if len(problem.closures):
+            yield self._where.closures, linearised.closures_at(problem, point.poses)
+        ranges = linearised.ranges_at(problem, point, least)
+        yield from self._where.of_ranges(problem, point, ranges)
 
-def _pose_jacobians(poses: Array, factors: BetweenFactors) -> Array:
-    """(m, 3, 6): derivative of `pose_errors` by both poses of each factor."""
-    theta = poses[factors.i, 2]
-    cos, sin = np.cos(theta), np.sin(theta)
-    d = poses[factors.j, :2] - poses[factors.i, :2]
-    j = np.zeros((len(factors), 3, 6))
-    j[:, 0, 0] = j[:, 1, 1] = -cos
-    j[:, 0, 1], j[:, 1, 0] = -sin, sin
-    j[:, 0, 2] = -sin * d[:, 0] + cos * d[:, 1]
-    j[:, 1, 2] = -cos * d[:, 0] - sin * d[:, 1]
-    j[:, :2, 3:5] = -j[:, :2, :2]
-    j[:, 2, 2], j[:, 2, 5] = -1, 1
-    return j
+    def _add_heavy_priors(self, system: System, calibration: Calibration, least: float) -> None:
+        layout, priors = self.layout, self.problem.priors
+        self._add_bias_prior(system, calibration, least)
+        system.add_prior(layout.scale, priors.scale_curvature(calibration.scale, least))
+        self._add_mounting_priors(system, calibration, least)
+
+    def _add_bias_prior(self, system: System, calibration: Calibration, least: float) -> None:
+        layout, prior = self.layout, self.problem.priors.bias
+        team = float(calibration.team_bias[0])
+        own = prior.own_curvature(calibration.bias - team, least)
+        system.add_difference(layout.bias, layout.team_bias, own)
+        system.add_prior(layout.team_bias, prior.team_curvature(team, least))
+
+    def _add_mounting_priors(self, system: System, calibration: Calibration, least: float) -> None:
+        layout, doubted = self.layout, self.problem.doubted
+        for prior, numbers, values in (
+            (TRACK, layout.turn[doubted.track, None], calibration.turn[doubted.track, None]),
+            (ANTENNA, layout.antenna[doubted.antenna], calibration.antenna[doubted.antenna]),
+        ):
+            system.add_blocks(numbers, prior.curvature(values, least))
+
+    def _add_gaussian_priors(self, system: System) -> None:
+        layout, priors = self.layout, self.problem.priors
+        system.add_prior(layout.yaw, priors.yaw**-2.0)
+        system.add_prior(layout.near_bias, priors.near_bias**-2.0)
+        system.add_prior(layout.poses[self.problem.gauge], GAUGE_SIGMA**-2)
+
+    def _add_pull_of_priors(self, gradient: Array, point: Point) -> None:
+        layout, problem, calibration = self.layout, self.problem, point.calibration
+        priors, gauge = problem.priors, problem.gauge
+        team = float(calibration.team_bias[0])
+        pull = priors.bias.own_pull(calibration.bias - team)
+        gradient[layout.bias] += pull
+        gradient[layout.team_bias] += priors.bias.team_pull(team) - pull.sum()
+        gradient[layout.scale] += priors.scale_pull(calibration.scale)
+        doubted = problem.doubted
+        turn, antenna = (
+            TRACK.pull(calibration.turn[:, None])[:, 0],
+            ANTENNA.pull(calibration.antenna),
+        )
+        gradient[layout.turn[doubted.track]] += turn[doubted.track]
+        gradient[layout.antenna[doubted.antenna]] += antenna[doubted.antenna]
+        gradient[layout.yaw] += calibration.yaw / priors.yaw**2
+        gradient[layout.near_bias] += calibration.near_bias / priors.near_bias**2
+        moved = point.poses[gauge] - problem.initial[gauge]
+        gradient[layout.poses[gauge]] += moved / GAUGE_SIGMA**2

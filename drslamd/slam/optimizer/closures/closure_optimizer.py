@@ -47,17 +47,19 @@ class ClosureOptimizer:
         public: Mapping[int, PublicPoses],
     ) -> Job | None:
         """See `Optimizer.job`; public poses are not needed."""
-        places = factors.numbering(graph, group.members, group.shift_us)
-        chains = [graph.chains[robot].chain for robot in sorted({s.robot for s in group.members})]
+        places = factors.numbering(graph, group.members)
+        chains = [
+            graph.view.chains[robot].chain for robot in sorted({s.robot for s in group.members})
+        ]
         is_known = previous and {c.robot for c in chains} <= set(previous.trajectories)
-        edges, is_closure = _edges(graph, places)
+        edges, is_closure = closure_edges(graph, places)
         problem = _ClosureProblem(
             places=places,
             edges=edges,
             is_closure=is_closure,
             chains=chains,
             gauge=factors.gauge_place(graph, group, places),
-            origin=graph.segment(group.frame).poses[0],
+            origin=graph.view.segment(group.frame).poses[0],
             start=factors.initial_poses(graph, group, previous, places) if is_known else None,
         )
         return partial(_solve, problem, group, self.believable)
@@ -82,11 +84,11 @@ class _ClosureProblem:
     start: Array | None
 
 
-def _edges(graph: PoseGraph, places: Numbering) -> tuple[ComplexFactors, NDArray[np.bool_]]:
+def closure_edges(graph: PoseGraph, places: Numbering) -> tuple[ComplexFactors, NDArray[np.bool_]]:
     """All edges, and which of them are closures."""
     parts = [ComplexFactors.of(factors.closures(graph, places))]
     for robot, place in places.place.items():
-        links = chain_links(graph.chains[robot], calibrated=False)
+        links = chain_links(graph.view.chains[robot], calibrated=False)
         numbered = BetweenFactors(place[links.i], place[links.j], links.measured, links.covariance)
         parts.append(ComplexFactors.of(numbered))
     edges = ComplexFactors.joined(parts)
@@ -103,19 +105,16 @@ def _solve(problem: _ClosureProblem, group: Group, believable: float) -> TeamEst
     poses = se2.compose(w_T_any[None], answer.poses)
     poses[:, 2] = se2.wrap(poses[:, 2])
     mine = {chain.robot: places.of_robot(chain.robot) for chain in problem.chains}
-    last = {robot: int(at[-1]) for robot, at in mine.items()}
     # the cost counts an angle twice (`ComplexFactors.of`), which for a covariance it must not
     weighed = replace(edges, kappa=edges.kappa / 2)
-    covariances = PoseGraphSolver(weighed, count, problem.gauge).marginals(
-        poses, list(last.values())
-    )
+    solver = PoseGraphSolver(weighed, count, problem.gauge)
     return TeamEstimate(
         frame=group.frame,
         trajectories={
             c.robot: Trajectory(c, places.n[mine[c.robot]], poses[mine[c.robot]])
             for c in problem.chains
         },
-        covariances=dict(zip(last, covariances, strict=True)),
+        joint=solver.joint_covariance(poses, [int(mine[c.robot][-1]) for c in problem.chains]),
         cost=answer.cost,
         iterations=answer.steps,
         converged=answer.converged,

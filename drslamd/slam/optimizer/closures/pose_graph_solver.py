@@ -68,7 +68,7 @@ class PoseGraphSolver:
     def __init__(self, edges: ComplexFactors, count: int, gauge: int = 0) -> None:
         """
         Args:
-            gauge: the pose that is held, which only `marginals` shows.
+            gauge: the pose that is held, which only `joint_covariance` shows.
         """
         self._order = elimination_order(edges.i, edges.j, count)
         self._place = np.argsort(self._order)
@@ -153,8 +153,8 @@ class PoseGraphSolver:
         )
         return np.column_stack([x, y, theta])[self._place]
 
-    def marginals(self, poses: Array, wanted: list[int]) -> list[Array]:
-        """(3, 3) covariances of x, y, theta of some poses, while the gauge is held.
+    def joint_covariance(self, poses: Array, wanted: list[int]) -> Array:
+        """(3 k, 3 k) of x, y, theta of k poses, while the gauge is held.
 
         Args:
             poses: (n, 3), of least cost.
@@ -165,8 +165,7 @@ class PoseGraphSolver:
         unit = np.zeros((3 * self._count, 3 * len(wanted)))
         at = 3 * self._place[wanted][:, None] + np.arange(3)
         unit[at.ravel(), np.arange(at.size)] = 1
-        inverse = factor.solve(unit)[at].reshape(len(wanted), 3, len(wanted), 3)
-        return [inverse[k, :, k] for k in range(len(wanted))]
+        return np.asarray(factor.solve(unit)[at.ravel()])
 
     def cost(self, poses: Array) -> float:
         """Of poses (n, 3)."""

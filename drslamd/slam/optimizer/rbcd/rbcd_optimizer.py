@@ -2,66 +2,95 @@
 
 A robot holds its own trajectory, the closures that it takes part in and the public poses of its
 neighbours. Who is not yet placed waits until a neighbour is; the group's lowest robot is always
-placed, so the frame spreads from it.
+placed, so the frame spreads from it. When a robot may move says `pose_exchange`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from drslamd.conventions import Chain
+from drslamd.conventions import Chain, Segment
 from drslamd.slam import se2
-from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.estimate import Lifted, TeamEstimate, Trajectory
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
+from drslamd.slam.graph.thinning.chain_view import ChainView
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.optimizer.contract import Job
-from drslamd.slam.optimizer.factors import between_factors, chain_links
+from drslamd.slam.optimizer.factors import chain_links
 from drslamd.slam.optimizer.problem import BetweenFactors
 from drslamd.slam.optimizer.rbcd import riemannian_descent
-from drslamd.slam.se2 import Array
+from drslamd.slam.optimizer.rbcd.lifted_neighbours import (
+    LiftedNeighbours,
+    SharedClosures,
+    lifted_neighbours,
+    on_sphere,
+    shared_closures,
+)
+from drslamd.slam.se2 import Array, Index
 
-SETTLED = 1e-7
-"""Relative gain of a round below which a block waits for news."""
-OFF_SPHERE = 1e-2
-"""A rotation whose length is wrong by more than rounding to 32 bits is not one."""
+SETTLED = 1e-9
+"""Relative gain of a move below which a block waits for news: what the whole team could still gain
+is some hundred times as much."""
+MOST_LEAN = 0.9
+"""How far past its minimum a block goes at most: where the team is stiff, halves what is missing
+in seven rounds; where it is not, still in fifteen."""
+HALF_LEAN = 4
+"""Moves until a block goes half of that past its minimum."""
+AFTER_NEWS = 2
+"""So many count when something new was measured: what goes far past what is only just measured
+swings about it, and news come every second."""
 
 
 @dataclass(frozen=True)
-class LiftedNeighbours:
-    """The lifted poses that this robot's closures lead to.
+class OwnBlock:
+    """What is measured of our own poses.
 
     Attributes:
-        chains, n: (m,) whose keyframes they are; rows: (m, 2 r).
-        leaving: edges from our poses (i) to rows (j); arriving: from rows (i) to our poses (j).
-        carriers: (k,) our keyframes that carry closures, to whomever.
+        n: (k,) keyframes; odometry: (k, 3) where it has them; links: between them, by their places.
+        shared: closures to other robots.
     """
 
-    chains: tuple[Chain, ...]
-    n: Array
-    rows: Array
-    leaving: BetweenFactors
-    arriving: BetweenFactors
-    carriers: Array
+    chain: Chain
+    n: Index
+    odometry: Array
+    links: BetweenFactors
+    shared: list[SharedClosures]
+
+
+@dataclass(frozen=True)
+class AnchoredFrame:
+    """The frame of the team: its segment, and where (3,) in it the pose is that anchors it."""
+
+    segment: Segment
+    origin: Array
 
 
 @dataclass(frozen=True)
 class Start:
-    """Our block before a round: keyframes n (k,), lifted (k, 2 r), with the odometry between."""
+    """Our block before a move.
 
-    n: Array
+    Attributes:
+        lifted: (k, 2 r).
+        anchor: (2 r,) of the frame; None where the frame is ours.
+        quiet: how many moves were made on the very same measurements.
+    """
+
+    own: OwnBlock
+    around: LiftedNeighbours
+    frame: AnchoredFrame
     lifted: Array
-    own: BetweenFactors
+    anchor: Array | None
+    quiet: int
 
 
 class RbcdOptimizer:
-    """One round of block coordinate descent at a time."""
+    """One move of block coordinate descent at a time."""
 
     def __init__(self, own: Chain, rank: int) -> None:
         """
@@ -78,57 +107,89 @@ class RbcdOptimizer:
         public: Mapping[int, PublicPoses],
     ) -> Job | None:
         """See `Optimizer.job`."""
-        data = graph.chains[self._own.robot]
+        data = graph.view.chains[self._own.robot]
         used = _in_group(data, group)
-        fitting = {k: p for k, p in sorted(public.items()) if p.rank == self._rank}
-        around = lifted_neighbours(graph, data, used, fitting, self._rank)
-        anchor = _anchor(fitting, group)
-        lifted = self._start(data, used, group, previous, around)
-        if lifted is None or (anchor is None and group.frame.chain != self._own):
+        keyframes = data.keyframes.chosen(used)
+        shared = shared_closures(graph, self._own)
+        own = OwnBlock(self._own, keyframes.n, keyframes.poses, _links(data, used), shared)
+        frame = AnchoredFrame(group.frame, graph.view.segment(group.frame).poses[0])
+        before = previous.lifted if previous and previous.frame == group.frame else None
+        begun = start(own, frame, before, public, self._rank)
+        return partial(move, begun) if begun else None
+
+
+def start(
+    own: OwnBlock,
+    frame: AnchoredFrame,
+    before: Lifted | None,
+    public: Mapping[int, PublicPoses],
+    rank: int,
+) -> Start | None:
+    """Our block where it is before a move; None while neither it nor the frame is known.
+
+    Args:
+        before: after our last move in this frame.
+        public: poses of others in this frame, by robot.
+        rank: of the relaxation.
+    """
+    fitting = {
+        robot: poses.of_rank(rank) for robot, poses in sorted(public.items()) if poses.rank <= rank
+    }
+    around = lifted_neighbours(own.shared, own.n, fitting, rank)
+    owns = frame.segment.chain == own.chain
+    anchor = None if owns else _anchor(fitting, frame.segment.robot)
+    lifted = placed_rows(own.n, own.odometry, before, around, rank if owns else None)
+    if lifted is None or (anchor is None and not owns):
+        return None
+    same = before is not None and np.array_equal(before.n, own.n) and before.ends == len(around.n)
+    quiet = before.quiet + 1 if before else 0
+    if not same:
+        quiet = min(quiet, AFTER_NEWS)
+    return Start(own, around, frame, lifted, anchor, quiet)
+
+
+def placed_rows(
+    n: Array, odometry: Array, before: Lifted | None, around: LiftedNeighbours, rank: int | None
+) -> Array | None:
+    """(k, 2 r) our keyframes: as they were, else by odometry from the nearest that is known, else
+    as closures to neighbours tell. None: no neighbour is known.
+
+    Args:
+        n, odometry: (k,) and (k, 3) our keyframes.
+        before: after our last move in this frame.
+        rank: of the relaxation, where the frame is ours; then the first keyframe is where odometry
+            has it.
+    """
+    known = np.isin(n, before.n) if before else np.zeros(len(n), dtype=bool)
+    if before is not None and known.any():
+        at = np.flatnonzero(known)
+        rows = before.rows[np.searchsorted(before.n, n[at])]
+    elif rank is not None:
+        at, rows = np.zeros(1, dtype=np.int64), riemannian_descent.lift(odometry[:1], rank)
+    else:
+        out, back = around.leaving, around.arriving
+        at = np.concatenate([out.i, back.j])
+        rows = np.concatenate(
+            [
+                riemannian_descent.moved(around.rows[out.j], se2.inverse(out.measured)),
+                riemannian_descent.moved(around.rows[back.i], back.measured),
+            ]
+        )
+        if not len(at):
             return None
-        start = Start(data.keyframes.n[used], lifted, _links(data, used))
-        return partial(_round, start, around, anchor, group, self._own)
-
-    def _start(
-        self,
-        data: ChainData,
-        used: Array,
-        group: Group,
-        previous: TeamEstimate | None,
-        around: LiftedNeighbours,
-    ) -> Array | None:
-        """(k, 2 r) our keyframes: as they were, else by odometry from the nearest that is known."""
-        n, poses = data.keyframes.n[used], data.keyframes.poses[used]
-        known = previous.lifted if previous and previous.frame == group.frame else None
-        if known is not None and np.isin(n, known.n).any():
-            at = np.flatnonzero(np.isin(n, known.n))
-            rows = known.rows[np.searchsorted(known.n, n[at])]
-        elif group.frame.chain == self._own:
-            at, rows = np.zeros(1, dtype=np.int64), riemannian_descent.lift(poses[:1], self._rank)
-        else:
-            out, back = around.leaving, around.arriving
-            at = np.concatenate([out.i, back.j])
-            rows = np.concatenate(
-                [
-                    riemannian_descent.moved(around.rows[out.j], se2.inverse(out.measured)),
-                    riemannian_descent.moved(around.rows[back.i], back.measured),
-                ]
-            )
-            if not len(at):
-                return None
-            order = np.argsort(at, kind="stable")
-            at, rows = at[order], rows[order]
-        nearest = np.searchsorted((n[at][1:] + n[at][:-1]) / 2, n)
-        return riemannian_descent.moved(rows[nearest], se2.between(poses[at][nearest], poses))
+        order = np.argsort(at, kind="stable")
+        at, rows = at[order], rows[order]
+    nearest = np.searchsorted((n[at][1:] + n[at][:-1]) / 2, n)
+    return riemannian_descent.moved(rows[nearest], se2.between(odometry[at][nearest], odometry))
 
 
-def _in_group(data: ChainData, group: Group) -> Array:
+def _in_group(data: ChainView, group: Group) -> Array:
     """Which of our rows lie in segments of the group."""
     segments = [s.segment for s in group.members if s.chain == data.chain]
     return np.flatnonzero(np.isin(data.keyframes.segment, segments))
 
 
-def _links(data: ChainData, used: Array) -> BetweenFactors:
+def _links(data: ChainView, used: Array) -> BetweenFactors:
     """Our odometry between the rows `used`, numbered as they are."""
     links = chain_links(data, calibrated=False)
     place = np.full(len(data.keyframes), -1)
@@ -138,98 +199,80 @@ def _links(data: ChainData, used: Array) -> BetweenFactors:
     return BetweenFactors(i[inside], j[inside], links.measured[inside], links.covariance[inside])
 
 
-def _anchor(public: Mapping[int, PublicPoses], group: Group) -> Array | None:
-    """The origin of the frame as the nearest to its owner has it."""
-    nearest = sorted(public, key=lambda robot: (robot != group.frame.robot, robot))
+def _anchor(public: Mapping[int, PublicPoses], owner: int) -> Array | None:
+    """The pose that anchors the frame as the nearest to its owner has it."""
+    nearest = sorted(public, key=lambda robot: (robot != owner, robot))
     anchors = (public[robot].values[0] for robot in nearest)
-    return next((a for a in anchors if _on_sphere(a[None]).all()), None)
+    return next((a for a in anchors if on_sphere(a[None]).all()), None)
 
 
-def _on_sphere(rows: Array) -> Array:
-    """Which of the rows (k, 2 r) have a rotation."""
-    length = np.linalg.norm(rows[:, : rows.shape[1] // 2], axis=1)
-    return np.asarray(np.abs(length - 1) < OFF_SPHERE)
-
-
-def lifted_neighbours(
-    graph: PoseGraph,
-    data: ChainData,
-    used: Array,
-    public: Mapping[int, PublicPoses],
-    rank: int,
-) -> LiftedNeighbours:
-    """Sort the kept closures of our own pairs by whether the other end is known.
-
-    Args:
-        used: (k,) rows of our chain that the block consists of.
-        public: poses of that rank.
-    """
-    own = data.chain
-    leaving: list[tuple[int, int, tuple[float, ...], Array]] = []
-    arriving: list[tuple[int, int, tuple[float, ...], Array]] = []
-    chains: list[Chain] = []
-    keyframes: list[int] = []
-    rows: list[Array] = []
-    carriers: set[int] = set()
-    number = {int(n): k for k, n in enumerate(data.keyframes.n[used])}
-    for pair in graph.usable():
-        if own not in (pair.a, pair.b):
-            continue
-        outward = pair.a == own
-        other = pair.b if outward else pair.a
-        table = public[other.robot].table() if other.robot in public else {}
-        for closure in pair.kept_closures():
-            mine, far = (closure.a_n, closure.b_n) if outward else (closure.b_n, closure.a_n)
-            if mine not in number:
-                continue
-            carriers.add(mine)
-            if far not in table or not _on_sphere(table[far][None])[0]:
-                continue
-            edge = (closure.a_T_b, se2.unpacked(closure.covariance))
-            if outward:
-                leaving.append((number[mine], len(rows), *edge))
-            else:
-                arriving.append((len(rows), number[mine], *edge))
-            chains.append(other)
-            keyframes.append(far)
-            rows.append(table[far])
-    return LiftedNeighbours(
-        tuple(chains),
-        np.array(keyframes),
-        np.array(rows, dtype=complex).reshape(-1, 2 * rank),
-        between_factors(leaving),
-        between_factors(arriving),
-        np.array(sorted(carriers)),
+def move(begun: Start) -> TeamEstimate:
+    """Our block moves, if that is worth it; what that means in the frame of the team."""
+    own, around, frame = begun.own, begun.around, begun.frame
+    edges = [ComplexFactors.of(e) for e in (own.links, around.leaving, around.arriving)]
+    block = riemannian_descent.block(edges[0], edges[1], edges[2], around.rows, len(own.n))
+    before = riemannian_descent.stacked(begun.lifted)
+    lowest, steps = riemannian_descent.descend(block, before)
+    cost = block.cost(before)
+    gain = (cost - block.cost(lowest)) / (1 + cost)
+    after = before
+    if gain > SETTLED:
+        lean = MOST_LEAN * begun.quiet / (begun.quiet + HALF_LEAN)
+        after = riemannian_descent.leaned(block, before, lowest, lean)
+    lifted = riemannian_descent.rows(after)
+    last, held = len(own.n) - 1, 0 if begun.anchor is None else None
+    anchor = lifted[0] if begun.anchor is None else begun.anchor
+    covariance = riemannian_descent.conditional_covariance(block, last, held)
+    return TeamEstimate(
+        frame.segment,
+        _trajectories(begun, lifted, anchor),
+        joint=covariance,
+        cost=block.cost(after),
+        iterations=steps,
+        converged=gain <= SETTLED,
+        lifted=Lifted(
+            n=own.n,
+            rows=lifted,
+            anchor=anchor,
+            origin=frame.origin,
+            carriers=around.carriers,
+            weights=around.weights,
+            ends=len(around.n),
+            quiet=begun.quiet,
+            gain=gain,
+        ),
     )
 
 
-def _round(
-    start: Start, around: LiftedNeighbours, anchor: Array | None, group: Group, chain: Chain
-) -> TeamEstimate:
-    """One round on our block, and what it means in the frame of the team."""
-    edges = [ComplexFactors.of(e) for e in (start.own, around.leaving, around.arriving)]
-    block = riemannian_descent.block(edges[0], edges[1], edges[2], around.rows, len(start.n))
-    before = riemannian_descent.stacked(start.lifted)
-    after = riemannian_descent.descend(block, before)
-    gain, cost = block.cost(before) - block.cost(after), block.cost(after)
-    lifted = riemannian_descent.rows(after)
-    ours = group.frame.chain == chain
-    origin = lifted[0] if anchor is None or ours else anchor
-    trajectories = {
-        chain.robot: Trajectory(chain, start.n, riemannian_descent.rounded(lifted, origin))
-    }
+def _trajectories(begun: Start, lifted: Array, anchor: Array) -> dict[int, Trajectory]:
+    """Ours, and what is known of our neighbours'."""
+    own, around, origin = begun.own, begun.around, begun.frame.origin
+    out = {own.chain.robot: Trajectory(own.chain, own.n, _in_frame(lifted, anchor, origin))}
     for other in dict.fromkeys(around.chains):
         mine = [k for k, c in enumerate(around.chains) if c == other]
         keyframes, first = np.unique(around.n[mine], return_index=True)
-        poses = riemannian_descent.rounded(around.rows[mine][first], origin)
-        trajectories[other.robot] = Trajectory(other, keyframes, poses)
-    last = len(start.n) - 1
-    return TeamEstimate(
-        group.frame,
-        trajectories,
-        {chain.robot: riemannian_descent.conditional_covariance(block, last, 0 if ours else None)},
-        cost=cost,
-        iterations=riemannian_descent.STEPS_PER_ROUND,
-        converged=gain <= SETTLED * (1 + cost),
-        lifted=Lifted(start.n, lifted, origin, around.carriers),
-    )
+        poses = _in_frame(around.rows[mine][first], anchor, origin)
+        out[other.robot] = Trajectory(other, keyframes, poses)
+    return out
+
+
+def _in_frame(lifted: Array, anchor: Array, origin: Array) -> Array:
+    """(k, 3) in the frame of the team, where the anchor is at `origin`."""
+    return se2.compose(origin[None], riemannian_descent.rounded(lifted, anchor))
+
+
+def at_anchor(estimate: TeamEstimate, owner: PublicPoses) -> TeamEstimate:
+    """The same estimate where the owner of the frame has moved the pose that anchors it."""
+    lifted = estimate.lifted
+    if lifted is None or owner.rank > len(lifted.anchor) // 2:
+        return estimate
+    anchor = owner.of_rank(len(lifted.anchor) // 2).values[0]
+    if np.array_equal(lifted.anchor, anchor) or not on_sphere(anchor[None])[0]:
+        return estimate
+    was = _in_frame(lifted.anchor[None], anchor, lifted.origin)[0]
+    turn = se2.compose(was, se2.inverse(lifted.origin))
+    trajectories = {
+        robot: replace(t, poses=se2.compose(turn[None], t.poses))
+        for robot, t in estimate.trajectories.items()
+    }
+    return replace(estimate, trajectories=trajectories, lifted=replace(lifted, anchor=anchor))

@@ -6,9 +6,14 @@ optimisation is then
     min  sum kappa |z_j - z_i z_ij|^2 + tau |p_j - p_i - z_i t_ij|^2,   |z_k| = 1.
 
 The rank-restricted relaxation lets z and p be vectors of C^r: rotations live on spheres, and for
-a moderate r local minima disappear. Every robot owns the block of its own poses and improves it by
-preconditioned Riemannian gradient descent while the poses of its neighbours stay as they were last
-heard. Only public poses, those that carry closures, are exchanged; nobody waits for anybody.
+a moderate r local minima disappear. (Poses that begin in a plane stay in it; then r costs nothing
+on the air.) Every robot owns the block of its own poses and improves it by preconditioned
+Riemannian descent while the poses of its neighbours stay as they were last heard. Only public
+poses, those that carry closures, are exchanged.
+
+With its neighbours held a block's cost is quadratic, so a step that goes past the block's minimum,
+to x + (1 + lean) (y - x) with 0 < lean < 1, lowers the cost as well (Ostrowski 1954), and of what
+the whole team still has to move together it brings far more: block successive over-relaxation.
 """
 
 from __future__ import annotations
@@ -21,15 +26,39 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.se2 import Array
 
-STEPS_PER_ROUND = 3
-"""Descent steps on one block before its public poses are sent; more would fit the block to
-neighbours that are about to move."""
+MOST_STEPS = 30
+"""Descent steps on one block; ten are enough unless it was just placed."""
+ENOUGH = 1e-3
+"""Gain of a step, as a share of that of all steps before, after which no other one is taken: the
+neighbours are about to move anyway."""
 SUFFICIENT = 1e-4
 """Armijo's constant."""
+SHORTEST = 1e-6
+"""Share of a step below which none is taken."""
+LEAST_LEAN = 0.05
+"""A shorter way past the minimum is not worth a trial."""
 REGULARISATION = 1e-6
 """Of the preconditioner, relative to its diagonal."""
 HOLD = 1e10
 """Weight that pins a pose: 10 um."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """m squares of a block's cost: weight |sum_k factor_k x_k + pull|^2 over the k own ends.
+
+    Attributes:
+        weight: (m,); factors: (k, m) complex; rows: (k, m) of X; pull: (m, r) of held neighbours.
+    """
+
+    weight: Array
+    factors: Array
+    rows: Array
+    pull: Array
+
+    def cost(self, x: Array) -> float:
+        ends = np.einsum("km,kmr->mr", self.factors, x[self.rows])
+        return float(self.weight @ np.sum(np.abs(ends + self.pull) ** 2, axis=-1))
 
 
 @dataclass(frozen=True)
@@ -41,12 +70,12 @@ class BlockProblem:
     Attributes:
         q: (w + 1, 2n) lower band of the Hermitian Q.
         g: (2n, r) pull of the fixed neighbours.
-        constant: cost that no own pose can change.
+        terms: f once more, square by square.
     """
 
     q: Array
     g: Array
-    constant: float
+    terms: tuple[Term, ...]
 
     def apply(self, x: Array) -> Array:
         """Q X."""
@@ -58,7 +87,12 @@ class BlockProblem:
         return np.asarray(out)
 
     def cost(self, x: Array) -> float:
-        return float(np.real(np.vdot(x, self.apply(x) + 2 * self.g))) + self.constant
+        """Of the squares: the polynomial would lose half of its digits to stiff links."""
+        return sum(term.cost(x) for term in self.terms)
+
+    def change(self, gradient: Array, step: Array) -> float:
+        """By how much a step from where the gradient is that lets the cost rise."""
+        return _real(step, self.apply(step) + 2 * gradient)
 
     def gradient(self, x: Array) -> Array:
         """Half the Euclidean gradient."""
@@ -85,13 +119,14 @@ def block(
     width = 2 * int(np.abs(own.i - own.j).max(initial=0)) + 2
     q = np.zeros((width, 2 * size), dtype=complex)
     g = np.zeros((2 * size, held.shape[1]), dtype=complex)
-    constant = 0.0
+    terms = []
     for edges, ours in ((own, (0, 1, 2, 3)), (leaving, (0, 1)), (arriving, (2, 3))):
         ends = np.stack([2 * edges.i, 2 * edges.i + 1, 2 * edges.j, 2 * edges.j + 1])
         theirs = [k for k in range(4) if k not in ours]
         for weight, factor in _residuals(edges):
-            # |sum_k factor_k x_k|^2 with x_k ours or held: its square, its mixed term, its rest
-            pull = sum((factor[k][:, None] * held[ends[k]] for k in theirs), np.zeros(1))
+            pull = np.zeros((len(edges), held.shape[1]), dtype=complex)
+            for k in theirs:
+                pull += factor[k][:, None] * held[ends[k]]
             for k in ours:
                 np.add.at(g, ends[k], (weight * factor[k].conj())[:, None] * pull)
                 for m in ours:
@@ -99,8 +134,9 @@ def block(
                     row, column = ends[k][lower], ends[m][lower]
                     value = (weight * factor[k].conj() * factor[m])[lower]
                     np.add.at(q, (row - column, column), value)
-            constant += float(np.sum(weight * np.sum(np.abs(pull) ** 2, axis=-1)))
-    return BlockProblem(q, g, constant)
+            mine = list(ours)
+            terms.append(Term(weight, factor[mine], ends[mine], pull))
+    return BlockProblem(q, g, tuple(terms))
 
 
 def _residuals(edges: ComplexFactors) -> list[tuple[Array, Array]]:
@@ -113,26 +149,72 @@ def _residuals(edges: ComplexFactors) -> list[tuple[Array, Array]]:
     ]
 
 
-def descend(problem: BlockProblem, x: Array, steps: int = STEPS_PER_ROUND) -> Array:
-    """Some steps of preconditioned Riemannian gradient descent from X (2n, r); the new X."""
+def descend(problem: BlockProblem, x: Array, most: int = MOST_STEPS) -> tuple[Array, int]:
+    """Preconditioned Riemannian conjugate gradients (Polak and Ribiere) from X (2n, r).
+
+    Returns:
+        the new X, nearly the block's minimum, and how many steps led there.
+    """
     factor = _factor(problem.q)
-    cost = problem.cost(x)
-    for _ in range(steps):
-        gradient = tangent(x, problem.gradient(x))
-        direction = -cho_solve_banded((factor, True), gradient, check_finite=False)
-        direction = tangent(x, direction)
-        slope = 2 * float(np.real(np.vdot(gradient, direction)))
-        length = 1.0
-        while length > 1e-6:
-            trial = retract(x + length * direction)
-            new = problem.cost(trial)
-            if new <= cost + SUFFICIENT * length * slope:
-                x, cost = trial, new
-                break
-            length /= 2
-        else:
-            break
-    return x
+    total = 0.0
+    before: tuple[Array, Array, Array] | None = None
+    for step in range(most):
+        ambient = problem.gradient(x)
+        gradient = tangent(x, ambient)
+        downhill = -tangent(x, cho_solve_banded((factor, True), gradient, check_finite=False))
+        direction = downhill
+        if before is not None:
+            old_gradient, old_downhill, old_direction = before
+            turned = _real(downhill, gradient - tangent(x, old_gradient))
+            share = max(0.0, turned / _real(old_downhill, old_gradient))
+            direction = tangent(x, downhill + share * old_direction)
+            if _real(gradient, direction) >= 0:
+                direction = downhill
+        trial, gain = _line_search(problem, x, ambient, direction)
+        if gain <= 0:
+            return x, step
+        x, before, total = trial, (gradient, downhill, direction), total + gain
+        if gain <= ENOUGH * total:
+            return x, step + 1
+    return x, most
+
+
+def _line_search(
+    problem: BlockProblem, x: Array, ambient: Array, direction: Array
+) -> tuple[Array, float]:
+    """The new X and by how much the cost is less there; the old one where no step helps.
+
+    Args:
+        ambient: half the Euclidean gradient at X.
+    """
+    slope = 2 * _real(ambient, direction)
+    curvature = _real(direction, problem.apply(direction))
+    length = -slope / (2 * curvature) if curvature > 0 else 0.0
+    shortest = SHORTEST * length
+    while length > shortest:
+        trial = retract(x + length * direction)
+        change = problem.change(ambient, trial - x)
+        if change <= SUFFICIENT * length * slope:
+            return trial, -change
+        length /= 2
+    return x, 0.0
+
+
+def leaned(problem: BlockProblem, x: Array, y: Array, lean: float) -> Array:
+    """As far past the block's minimum y as `lean` says, a share of the way from x to y; less where
+    the cost would be above that of x."""
+    ambient = problem.gradient(x)
+    while lean >= LEAST_LEAN:
+        beyond = retract(y + lean * (y - x))
+        if problem.change(ambient, beyond - x) <= 0:
+            return beyond
+        lean /= 2
+    return y
+
+
+def _real(a: Array, b: Array) -> float:
+    """Inner product of tangent vectors."""
+    return float(np.real(np.vdot(a, b)))
 
 
 def conditional_covariance(problem: BlockProblem, pose: int, held: int | None) -> Array:

@@ -6,28 +6,84 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from dense_problems import places
 from slam_problems import no_ranges, pose_edges, team_problem
 
-from drslamd.slam.optimizer.banded.layout import BandLayout, border_poses
+from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout, border_poses
+from drslamd.slam.optimizer.problem import Doubted
 
 
 def test_every_unknown_stands_somewhere_and_only_once() -> None:
     problem, _ = team_problem(6, robots=3, count=30)
     layout = BandLayout.of(problem)
-    parts = [layout.poses.ravel(), layout.bias, layout.scale, layout.yaw, layout.near_bias]
-    numbers = np.sort(np.concatenate(parts))
+    numbers = np.sort(places(layout))
     assert np.array_equal(numbers, np.arange(layout.band + layout.border))
     # links of three robots reach three poses: 3 * 3 + 2 below the diagonal
     assert layout.width == 3 * 3 + 3
-    step = np.arange(len(numbers), dtype=float)
-    assert layout.calibration(step).scale.tolist() == layout.scale.tolist()
+    sensors = layout.calibration(np.arange(len(numbers), dtype=float))
+    for name in ("bias", "scale", "yaw", "near_bias", "team_bias"):
+        assert getattr(sensors, name).tolist() == getattr(layout, name).tolist()
+    sizes = [len(part) for part in (layout.bias, layout.scale, layout.yaw, layout.team_bias)]
+    assert sizes == [3, 3, 3, 1]
+
+
+def test_a_link_depends_on_its_poses_and_on_the_wheels_of_its_robot() -> None:
+    problem, _ = team_problem(6, robots=3, count=4)
+    layout, links = BandLayout.of(problem), problem.odometry
+    for row, i, j, robot in zip(
+        layout.odometry_unknowns(links), links.i, links.j, links.robot, strict=True
+    ):
+        ends = [3 * i, 3 * i + 1, 3 * i + 2, 3 * j, 3 * j + 1, 3 * j + 2]
+        # biases of three pairs stand before the scales of three robots and their yaw rates; turns
+        # are known
+        assert row.tolist() == [*ends, 36 + 3 + robot, 36 + 3 + 3 + robot, NOWHERE]
+
+
+def test_mountings_in_doubt_stand_last_and_the_others_nowhere() -> None:
+    problem, _ = team_problem(6, robots=3, count=4)
+    doubted = Doubted(np.array([False, True, True]), np.array([True, False, True]))
+    problem = replace(problem, doubted=doubted)
+    layout = BandLayout.of(problem)
+    assert np.array_equal(np.sort(places(layout)), np.arange(layout.band + layout.border))
+    # behind twelve poses, three biases, scales and yaw rates, and two constants of the team
+    first = 36 + 9 + 2
+    assert layout.turn.tolist() == [NOWHERE, first, first + 1]
+    assert layout.antenna.tolist() == [
+        [first + 2, first + 3],
+        [NOWHERE] * 2,
+        [first + 4, first + 5],
+    ]
+    assert layout.border == 11 + 6
+    turns = layout.odometry_unknowns(problem.odometry)[:, 8]
+    assert np.array_equal(turns, layout.turn[problem.odometry.robot])
+    ranges = problem.ranges
+    for row, pair, (a, b) in zip(
+        layout.range_unknowns(ranges), ranges.pair, ranges.robots, strict=True
+    ):
+        constants = [layout.bias[pair], *layout.near_bias]
+        assert row[6:].tolist() == [*constants, *layout.antenna[a], *layout.antenna[b]]
+    sensors = layout.calibration(np.arange(layout.band + layout.border, dtype=float))
+    assert sensors.turn.tolist() == [0, first, first + 1]
+    assert sensors.antenna.tolist() == [[first + 2, first + 3], [0, 0], [first + 4, first + 5]]
+
+
+def test_a_range_that_was_carried_depends_on_the_wheels_of_both_robots() -> None:
+    problem, _ = team_problem(6, robots=3, count=4, is_thinned=True)
+    layout, ranges = BandLayout.of(problem), problem.ranges
+    plain, carried = layout.range_unknowns(ranges), layout.carried_unknowns(ranges)
+    assert carried.shape == (4, 16)
+    for row, m in zip(carried, ranges.carried.rows, strict=True):
+        a, b = ranges.robots[m]
+        wheels = [layout.yaw[a], layout.scale[a], layout.yaw[b], layout.scale[b]]
+        assert row.tolist() == [*plain[m], *wheels]
 
 
 def test_a_group_of_one_pose_has_a_layout() -> None:
     problem, _ = team_problem(7, robots=1, count=1, closures=0)
-    problem = replace(problem, ranges=no_ranges())
-    layout = BandLayout.of(problem)
+    layout = BandLayout.of(replace(problem, ranges=no_ranges()))
     assert (layout.band, layout.width) == (3, 3)
+    # scale, yaw rate, near-range bias and what biases have in common
+    assert layout.border == 4
 
 
 @pytest.mark.parametrize(("reach", "apart"), [(20, 0), (21, 1)])
@@ -73,7 +129,7 @@ def test_poses_at_the_border_stand_behind_the_band() -> None:
     edges = pose_edges(np.random.default_rng(4), problem.initial, far, (0.05, 0.05, 0.03))
     layout = BandLayout.of(replace(problem, closures=edges))
     assert layout.band == 3 * 79
-    assert layout.border == 3 + len(layout.bias) + len(layout.scale) + len(layout.yaw) + 1
+    assert layout.border == 3 + len(layout.bias) + len(layout.scale) + len(layout.yaw) + 2
     assert layout.poses[9].tolist() == [3 * 79, 3 * 79 + 1, 3 * 79 + 2]
     # those after it move up, and odometry of two robots reaches two poses
     assert layout.poses[10].tolist() == [27, 28, 29]

@@ -2,72 +2,299 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
-from slam_problems import (
+from dense_problems import (
+    bias_places,
+    claimed_information,
     dense,
+    heavy_curvature,
+    information_of,
     jacobian,
+    mounting_curvature,
     packed,
-    pose_edges,
+    places,
+    point_at,
+    range_residuals,
     range_weights,
     residual_vector,
-    team_problem,
+    second,
+    unpacked,
 )
+from slam_problems import mismounted, no_ranges, pose_edges, team_problem
 from slam_scenes import Array
 
+from drslamd.slam.optimizer.banded.banded_solver import solve
 from drslamd.slam.optimizer.banded.layout import BandLayout
-from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.problem import Calibration, Problem
+from drslamd.slam.optimizer.banded.normal_equations import Equations, System
+from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE, WEIGHT, WHOLE
+from drslamd.slam.optimizer.mounting_prior import ANTENNA, TRACK
+from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem
+
+THRESHOLD = np.array([2.5, 1.5, 0.9])
 
 
-def somewhere(problem: Problem, seed: int) -> tuple[Array, Calibration]:
+def somewhere(problem: Problem, seed: int, sizes: float = 1.0) -> tuple[Array, Calibration]:
     """A point where nothing is zero."""
     rng = np.random.default_rng(seed)
-    p = problem.priors
-    calibration = Calibration(*(rng.normal(0, s) for s in (p.bias, p.scale, p.yaw, p.near_bias)))
-    return problem.initial + rng.normal(0, 0.05, problem.initial.shape), calibration
+    robots = len(problem.priors.scale)
+    sensors = ((problem.pairs, 0.1), (robots, 0.03), (robots, 0.01), (1, 0.1), (1, 0.05))
+    bias, scale, yaw, near, team = (rng.normal(0, sizes * sigma, n) for n, sigma in sensors)
+    track, antenna = problem.doubted.track, problem.doubted.antenna
+    # so little that the curvature of their priors is positive
+    turn, beside = rng.uniform(-0.008, 0.008, robots), rng.uniform(-0.01, 0.01, (robots, 2))
+    mountings = turn * track, beside * antenna[:, None]
+    calibration = Calibration(bias, scale, yaw, near, team, *mountings)
+    return problem.initial + rng.normal(0, sizes * 0.05, problem.initial.shape), calibration
 
 
-@pytest.mark.parametrize("robots", [2, 3])
-def test_gradient_hessian_and_cost_are_those_of_the_dense_residuals(robots: int) -> None:
-    problem, _ = team_problem(1, robots=robots, count=6)
-    poses, calibration = somewhere(problem, 2)
-    x = packed(poses, calibration)
-    equations = Equations(problem)
-    system = equations.at(poses, calibration)
-    robust = residual_vector(problem, x)
-    assert system.cost == pytest.approx(float(robust @ robust), rel=1e-9)
-    # the gradient is that of the robust cost itself ...
-    gradient = jacobian(problem, x, robust=True).T @ robust
-    layout = equations.layout
-    order = np.concatenate(
-        [layout.poses.ravel(), layout.bias, layout.scale, layout.yaw, layout.near_bias]
-    )
-    assert np.allclose(system.gradient[order], gradient, rtol=1e-5, atol=1e-4)
-    # ... the Hessian that of Gauss and Newton, ranges by their weights
-    j = jacobian(problem, x, robust=False)
-    hessian = j.T @ (range_weights(problem, x)[:, None] * j)
-    scale = np.sqrt(np.diag(hessian))
-    assert np.abs((dense(system, layout) - hessian) / np.outer(scale, scale)).max() < 1e-6
-
-
-def test_it_is_the_same_with_poses_at_the_border() -> None:
-    """One pose that is ranged from all the others, and a gauge that reaches far."""
-    problem, _ = team_problem(3, robots=2, count=40, closures=0)
-    far = [(0, k) for k in range(30, 80, 7)] + [(9, 78)]
+def far_edges() -> Problem:
+    """One pose that is joined to many others, and a gauge that reaches far."""
+    problem, _ = team_problem(3, robots=2, count=14, closures=0)
+    far = [(0, k) for k in range(18, 28, 2)] + [(9, 27)]
     edges = pose_edges(np.random.default_rng(4), problem.initial, far, (0.05, 0.05, 0.03))
-    problem = replace(problem, closures=edges)
-    layout = BandLayout.of(problem)
-    assert layout.band == 3 * 78
-    assert layout.width < 3 * 20
-    poses, calibration = somewhere(problem, 5)
+    return replace(problem, closures=edges)
+
+
+def small(robots: int) -> Problem:
+    """The track of the first and the antennas of all but the second are in doubt."""
+    problem = mismounted(
+        *team_problem(1, robots=robots, count=6, is_thinned=True), turned_sigma=0.2
+    )
+    number = np.arange(robots)
+    return replace(problem, doubted=Doubted(track=number == 0, antenna=number != 1))
+
+
+@pytest.mark.parametrize("robots", [1, 2, 3])
+def test_cost_and_gradient_are_those_of_the_dense_residuals(robots: int) -> None:
+    problem = small(robots)
+    poses, calibration = somewhere(problem, 2)
+    x, threshold = packed(poses, calibration, problem.doubted), THRESHOLD[: problem.pairs]
     equations = Equations(problem)
-    x = packed(poses, calibration)
-    j = jacobian(problem, x, robust=False)
-    weights = range_weights(problem, x)
-    hessian = j.T @ (weights[:, None] * j)
-    scale = np.sqrt(np.diag(hessian))
-    system = equations.at(poses, calibration)
-    assert np.abs((dense(system, layout) - hessian) / np.outer(scale, scale)).max() < 1e-6
+    residuals = residual_vector(problem, x, threshold)
+    point = point_at(problem, poses, calibration, threshold)
+    cost = equations.cost(point, threshold)
+    assert cost == pytest.approx(float(residuals @ residuals), rel=1e-9)
+    gradient = jacobian(lambda v: residual_vector(problem, v, threshold), x).T @ residuals
+    order = places(equations.layout)
+    found = equations.gradient(point)[order]
+    assert np.allclose(found, gradient, rtol=1e-5, atol=1e-4)
+    _, again = equations.at(point)
+    assert np.array_equal(again[order], found)
+
+
+@pytest.mark.parametrize("gauge", [0, 11])
+def test_the_gauge_is_held_where_it_was(gauge: int) -> None:
+    problem = replace(small(2), gauge=gauge)
+    equations = Equations(problem)
+    nothing = Calibration.zero(problem.pairs, 2)
+    moved = problem.initial.copy()
+    moved[gauge, 0] += 1e-3
+    points = [point_at(problem, p, nothing, THRESHOLD[:1]) for p in (problem.initial, moved)]
+    pulls = [equations.gradient(point) for point in points]
+    at = equations.layout.poses[gauge, 0]
+    # one millimetre at a sigma of 10 um; all else that holds the pose is a million times softer
+    assert pulls[1][at] - pulls[0][at] == pytest.approx(1e-3 / 1e-5**2, rel=1e-3)
+
+
+@pytest.mark.parametrize("least", [WHOLE, LEAST_CURVATURE])
+@pytest.mark.parametrize("robots", [1, 2, 3])
+def test_the_matrix_bends_as_the_cost_of_each_error_does(robots: int, least: float) -> None:
+    """By Gauss and Newton, with the curvature of Cauchy's cost and of the priors' own."""
+    problem = small(robots)
+    poses, calibration = somewhere(problem, 2, 0.3)
+    assert (problem.priors.scale_curvature(calibration.scale) > 0.1 / 0.03**2).all()
+    x, threshold = packed(poses, calibration, problem.doubted), THRESHOLD[: problem.pairs]
+    bends = []
+    for e, c in zip(range_residuals(problem, x), threshold[problem.ranges.pair], strict=True):
+        bend = second(partial(cauchy_cost, c), e) / 2
+        bends.append(max(bend, least / (1 + (e / c) ** 2)))
+    if robots > 1:
+        assert bool(min(bends) < 0) is (least == WHOLE)
+    expected = information_of(problem, x, np.array(bends)) + heavy_curvature(problem, x)
+    expected += mounting_curvature(problem, x)
+    equations = Equations(problem)
+    point = point_at(problem, poses, calibration, threshold)
+    system, _ = equations.at(point, least)
+    assert close(dense(system, equations.layout), expected, 1e-4)
+    if least == LEAST_CURVATURE:
+        usual, _ = equations.at(point)
+        assert np.array_equal(usual.band, system.band)
+
+
+def cauchy_cost(c: float, e: float) -> float:
+    return c**2 * math.log1p((e / c) ** 2)
+
+
+def test_by_weights_the_matrix_is_nowhere_less_than_what_the_cost_can_bend() -> None:
+    """Each heavy tail as the square that pulls as it does."""
+    problem = small(3)
+    poses, calibration = somewhere(problem, 2)
+    x, prior = packed(poses, calibration, problem.doubted), problem.priors.bias
+    expected = information_of(problem, x, range_weights(problem, x, THRESHOLD))
+    mountings = ((doubted_turns(problem), TRACK), (doubted_antennas(problem), ANTENNA))
+    for numbers, believed in mountings:
+        for at in numbers:
+            weight = (1 + len(at)) / 2 / (believed.width**2 + float(x[at] @ x[at]))
+            expected[at, at] += weight + believed.most**-2
+    first, team = 3 * len(poses), float(calibration.team_bias[0])
+    own = calibration.bias - team
+    held = (3 + 3) / (3 * prior.spread**2 + float(own @ own)) + prior.sigma**-2
+    apart = np.zeros((3, len(x)))
+    common = bias_places(problem)[-1]
+    apart[:, first : first + 3], apart[:, common] = np.eye(3), -1
+    expected += held * apart.T @ apart
+    expected[common, common] += 1 / (prior.team**2 + team**2) + prior.sigma**-2
+    scales = first + 3 + np.arange(3)
+    expected[scales, scales] += 1 / (0.03**2 + calibration.scale**2)
+    equations = Equations(problem)
+    system, _ = equations.at(point_at(problem, poses, calibration, THRESHOLD), WEIGHT)
+    assert close(dense(system, equations.layout), expected, 1e-5)
+
+
+def doubted_turns(problem: Problem) -> list[list[int]]:
+    """Where they are in the order of `packed`, one by one."""
+    first = int(bias_places(problem)[-1]) + 1
+    return [[first + k] for k in range(int(problem.doubted.track.sum()))]
+
+
+def doubted_antennas(problem: Problem) -> list[list[int]]:
+    first = int(bias_places(problem)[-1]) + 1 + int(problem.doubted.track.sum())
+    count = int(problem.doubted.antenna.sum())
+    return [[first + 2 * k, first + 2 * k + 1] for k in range(count)]
+
+
+def close(found: Array, expected: Array, tolerance: float) -> bool:
+    """Every element beside what its diagonals are."""
+    scale = np.sqrt(np.diag(expected))
+    return bool(np.abs((found - expected) / np.outer(scale, scale)).max() < tolerance)
+
+
+def test_at_the_solution_the_matrix_is_nearly_the_derivative_of_the_gradient() -> None:
+    problem, _ = team_problem(5, robots=3, count=8, range_error=0.02, link_error=0.3)
+    solution = solve(problem, tolerance=1e-9)
+    equations = Equations(problem)
+    threshold = np.full(3, 2.5)
+    order = places(equations.layout)
+
+    def gradient(v: Array) -> Array:
+        poses, calibration = unpacked(problem, v)
+        return equations.gradient(point_at(problem, poses, calibration, threshold))[order]
+
+    hessian = jacobian(gradient, packed(solution.poses, solution.calibration))
+    system, _ = equations.at(point_at(problem, solution.poses, solution.calibration, threshold))
+    assert close(dense(system, equations.layout), hessian, 0.03)
+
+
+def test_equations_of_another_belief_share_where_all_stands_and_are_the_same_as_new_ones() -> None:
+    problem = small(3)
+    links = problem.odometry
+    other = replace(problem, odometry=replace(links, covariance=4 * links.covariance))
+    first = Equations(problem)
+    shared, fresh = Equations(other, like=first), Equations(other)
+    assert shared.layout is first.layout
+    point = point_at(problem, *somewhere(problem, 2), THRESHOLD)
+    assert shared.cost(point, THRESHOLD) == fresh.cost(point, THRESHOLD)
+    (one, pull), (two, same_pull) = (equations.at(point) for equations in (shared, fresh))
+    assert np.array_equal(one.band, two.band)
+    assert np.array_equal(one.border, two.border)
+    assert np.array_equal(one.corner, two.corner)
+    assert np.array_equal(pull, same_pull)
+    assert shared.cost(point, THRESHOLD) < first.cost(point, THRESHOLD)
+
+
+# what may be claimed, and what weighs
+
+
+def far_or_small(kind: str) -> Problem:
+    return far_edges() if kind == "border" else small(3)
+
+
+@pytest.mark.parametrize("kind", ["band", "border"])
+def test_what_is_claimed_are_dense_ranges_made_wider_and_priors_as_configured(kind: str) -> None:
+    problem = far_or_small(kind)
+    poses, calibration = somewhere(problem, 5)
+    threshold, claims = THRESHOLD[: problem.pairs], np.array([2.0, 1.3, 0.7])[: problem.pairs]
+    equations = Equations(problem)
+    system = equations.claimed(point_at(problem, poses, calibration, threshold), claims)
+    expected = claimed_information(
+        problem, packed(poses, calibration, problem.doubted), threshold, claims
+    )
+    assert close(dense(system, equations.layout), expected, 1e-5)
+
+
+def test_what_the_factors_weigh_is_the_same_with_the_priors_of_the_estimate() -> None:
+    problem = small(3)
+    poses, calibration = somewhere(problem, 5, 0.3)
+    x = packed(poses, calibration, problem.doubted)
+    equations = Equations(problem)
+    system = equations.weighed(point_at(problem, poses, calibration, THRESHOLD))
+    bare = information_of(problem, x, range_weights(problem, x, THRESHOLD))
+    expected = bare + heavy_curvature(problem, x) + mounting_curvature(problem, x)
+    assert close(dense(system, equations.layout), expected, 1e-4)
+
+
+# where things stand
+
+
+def test_poses_at_the_border_change_nothing() -> None:
+    problem = far_edges()
+    layout = BandLayout.of(problem)
+    assert layout.band == 3 * 26
+    assert layout.width == 3 * 3
+    poses, calibration = somewhere(problem, 5, 0.5)
+    equations = Equations(problem)
+    threshold = np.array([20.0])
+    x = packed(poses, calibration, problem.doubted)
+    residuals = residual_vector(problem, x, threshold)
+    gradient = jacobian(lambda v: residual_vector(problem, v, threshold), x).T @ residuals
+    found = equations.gradient(point_at(problem, poses, calibration, threshold))[places(layout)]
+    assert np.allclose(found, gradient, rtol=1e-5, atol=1e-3)
+
+
+def test_without_ranges_and_closures_there_are_equations_too() -> None:
+    problem, _ = team_problem(7, robots=2, count=5, closures=0)
+    problem = replace(problem, ranges=no_ranges(), pairs=0)
+    poses, calibration = somewhere(problem, 8)
+    x, none = packed(poses, calibration, problem.doubted), np.zeros(0)
+    residuals = residual_vector(problem, x, none)
+    equations = Equations(problem)
+    point = point_at(problem, poses, calibration, none)
+    assert equations.cost(point, none) == pytest.approx(float(residuals @ residuals))
+    system, _ = equations.at(point)
+    assert system.corner.shape == (6, 6)
+
+
+def test_priors_are_added_where_their_unknowns_stand() -> None:
+    system = System(np.zeros((3, 6)), np.zeros((6, 4)), np.zeros((4, 4)))
+    system.add_prior(np.array([2, 7]), np.array([5.0, 3.0]))
+    assert system.band[0].tolist() == [0, 0, 5, 0, 0, 0]
+    assert np.diag(system.corner).tolist() == [0, 3, 0, 0]
+    assert not system.band[1:].any()
+    assert not system.border.any()
+
+
+def test_groups_of_unknowns_of_the_border_are_held_each_by_its_own_matrix() -> None:
+    system = System(np.zeros((3, 3)), np.zeros((3, 5)), np.ones((5, 5)))
+    blocks = np.array([[[4.0, 1.0], [1.0, 3.0]], [[5.0, 2.0], [2.0, 6.0]]])
+    system.add_blocks(np.array([[3, 7], [4, 5]]), blocks)
+    expected = np.ones((5, 5))
+    expected[np.ix_([0, 4], [0, 4])] += blocks[0]
+    expected[np.ix_([1, 2], [1, 2])] += blocks[1]
+    assert np.array_equal(system.corner, expected)
+    assert not system.band.any()
+
+
+def test_unknowns_are_held_beside_one_other() -> None:
+    """x' K x of differences, with K of two unknowns and the other one behind them."""
+    system = System(np.zeros((3, 3)), np.zeros((3, 4)), np.zeros((4, 4)))
+    stiffness = np.array([[4.0, 1.0], [1.0, 3.0]])
+    system.add_difference(np.array([3, 5]), np.array([6]), stiffness)
+    for values in np.random.default_rng(9).normal(size=(5, 4)):
+        apart = values[[0, 2]] - values[3]
+        expected = float(apart @ stiffness @ apart)
+        assert float(values @ system.corner @ values) == pytest.approx(expected)

@@ -13,11 +13,13 @@ from slam_scenes import Array, inverted, product, same_pose, wander
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.optimizer.problem import BetweenFactors
 from drslamd.slam.optimizer.rbcd.riemannian_descent import (
+    ENOUGH,
     HOLD,
     BlockProblem,
     block,
     conditional_covariance,
     descend,
+    leaned,
     lift,
     moved,
     retract,
@@ -141,7 +143,7 @@ def test_a_retraction_goes_where_the_tangent_vector_points() -> None:
 def test_a_round_lowers_the_cost_of_the_block_and_stays_on_the_spheres(seed: int) -> None:
     scene = Scene(seed)
     x = scene.somewhere(seed)
-    after = descend(scene.problem, x)
+    after, _ = descend(scene.problem, x)
     assert scene.plain_cost(after) < 0.9 * scene.plain_cost(x)
     assert np.allclose(np.linalg.norm(after[0::2], axis=1), 1.0)
 
@@ -149,7 +151,7 @@ def test_a_round_lowers_the_cost_of_the_block_and_stays_on_the_spheres(seed: int
 def test_more_steps_never_cost_more() -> None:
     scene, costs = Scene(), []
     for steps in range(8):
-        costs.append(scene.plain_cost(descend(scene.problem, scene.somewhere(), steps)))
+        costs.append(scene.plain_cost(descend(scene.problem, scene.somewhere(), steps)[0]))
     assert (np.diff(costs) <= 0).all()
     assert costs[0] == scene.plain_cost(scene.somewhere())
 
@@ -175,7 +177,9 @@ def test_many_steps_end_where_least_squares_over_planar_poses_end(seed: int) -> 
         return np.array([[value.real, value.imag] for value in out]).ravel()
 
     best = least_squares(residuals, scene.truth.ravel(), method="lm")
-    found = descend(scene.problem, scene.somewhere(seed), 400)
+    found, steps = scene.somewhere(seed), 1
+    while steps:
+        found, steps = descend(scene.problem, found, 400)
     assert scene.plain_cost(found) == pytest.approx(2 * best.cost, rel=1e-4)
     poses = rounded(rows(found), lift(np.zeros((1, 3)), 3)[0])
     for ours, theirs in zip(poses, best.x.reshape(-1, 3), strict=True):
@@ -185,7 +189,59 @@ def test_many_steps_end_where_least_squares_over_planar_poses_end(seed: int) -> 
 def test_where_nothing_can_be_gained_nothing_moves() -> None:
     scene = Scene(error=0.0)
     x = stacked(lift(scene.truth, 3))
-    assert np.allclose(descend(scene.problem, x), x, atol=1e-6)
+    assert np.allclose(descend(scene.problem, x)[0], x, atol=1e-6)
+
+
+def test_it_ends_when_a_step_gains_hardly_anything_or_after_so_many() -> None:
+    scene = Scene()
+    x = scene.somewhere()
+    nearly, steps = descend(scene.problem, x, 400)
+    assert 1 < steps < 400
+    assert descend(scene.problem, x, 2)[1] == 2
+    before, _ = descend(scene.problem, x, steps - 1)
+    gain = scene.plain_cost(before) - scene.plain_cost(nearly)
+    assert gain <= ENOUGH * (scene.plain_cost(x) - scene.plain_cost(before)) * 1.01
+
+
+def test_the_change_of_the_cost_is_the_difference_of_two() -> None:
+    scene = Scene()
+    x, y = scene.somewhere(1), scene.somewhere(2)
+    found = scene.problem.change(scene.problem.gradient(x), y - x)
+    assert found == pytest.approx(scene.plain_cost(y) - scene.plain_cost(x), rel=1e-9)
+
+
+# beyond the minimum
+
+
+def test_past_the_minimum_the_cost_is_still_below_that_of_the_start() -> None:
+    """Where it is quadratic, all the way to twice as far; there it is the same again."""
+    scene = Scene()
+    x = stacked(lift(scene.truth + [0.01, -0.02, 0.0], 3))
+    y, steps = x, 1
+    while steps:
+        y, steps = descend(scene.problem, y, 400)
+    costs = [scene.plain_cost(leaned(scene.problem, x, y, lean)) for lean in (0.0, 0.5, 0.9)]
+    assert costs == sorted(costs)
+    assert costs[-1] < scene.plain_cost(x)
+    quadratic = costs[0] + 0.9**2 * (scene.plain_cost(x) - costs[0])
+    assert costs[-1] == pytest.approx(quadratic, rel=0.1)
+
+
+def test_as_far_past_the_minimum_as_is_asked_for() -> None:
+    scene = Scene()
+    x = stacked(lift(scene.truth + [0.01, 0.0, 0.0], 3))
+    y, _ = descend(scene.problem, x)
+    beyond = leaned(scene.problem, x, y, 0.6)
+    assert np.allclose((beyond - y)[1::2], 0.6 * (y - x)[1::2])
+
+
+def test_where_it_would_cost_more_than_at_the_start_it_goes_less_far() -> None:
+    scene = Scene()
+    x, y = scene.somewhere(1), stacked(lift(scene.truth, 3))
+    # beyond four times the way to the minimum even a quadratic cost is above that of the start
+    beyond = leaned(scene.problem, x, y, 4.0)
+    assert scene.plain_cost(beyond) <= scene.plain_cost(x)
+    assert np.linalg.norm((beyond - y)[1::2]) < 3.9 * np.linalg.norm((y - x)[1::2])
 
 
 # poses in the plane and lifted ones

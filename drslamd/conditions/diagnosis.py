@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol
 
+from drslamd.conditions import contradictions
 from drslamd.config import Config
 from drslamd.conventions import SECOND_US
 from drslamd.events import NetworkState, PortCondition, PortState
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.team import Team
 from drslamd.jobs import OPTIMIZER, RELATIVE_POSE, DutyCycle, Jobs
+from drslamd.memory import Memory
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.wheels.wheel_input import WheelInput
 from drslamd.slam.back_end import BackEnd
+from drslamd.slam.calibration.window_calibration import has_learned
 from drslamd.slam.consistency.pair import PairTracker
+from drslamd.slam.doubt import doubted_partners
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.relative_pose.estimate import Verdict
+from drslamd.whereabouts import Whereabouts
 
 PATIENCE_US = 3 * SECOND_US
 """How long an open port may be silent before that is worth a word."""
@@ -44,9 +49,12 @@ class Stages(Protocol):
     outbox: Outbox
     ports: dict[str, PortState]
     network: NetworkState | None
+    memory: Memory
     jobs: Jobs
 
     def neighbours(self, utime: int) -> list[PeerInRange]: ...
+
+    def whereabouts(self, utime: int) -> Whereabouts: ...
 
 
 def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
@@ -57,8 +65,13 @@ def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
     yield "network", None if network is None or network.up else network.detail
     yield from robot.team.conditions(utime)
     yield "pose", why_not_localised(robot, utime)
+    doubt = robot.whereabouts(utime).doubt
+    yield "doubt", contradictions.doubt(doubt)
+    yield "partners", contradictions.partners(_doubted_partners(robot) if not doubt else ())
+    yield "mounting", _mountings(robot)
     yield "load", _load(robot, utime)
     yield "budget", robot.outbox.condition(utime)
+    yield "state", _state(robot)
 
 
 def _sensor(
@@ -88,10 +101,50 @@ def _load(robot: Stages, utime: int) -> str | None:
     return f"{', '.join(late)}, to leave time for the sensors; the team is large for this computer"
 
 
+def _doubted_partners(robot: Stages) -> Iterable[int]:
+    front = robot.front
+    return doubted_partners(front.own.robot, robot.back.estimate, front.watch.doubted)
+
+
+def _mountings(robot: Stages) -> str | None:
+    """What was found wrong with the wheels of whom, and whose windows nothing explains."""
+    own, pairs, estimate = robot.front.own.robot, robot.front.pairs, robot.back.estimate
+    said = []
+    for peer, pair in pairs.items():
+        found = pair.search.found
+        agrees = found is not None and has_learned(estimate, (own, peer), found)
+        said.append(contradictions.mounting(own, peer, pair.search, _is_odd(pairs, peer), agrees))
+    return "; ".join(sentence for sentence in said if sentence) or None
+
+
+def _is_odd(pairs: dict[int, PairTracker], peer: int) -> bool:
+    """Is it the peer that is wrong: do we agree with somebody else?"""
+    others = (pair for robot, pair in pairs.items() if robot != peer)
+    return any(pair.connected and pair.search.found is None for pair in others)
+
+
+def _state(robot: Stages) -> str | None:
+    if not robot.memory.fault:
+        return None
+    return (
+        f"{robot.memory.fault}: the next start will not know what this one learned, nor its "
+        "number; make room, make the folder writable, or name another in daemon.state_dir"
+    )
+
+
 def why_not_localised(robot: Stages, utime: int) -> str | None:
     """The first stage at which it stops, None when the robot is localised."""
-    if robot.back.estimate is not None:
+    where = robot.whereabouts(utime)
+    if where.is_old:
+        seconds = where.age_us // SECOND_US
+        return (
+            f"no odometry for {seconds} s: the pose is that of then, and its sigma grows as fast "
+            "as the robot drives; check the wheels"
+        )
+    if where.pose is not None:
         return None
+    if robot.back.estimate is not None:
+        return "not localised: the odometry was interrupted, and what follows it has no place yet"
     peers = robot.team.peers
     living = robot.team.living(utime)
     if not peers:

@@ -8,8 +8,8 @@ from message_builders import a_status, forged
 from pair_scenes import BESIDE, asked_at, estimate_of
 from robot_scenes import RobotScene
 
+from drslamd.conditions.diagnosis import conditions, why_not_localised
 from drslamd.conventions import SECOND_US
-from drslamd.diagnosis import conditions, why_not_localised
 from drslamd.events import ChannelMessage, JobDone, NetworkState, PortCondition, PortState, Send
 from drslamd.gossip import messages
 from drslamd.gossip.message_types import Heard
@@ -29,7 +29,8 @@ def test_everything_is_looked_after_from_the_sensors_to_the_budget() -> None:
     scene = RobotScene()
     keys = [key for key, _ in conditions(scene.robot, scene.utime)]
     team = [key for key in keys if key.startswith("team.")]
-    assert keys == ["uwb", "wheels", "network", *team, "pose", "load", "budget"]
+    of_poses = ["pose", "doubt", "partners", "mounting"]
+    assert keys == ["uwb", "wheels", "network", *team, *of_poses, "load", "budget", "state"]
     assert len(team) >= 4
 
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
+from drslamd.conditions.health import MAX_CONDITIONS, REPEAT_US, Health
 from drslamd.conventions import SECOND_US
 from drslamd.events import Level, Note
-from drslamd.health import MAX_CONDITIONS, REPEAT_US, Health
 
 T0 = 100 * SECOND_US
 

@@ -1,0 +1,100 @@
+"""What is said where measurements contradict each other: whose, why, and what to do.
+
+Wheels that are not mounted as configured are named with the key to set. A pose in doubt is told
+with what may be the cause, and so are robots to which ranges do not fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from drslamd.slam.doubt import Doubt, Reason
+from drslamd.slam.odometry.mounting import Fault, Repair
+from drslamd.slam.relative_pose.mounting_search import MountingSearch, is_learned
+
+CHECK = {
+    Fault.MIRRORED: (
+        "run backwards on both sides (set wheels.reverse_left and wheels.reverse_right) or are "
+        "swapped (wheels.swap_channels, or left and right in [wheels])"
+    ),
+    Fault.LEFT_REVERSED: "run backwards on the left (set wheels.reverse_left)",
+    Fault.RIGHT_REVERSED: "run backwards on the right (set wheels.reverse_right)",
+}
+"""Of the wheels of a robot."""
+
+
+def mounting(
+    own: int, peer: int, search: MountingSearch, peer_is_odd: bool, has_learned: bool
+) -> str | None:
+    """One sentence on a pair; None while nothing is wrong with it.
+
+    Args:
+        peer_is_odd: do we agree with other robots?
+        has_learned: does module 3 find the same track or scale?
+    """
+    case = search.found
+    if case is None:
+        if not search.is_puzzled:
+            return None
+        return (
+            f"ranges and odometry of robots {own} and {peer} contradict each other, and no usual "
+            "mistake explains it; look at the wheels and the antennas of both"
+        )
+    if not search.is_clear or (is_learned(case) and not has_learned):
+        return None
+    if case.b.fault is Fault.MIRRORED:
+        whose = f"robot {peer}" if peer_is_odd else f"robot {own} or {peer}"
+        return f"the wheels of {whose} {CHECK[Fault.MIRRORED]}"
+    found = ((own, case.a), (peer, case.b))
+    return ", ".join(_of_one(robot, repair) for robot, repair in found if repair.fault.value)
+
+
+def _of_one(robot: int, repair: Repair) -> str:
+    if repair.fault is Fault.TRACK:
+        return (
+            f"wheels.track_m of robot {robot} should be about {1 / repair.turn:.1f} times what it "
+            "is; it is learned meanwhile"
+        )
+    if repair.fault is Fault.SCALE:
+        return (
+            f"the odometry of robot {robot} should be about {repair.way:.1f} times as long; set "
+            "wheels.counts_per_metre (or the radius of its wheels); it is learned meanwhile"
+        )
+    return f"the wheels of robot {robot} {CHECK[repair.fault]}"
+
+
+def doubt(found: Doubt | None) -> str | None:
+    """One sentence on the own pose; None while nothing speaks against it."""
+    if found is None:
+        return None
+    if found.reason is Reason.ODOMETRY:
+        return (
+            f"the pose is doubtful: odometry is {_times(found.level)} as wrong as configured; "
+            "the wheels slip or spin, or a counter stands; look at them, or drive more slowly"
+        )
+    if len(found.peers) == 1:
+        return (
+            f"the pose is doubtful: ranges to robot {found.peers[0]} and the odometry of both do "
+            "not fit; wheels of one of them slip, or sight is blocked"
+        )
+    peers = " and ".join(map(str, found.peers))
+    return (
+        f"the pose is doubtful: ranges to robots {peers} do not fit the odometry of this robot; "
+        "its wheels slip or stand, or its antenna is covered so that sight is blocked"
+    )
+
+
+def _times(level: float) -> str:
+    """In few words, so that a sentence stays the same while it means the same."""
+    return "over ten times" if level > 10 else "some times"
+
+
+def partners(robots: Iterable[int]) -> str | None:
+    """One sentence on other robots to whom ranges do not fit; None while there are none."""
+    named = " and ".join(str(robot) for robot in sorted(robots))
+    if not named:
+        return None
+    return (
+        f"ranges to robot {named} do not fit where it should be; sight between is blocked, or its "
+        "wheels slip"
+    )

@@ -1,0 +1,287 @@
+"""One chain as module 3 sees it: keyframes that stand for cells of time, and the ways between.
+
+A cell that is thinned loses keyframes and no odometry: the link to the next cell is as long and as
+uncertain as the way that was driven, and what was measured at a keyframe that went is carried to
+the nearest one that stayed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drslamd.conventions import GRID_HZ
+from drslamd.slam import se2
+from drslamd.slam.graph.chain_data import ChainData
+from drslamd.slam.graph.tables import KeyframeTable
+from drslamd.slam.graph.thinning.time_cells import Stretch, stretches
+from drslamd.slam.graph.timed_rows import NEVER
+from drslamd.slam.odometry.noise import seen_from, step_sums
+from drslamd.slam.se2 import Array, Index
+
+
+@dataclass(frozen=True)
+class ChainLinks:
+    """Odometry between keyframes i (m,) and those after them, across no break.
+
+    Attributes:
+        measured: (m, 3) relative poses, scale and yaw rate left in.
+        sums: (m, 6) `noise.growth` over the way that was driven, in frames i.
+        by_turn: (m, 3) how `measured` moves when turns are longer by a fraction.
+    """
+
+    i: Index
+    measured: Array
+    sums: Array
+    by_turn: Array
+
+
+@dataclass(frozen=True)
+class Carried:
+    """Where bodies (m,) were, seen from the keyframes that stand for them.
+
+    Attributes:
+        n: (m,) those keyframes.
+        keyframe_T_body: (m, 3).
+        sums: (m, 6) `noise.growth` over the ways between, in the frames of the keyframes.
+        is_after: (m,) was the body there after its keyframe?
+    """
+
+    n: Array
+    keyframe_T_body: Array
+    sums: Array
+    is_after: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class ChainPart:
+    """A stretch of a chain; r rows of what was said make k keyframes that stay.
+
+    Attributes:
+        held: what was said.
+        stays: (k,) which rows stay.
+        own: (r,) for each row, the row that begins its cell.
+        near: (r,) for each row, the row that stands for it: r is that which follows the stretch.
+        steps: (r, 6) `noise.step_sums` from each row to the next, in the frame of its `own`; what
+            they are across a break nobody asks.
+        links: between the rows `stays` and on to the next stretch, numbered as `stays` is.
+    """
+
+    stretch: Stretch
+    held: KeyframeTable
+    stays: Index
+    own: Index
+    near: Index
+    steps: Array
+    links: ChainLinks
+
+
+def thinned(stretch: Stretch, rows: Array, after: Array) -> ChainPart:
+    """Thin a stretch of a chain.
+
+    Args:
+        rows: (r, 5) of `KeyframeTable`; after: (0 or 1, 5) the row that follows.
+    """
+    both = KeyframeTable(np.concatenate([rows, after]))
+    n, segment, poses, count = both.n, both.segment, both.poses, len(rows)
+    cell = n // (GRID_HZ * 4**stretch.level) if stretch.level else n
+    is_joined = segment[1:] == segment[:-1]
+    begins = np.ones(len(n), dtype=bool)
+    begins[1:] = (cell[1:] != cell[:-1]) | ~is_joined
+    begins[count:] = True
+    stays = np.flatnonzero(begins)
+    own = stays[np.cumsum(begins) - 1]
+    start = poses[own[:-1]]
+    here, there = se2.between(start, poses[:-1]), se2.between(start, poses[1:])
+    steps = np.zeros((count, 6))
+    steps[: len(there)] = step_sums(there[:, :2] - here[:, :2], (there[:, :2] + here[:, :2]) / 2)
+    last = stays[1:] - 1
+    linked = np.flatnonzero(is_joined[last])
+    turn = se2.wrap(there[:, 2] - here[:, 2])
+    at = (there[:, :2] + here[:, :2]) / 2
+    turned = np.zeros((count, 3))
+    turned[: len(there)] = np.column_stack([turn, turn[:, None] * at])
+    first = stays[stays < count]
+    sums = np.add.reduceat(steps, first) if count else steps
+    turns = np.add.reduceat(turned, first) if count else turned
+    ends = there[last[linked]]
+    return ChainPart(
+        stretch=stretch,
+        held=KeyframeTable(rows),
+        stays=stays[stays < count],
+        own=own[:count],
+        near=_nearest(n, stays, own, is_joined)[:count],
+        steps=steps,
+        links=ChainLinks(linked, ends, sums[linked], _by_turn(ends, turns[linked])),
+    )
+
+
+def _by_turn(ends: Array, turns: Array) -> Array:
+    """(m, 3) derivative of the ends (m, 3) of ways by the fraction that turns are longer.
+
+    Args:
+        turns: (m, 3) sums over the steps of a way: of their turns, and of these times where they
+            were made.
+    """
+    turn, x, y = turns.T
+    return np.stack([y - turn * ends[:, 1], turn * ends[:, 0] - x, turn], axis=-1)
+
+
+def _nearest(n: Index, stays: Index, own: Index, is_joined: NDArray[np.bool_]) -> Index:
+    """The row that stands for each row (r,): that which begins its cell, or the next to stay."""
+    following = np.searchsorted(stays, np.arange(len(n)), side="right")
+    after = stays[np.minimum(following, len(stays) - 1)]
+    is_near = (following < len(stays)) & (n[after] - n < n - n[own])
+    # (what precedes the very first row is never asked for)
+    joined = np.append(is_joined, False)[after - 1]
+    return np.asarray(np.where(is_near & joined, after, own))
+
+
+class OldParts:
+    """The thinned parts of a chain side by side, their rows numbered through.
+
+    Attributes:
+        end: sample after the last.
+        own, near, steps: see `ChainPart`.
+    """
+
+    def __init__(self, parts: list[ChainPart]) -> None:
+        self.parts = parts
+        self.end = parts[-1].stretch.end if parts else 0
+        starts = np.cumsum([0, *(len(part.held) for part in parts)])[:-1].tolist()
+        each = list(zip(parts, starts, strict=True))
+        none = np.zeros(0, dtype=np.int64)
+        self.own = np.concatenate([none, *(part.own + start for part, start in each)])
+        self.near = np.concatenate([none, *(part.near + start for part, start in each)])
+        self.steps = np.concatenate([*(part.steps for part in parts), np.zeros((1, 6))])
+
+    def sums_between(self, first: Index, end: Index) -> Array:
+        """(m, 6) sums of the steps first .. end - 1, each of one cell and of one at least."""
+        if not len(first):
+            return np.zeros((0, 6))
+        order = np.argsort(first, kind="stable")
+        ends = np.stack([first[order], end[order]], axis=-1).ravel()
+        out = np.empty((len(first), 6))
+        out[order] = np.add.reduceat(self.steps[: ends.max() + 1], ends)[::2]
+        return out
+
+
+class ChainView:
+    """One chain, thinned.
+
+    Attributes:
+        held: keyframes that were said; model: of the robot's sensors.
+        keyframes: those that stay; links: between them.
+        parts: oldest first; the last one is recent and whole.
+    """
+
+    def __init__(self, data: ChainData, old: OldParts, recent: list[ChainPart]) -> None:
+        self.chain, self.model, self.held = data.chain, data.model, data.keyframes
+        self._old, self.parts = old, [*old.parts, *recent]
+        rows = [part.held.rows[part.stays] for part in self.parts]
+        starts = np.cumsum([0, *map(len, rows)])[:-1].tolist()
+        self.keyframes = KeyframeTable(np.concatenate(rows))
+        self.links = ChainLinks(
+            np.concatenate(
+                [p.links.i + start for p, start in zip(self.parts, starts, strict=True)]
+            ),
+            np.concatenate([part.links.measured for part in self.parts]),
+            np.concatenate([part.links.sums for part in self.parts]),
+            np.concatenate([part.links.by_turn for part in self.parts]),
+        )
+
+    @property
+    def recent_n(self) -> int:
+        """From this sample on all keyframes stay."""
+        return self._old.end
+
+    def old_parts(self, first: int, last: int) -> tuple[ChainPart, ...]:
+        """Those that samples first .. last touch."""
+        parts = self._old.parts
+        return tuple(p for p in parts if p.stretch.first <= last and first < p.stretch.end)
+
+    def is_old(self, rows: Index) -> NDArray[np.bool_]:
+        """Which rows (m,) of `held` lie in times that are thinned."""
+        return np.asarray(rows < len(self._old.near))
+
+    def standing_for(self, rows: Index) -> Index:
+        """The rows of `held` that stand for rows (m,)."""
+        out, old = rows.copy(), self.is_old(rows)
+        out[old] = self._old.near[rows[old]]
+        return np.asarray(out)
+
+    def carried(self, rows: Index) -> Carried:
+        """Where the bodies of rows (m,) of `held` were, seen from the keyframes that stay."""
+        near, held = self.standing_for(rows), self.held
+        sums, is_after = np.zeros((len(rows), 6)), rows >= near
+        for which, first, end in ((rows > near, near, rows), (rows < near, rows, near)):
+            sums[which] = self._old.sums_between(first[which], end[which])
+        # the sums of a way are in the frame of the cell that it crosses
+        before = np.flatnonzero(~is_after)
+        here, start = held.poses[near], held.poses[self._old.own[rows[before]]]
+        sums[before] = seen_from(sums[before], se2.between(here[before], start))
+        return Carried(held.rows[near, 0], se2.between(here, held.poses[rows]), sums, is_after)
+
+
+def whole(data: ChainData) -> ChainView:
+    """A chain of which nothing is thinned."""
+    rows = data.keyframes.rows
+    return ChainView(data, OldParts([]), [thinned(Stretch(0, 0, NEVER), rows, rows[:0])])
+
+
+@dataclass
+class _Made:
+    """A part, and what it was made of.
+
+    Attributes:
+        changes: of the chain, when it was last seen to be the same.
+        edge: segment of its first row, and the row that follows.
+    """
+
+    part: ChainPart
+    changes: int
+    edge: list[float]
+
+
+class ChainThinning:
+    """Views of one chain; parts in which nothing has changed are not made again."""
+
+    def __init__(self) -> None:
+        self._made: dict[int, _Made] = {}
+        self._old = OldParts([])
+
+    def view(self, data: ChainData, step: int, recent: int) -> ChainView:
+        """The chain as it is now; it has a keyframe.
+
+        Args:
+            step, recent: see `time_cells.stretches`.
+        """
+        parts = []
+        for stretch in reversed(stretches(step, recent)):
+            rows = data.keyframes.between(stretch.first, stretch.end)
+            if rows.start < rows.stop:
+                parts.append(self._part(data, stretch, rows))
+        old = [part for part in parts if part.stretch.level]
+        if old != self._old.parts:
+            self._old = OldParts(old)
+        return ChainView(data, self._old, parts[len(old) :])
+
+    def _part(self, data: ChainData, stretch: Stretch, which: slice) -> ChainPart:
+        rows = data.keyframes.rows[which]
+        after = data.keyframes.rows[which.stop : which.stop + 1]
+        # (a row in front of a part may change its segments)
+        edge = [rows[0, 1], *after.ravel().tolist()]
+        made = self._made.get(stretch.level)
+        is_same = (
+            made is not None
+            and made.part.stretch == stretch
+            and made.edge == edge
+            and data.is_same(made.changes, stretch.first, stretch.end)
+        )
+        if made is None or not is_same:
+            made = _Made(thinned(stretch, rows, after), 0, edge)
+            self._made[stretch.level] = made
+        made.changes = data.changes
+        return made.part

@@ -1,0 +1,110 @@
+"""The graph that module 3 solves, as it follows from what is held."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from hashlib import blake2b
+
+import numpy as np
+
+from drslamd.conventions import Chain, Segment
+from drslamd.slam.graph import clocks
+from drslamd.slam.graph.chain_data import ChainData
+from drslamd.slam.graph.pair_data import PairData
+from drslamd.slam.graph.tables import KeyframeTable
+from drslamd.slam.graph.thinning.chain_view import ChainThinning, ChainView
+from drslamd.slam.graph.thinning.pair_view import PairThinning, PairView
+from drslamd.slam.graph.thinning.time_cells import ages, recent_s
+from drslamd.slam.se2 import Array
+
+RESOLUTION = 1e-6
+"""m, rad and their squares: what differs by less counts as equal in a digest, because sines and
+cosines of different processors differ in their last digits."""
+
+
+@dataclass(frozen=True, eq=False)
+class GraphView:
+    """All chains, and all pairs of them.
+
+    Attributes:
+        chains: by robot, those without a keyframe left out.
+        pairs: whose both chains are there, in the order of their robots.
+        shifts: clock of each robot minus that of the first of its team, samples.
+    """
+
+    chains: Mapping[int, ChainView]
+    pairs: list[PairView]
+    shifts: Mapping[int, float]
+
+    def segment(self, segment: Segment) -> KeyframeTable:
+        """The keyframes of a segment that stay."""
+        keyframes = self.chains[segment.robot].keyframes
+        return keyframes.chosen(keyframes.of_segment(segment.segment))
+
+    def digest(self, robots: set[int]) -> int:
+        """A number that two robots share when they hold the same graph of these robots."""
+        h = blake2b(digest_size=8)
+        for robot, view in sorted(self.chains.items()):
+            if robot in robots:
+                h.update(repr((view.chain, view.model.numbers())).encode())
+                links = view.links
+                for values in (view.keyframes.rows, links.measured, links.sums, links.by_turn):
+                    h.update(_rounded(values))
+        for pair in self.pairs:
+            if {pair.a.robot, pair.b.robot} <= robots:
+                for values in (pair.ranges.rows, pair.moves, pair.closures.rows):
+                    h.update(_rounded(values))
+        return int.from_bytes(h.digest(), "big", signed=True)
+
+
+def _rounded(values: Array) -> bytes:
+    return np.rint(values / RESOLUTION).astype(np.int64).tobytes()
+
+
+class Thinning:
+    """Makes the view of what is held, again and again; what is old is rarely made anew."""
+
+    def __init__(self, recent_s: int) -> None:
+        """
+        Args:
+            recent_s: see `time_cells.RECENT_S`.
+        """
+        self._recent_s = recent_s
+        self._chains: dict[Chain, ChainThinning] = {}
+        self._pairs: dict[tuple[Chain, Chain], PairThinning] = {}
+
+    def view(self, chains: Mapping[int, ChainData], pairs: list[PairData]) -> GraphView:
+        """The graph as it is now.
+
+        Args:
+            chains: all that are held, by robot; pairs: of two of these.
+        """
+        known = {robot: data for robot, data in sorted(chains.items()) if len(data.keyframes)}
+        newest = {robot: int(data.keyframes.rows[-1, 0]) for robot, data in known.items()}
+        ahead = {(pair.a.robot, pair.b.robot): pair.ahead() for pair in pairs}
+        teams = clocks.shifts(set(chains), {k: found for k, found in ahead.items() if found})
+        steps, recent = ages(newest, teams), recent_s(len(chains), self._recent_s)
+        before, self._chains, views = self._chains, {}, {}
+        for robot, data in known.items():
+            thinning = before.get(data.chain) or ChainThinning()
+            self._chains[data.chain] = thinning
+            views[robot] = thinning.view(data, steps[robot], recent)
+        return GraphView(
+            chains=views,
+            pairs=self._views_of_pairs(known, pairs, views),
+            shifts={robot: shift for team in teams for robot, shift in team.items()},
+        )
+
+    def _views_of_pairs(
+        self, chains: Mapping[int, ChainData], pairs: list[PairData], views: Mapping[int, ChainView]
+    ) -> list[PairView]:
+        before, self._pairs, out = self._pairs, {}, []
+        for pair in pairs:
+            a, b = pair.a.robot, pair.b.robot
+            if a not in views or b not in views:
+                continue
+            thinning = before.get((pair.a, pair.b)) or PairThinning()
+            self._pairs[pair.a, pair.b] = thinning
+            out.append(thinning.view(pair, chains[b], views[a], views[b]))
+        return out

@@ -1,0 +1,99 @@
+"""What people get wrong when they mount and configure wheels, and what makes odometry right again.
+
+A counter says how far each side went. A side that counts backwards, sides that are swapped, a wrong
+track and a wrong number of counts per metre each change way d and turn t of a step as one matrix,
+with h half of the track:
+
+    d' = way d + cross h t        t' = turn t + cross d / h
+
+Wheels that both run backwards and sides that are swapped give the same path, mirrored, once from
+the front and once from the back of the robot. Ranges do not tell which.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+
+from drslamd.slam import se2
+from drslamd.slam.se2 import Array
+
+
+class Fault(Enum):
+    """Of one robot's wheels."""
+
+    NONE = ""
+    MIRRORED = "mirrored"
+    LEFT_REVERSED = "left reversed"
+    RIGHT_REVERSED = "right reversed"
+    TRACK = "track"
+    SCALE = "scale"
+
+
+LEARNED = (Fault.TRACK, Fault.SCALE)
+"""Faults that module 3 learns once it is close."""
+
+
+FINER = 1.06
+"""Odometry that is wrong by half of that is right enough for windows of a minute."""
+
+
+class Repair(NamedTuple):
+    """What makes the odometry of one robot right (see above), if it has this fault."""
+
+    fault: Fault = Fault.NONE
+    way: float = 1.0
+    turn: float = 1.0
+    cross: float = 0.0
+
+    def path(self, poses: Array, half_track_m: float) -> Array:
+        """(k, 3) of a 10 Hz track o_T_i, as they should have been, from the first of them on.
+
+        Args:
+            half_track_m: only where `cross` is not 0.
+        """
+        step = se2.between(poses[:-1], poses[1:])
+        turn = se2.wrap(step[:, 2])
+        along = se2.rotate(-turn / 2, step[:, :2])
+        way = along[:, 0] / _chord(turn)
+        cross = self.cross * np.array([half_track_m, 1 / half_track_m if self.cross else 0.0])
+        d = self.way * way + cross[0] * turn
+        t = self.turn * turn + cross[1] * way
+        chord = np.stack([d * _chord(t), self.way * along[:, 1]], axis=-1)
+        heading = poses[0, 2] + np.append(0.0, np.cumsum(t))
+        moved = np.cumsum(se2.rotate(heading[:-1] + t / 2, chord), axis=0)
+        place = np.concatenate([poses[:1, :2], poses[0, :2] + moved])
+        return np.column_stack([place, heading])
+
+    def variants(self) -> tuple[Repair, ...]:
+        """The same, way and turn a little more or less; of what has no factor only itself."""
+        if self.fault not in LEARNED:
+            return (self,)
+        factors = (1.0, 1 / FINER, FINER)
+        return tuple(
+            self._replace(way=self.way * way, turn=self.turn * turn)
+            for way in factors
+            for turn in factors
+        )
+
+
+def _chord(turn: Array) -> Array:
+    """Of an arc of length 1."""
+    return np.asarray(np.sinc(turn / (2 * np.pi)))
+
+
+AS_CONFIGURED = Repair()
+MIRRORED = Repair(Fault.MIRRORED, turn=-1.0)
+SIDES = (
+    Repair(Fault.LEFT_REVERSED, way=0.0, turn=0.0, cross=1.0),
+    Repair(Fault.RIGHT_REVERSED, way=0.0, turn=0.0, cross=-1.0),
+)
+TRACKS = tuple(Repair(Fault.TRACK, turn=k) for k in (0.67, 0.74, 0.82, 1.22, 1.35, 1.5))
+"""With a scale and a turn between two of them windows and odometry agree well enough."""
+SCALES = tuple(
+    Repair(Fault.SCALE, k, k)
+    for k in (0.5, 0.55, 0.61, 0.67, 0.74, 0.82, 1.22, 1.35, 1.5, 1.65, 1.82, 2.0)
+)
+"""See `TRACKS`; all counts are wrong by the same factor, those of turns too."""

@@ -1,0 +1,148 @@
+"""A system of band and border, factorised: solutions and covariances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cholesky_banded
+from scipy.linalg.lapack import dtbtrs
+
+from drslamd.slam.optimizer.banded.layout import NOWHERE
+from drslamd.slam.optimizer.banded.normal_equations import System
+from drslamd.slam.se2 import Array, Index
+
+ROOM = 64
+"""Poses that `selected_inverse` does before it moves its window: moving costs as much as some."""
+
+
+@dataclass(frozen=True)
+class BandFactor:
+    """A system [A B; B' C] taken apart: A = L L', and what is left for the border.
+
+    Attributes:
+        lower: L in lower banded form.
+        halfway: (n, b) L^-1 B: half of the way is enough, since B' A^-1 B = (L^-1 B)' (L^-1 B).
+        schur: (b, b) C - B' A^-1 B, whose inverse is the covariance of the border.
+    """
+
+    lower: Array
+    halfway: Array
+    schur: Array
+
+    @staticmethod
+    def of(system: System, damping: float = 0.0) -> BandFactor | None:
+        """None where the system is not positive definite, as far as that shows.
+
+        Args:
+            damping: what is added to the diagonal, relative to it.
+        """
+        band, corner = system.band.copy(), system.corner.copy()
+        band[0] *= 1 + damping
+        corner[np.diag_indices(len(corner))] *= 1 + damping
+        try:
+            lower = cholesky_banded(band, lower=True, check_finite=False)
+        except np.linalg.LinAlgError:
+            return None
+        halfway = _triangular(lower, system.border)
+        schur = corner - halfway.T @ halfway
+        # a tiny pivot of A can leave nothing of the border but rounding
+        definite = np.isfinite(schur).all() and bool((np.diag(schur) > 0).all())
+        return BandFactor(lower, halfway, schur) if definite else None
+
+    def solved(self, right: Array) -> Array | None:
+        """The solution for a right-hand side (n + b,), or for c of them (n + b, c)."""
+        n = len(self.halfway)
+        columns = right.reshape(len(right), -1)
+        middle = _triangular(self.lower, columns[:n])
+        try:
+            outer = np.linalg.solve(self.schur, columns[n:] - self.halfway.T @ middle)
+        except np.linalg.LinAlgError:
+            return None
+        inner = _triangular(self.lower, middle - self.halfway @ outer, transposed=True)
+        return np.concatenate([inner, outer]).reshape(right.shape)
+
+    def joint_covariance(self, unknowns: Index) -> Array | None:
+        """(k, k) block of the inverse for some unknowns (k,); None where there is none."""
+        n = len(self.halfway)
+        columns = np.arange(len(unknowns))
+        inside = unknowns < n
+        unit = np.zeros((n, len(unknowns)))
+        unit[unknowns[inside], columns[inside]] = 1
+        own = _triangular(self.lower, unit)
+        bound = -self.halfway.T @ own
+        bound[unknowns[~inside] - n, columns[~inside]] += 1
+        try:
+            joint = own.T @ own + bound.T @ np.linalg.solve(self.schur, bound)
+        except np.linalg.LinAlgError:
+            return None
+        return joint if np.isfinite(joint).all() else None
+
+    def covariance_blocks(self, unknowns: Index) -> Array | None:
+        """(m, c, c) blocks of the inverse, for m factors that depend on unknowns (m, c) each.
+
+        Those that are in the band are no farther apart than its width; `NOWHERE` is known. None
+        where there is no inverse.
+        """
+        n = len(self.halfway)
+        across = _triangular(self.lower, self.halfway, transposed=True)
+        try:
+            outer = np.linalg.inv(self.schur)
+        except np.linalg.LinAlgError:
+            return None
+        rows = np.zeros((*unknowns.shape, len(outer)))
+        inside, outside = (unknowns < n) & (unknowns != NOWHERE), unknowns >= n
+        rows[inside] = -across[unknowns[inside]]
+        rows[outside] = np.eye(len(outer))[unknowns[outside] - n]
+        blocks = rows @ outer @ np.swapaxes(rows, 1, 2)
+        row = np.maximum(unknowns[:, :, None], unknowns[:, None, :])
+        column = np.minimum(unknowns[:, :, None], unknowns[:, None, :])
+        both = (row < n) & (column != NOWHERE)
+        blocks[both] += selected_inverse(self.lower)[(row - column)[both], column[both]]
+        return np.asarray(blocks)
+
+
+def _triangular(lower: Array, columns: Array, transposed: bool = False) -> Array:
+    """L^-1, or L'^-1, times columns (n, c)."""
+    if not columns.size:  # of which scipy would write beyond its memory
+        return columns
+    solved, _ = dtbtrs(lower, columns, uplo="L", trans="T" if transposed else "N")
+    return np.asarray(solved)
+
+
+def selected_inverse(lower: Array) -> Array:
+    """(w, n) lower band of (L L')^-1, of L in lower banded form, poses (three columns) at a time.
+
+    With K the columns of one pose and R the rows below them, Z = (L L')^-1 follows from the end
+    (Takahashi's equations):
+
+        Z_RK = -Z_RR G     Z_KK = L_KK^-T L_KK^-1 + G' Z_RR G     G = L_RK L_KK^-1
+    """
+    width, n = lower.shape
+    reach = width - 1
+    dense = np.zeros((n, reach + 3, 3))
+    for c in range(3):
+        dense[:, c : c + width, c] = lower.T
+    blocks = np.stack([dense[c::3, :, c] for c in range(3)], axis=-1)
+    own = np.linalg.inv(blocks[:, :3])
+    gain = blocks[:, 3:] @ own
+    pivot = np.swapaxes(own, 1, 2) @ own
+    found = np.zeros((n // 3, reach + 3, 3))
+    room = reach + 3 * ROOM
+    window, at = np.zeros((room, room)), room - reach
+    for k in range(n // 3 - 1, -1, -1):
+        if at < 3:
+            window[-reach:, -reach:] = window[at : at + reach, at : at + reach].copy()
+            at = room - reach
+        known = window[at : at + reach, at : at + reach]
+        aside = -known @ gain[k]
+        middle = pivot[k] - gain[k].T @ aside
+        window[at : at + reach, at - 3 : at] = aside
+        window[at - 3 : at, at : at + reach] = aside.T
+        window[at - 3 : at, at - 3 : at] = middle
+        found[k, :3], found[k, 3:] = middle, aside
+        at -= 3
+    band = np.zeros((width, n))
+    for c in range(3):
+        band[:, c::3] = found[:, c : c + width, c].T
+    return band

@@ -1,0 +1,120 @@
+"""Is the model one of what was measured, and if not, what is?
+
+A solution as configured is asked three questions: does odometry fit, do ranges fit now, does some
+track or antenna ask to be another one? Most often all is well. Else mountings are tried
+(`mountings`), which explain a fault for good, and then odometry that was worse for a while
+(`odometry_levels`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drslamd.slam.optimizer.banded import mountings, odometry_levels
+from drslamd.slam.optimizer.banded.band_factor import BandFactor
+from drslamd.slam.optimizer.banded.misfit import (
+    Run,
+    guessed_misfit,
+    misfit,
+    outlier_share,
+    runs,
+)
+from drslamd.slam.optimizer.banded.mountings import Scores
+from drslamd.slam.optimizer.banded.normal_equations import Equations
+from drslamd.slam.optimizer.banded.odometry_levels import FEW_OUTLIERS, STANDS_OUT
+from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.se2 import Array
+
+SUSPICIOUS = 3.0
+"""Guessed s / g above which it is computed."""
+MUCH = 100.0
+"""Of cost: a mounting that takes away so much is right, though something else is wrong as well."""
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """
+    Attributes:
+        equations: of the problem with the mountings that were let go.
+        point: its solution.
+        other: the solution of another explanation, when nobody can tell which is right.
+        level: (m,) sigmas of odometry over what is configured, as far as it was seen.
+        feared: (m,) variances likewise, as far as it must be feared; lately: of the last seconds.
+    """
+
+    equations: Equations
+    point: Point
+    other: Point | None
+    level: Array
+    feared: Array
+    lately: Array
+
+
+@dataclass(frozen=True)
+class _Check:
+    """What a solution says of its model.
+
+    Attributes:
+        ratio: (robots,) s / g of odometry; 1 as modelled.
+        runs: of outliers, that last until now.
+        scores: of mountings.
+    """
+
+    ratio: Array
+    runs: list[Run]
+    scores: Scores
+
+    def is_passed(self) -> bool:
+        return not self.runs and bool((self.ratio <= STANDS_OUT).all())
+
+
+def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -> Explanation:
+    """
+    Args:
+        nominal: the solution as configured, or with the mountings that were let go before.
+        most, tolerance: of further solutions, see `descend`.
+    """
+    check = _checked(equations, nominal)
+    if check.is_passed() and not check.scores.ask():
+        return _as_is(equations, nominal, check.ratio)
+    bases = [(equations, nominal, check)]
+    if check.scores.ask():
+        mounted, better = mountings.fitted(equations, nominal, check.scores, most, tolerance)
+        again = _checked(mounted, better)
+        few = outlier_share(mounted.problem, better).max(initial=0) < FEW_OUTLIERS
+        if better.converged and few and again.is_passed():
+            return _as_is(mounted, better, again.ratio)
+        if better.converged and _gain(equations, nominal, mounted, better) > MUCH:
+            bases.insert(0, (mounted, better, again))
+    for base, point, said in bases:
+        levels = odometry_levels.levelled(base, point, said.ratio, said.runs, most, tolerance)
+        seen = np.sqrt(levels.seen)
+        if levels.is_odometry:
+            return Explanation(base, levels.point, None, seen, levels.feared, levels.lately)
+    # what was tried last is what remains of the nominal solution
+    return Explanation(equations, nominal, levels.point, seen, levels.feared, levels.lately)
+
+
+def _as_is(equations: Equations, point: Point, ratio: Array) -> Explanation:
+    robot = equations.problem.odometry.robot
+    feared = np.maximum(ratio, 1.0)[robot]
+    return Explanation(equations, point, None, np.ones(len(robot)), feared, feared)
+
+
+def _checked(equations: Equations, point: Point) -> _Check:
+    problem = equations.problem
+    robot, robots = problem.odometry.robot, len(problem.priors.scale)
+    factor = BandFactor.of(equations.weighed(point))
+    if factor is None:
+        return _Check(np.ones(robots), [], Scores(np.zeros(robots), np.zeros(robots)))
+    ratio = guessed_misfit(equations, point, factor).ratio(robot, robots)
+    if (ratio > SUSPICIOUS).any():
+        ratio = misfit(equations, point, factor).ratio(robot, robots)
+    return _Check(ratio, runs(problem, point), mountings.scores(equations, point, factor))
+
+
+def _gain(before: Equations, at: Point, after: Equations, better: Point) -> float:
+    """By how much the cost fell."""
+    return before.cost(at, at.threshold) - after.cost(better, at.threshold)

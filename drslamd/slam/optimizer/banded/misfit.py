@@ -1,0 +1,188 @@
+"""What at a solution does not fit the model: links of odometry, and ranges.
+
+Of a right model the weighed squares s of a stretch's errors come to g, its share of the degrees of
+freedom: what the other measurements could check of it (Baarda, Foerstner).
+
+    s = sum e' W e     g = sum (3 - tr W P)     P = J H^-1 J'
+
+Ranges that are wrong lose their weight, so what contradicts odometry for long soon counts for
+nothing. Therefore outliers are counted too, and the run of them that lasts until now.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drslamd.slam.optimizer.banded import linearised
+from drslamd.slam.optimizer.banded.band_factor import BandFactor
+from drslamd.slam.optimizer.banded.layout import NOWHERE
+from drslamd.slam.optimizer.banded.normal_equations import Equations
+from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.problem import Problem
+from drslamd.slam.se2 import Array, Index
+
+DOUBT = 1.0
+"""Degrees of freedom that hold a ratio at 1: a robot has but two or three that ranges can check."""
+PROBES = 6
+"""Rows of random signs that estimate g of a whole robot to some percent."""
+OUTLIER_SIGMAS = 2.5
+"""Of what a range was sent with: beyond it, it is an outlier."""
+RUN = 4
+"""Outliers of one pair that follow each other, at one a second; bursts are shorter."""
+OF_RUN = 0.8
+"""Share of the ranges since its beginning that are outliers."""
+
+
+LATELY = 200
+"""Steps of the keyframes' grid."""
+MANY_WRONG = 0.4
+"""Share of the ranges of late that are outliers; bursts take a tenth or two."""
+FEWEST_LATELY = 8
+"""Ranges, fewer are no share."""
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """
+    Attributes:
+        squares: (m,) s of each link of odometry.
+        checked: (m,) g of each.
+    """
+
+    squares: Array
+    checked: Array
+
+    @staticmethod
+    def unknown(links: int) -> Misfit:
+        """Of a system that cannot be solved."""
+        return Misfit(np.zeros(links), np.zeros(links))
+
+    def ratio(self, group: Index, count: int) -> Array:
+        """(count,) s / g of groups of links.
+
+        Args:
+            group: (m,) to which each link belongs.
+        """
+        s, g = (np.bincount(group, each, count) for each in (self.squares, self.checked))
+        return np.asarray((s + DOUBT) / (np.maximum(g, 0.0) + DOUBT))
+
+
+def misfit(equations: Equations, point: Point, factor: BandFactor) -> Misfit:
+    """Computed exactly.
+
+    Args:
+        factor: of `Equations.weighed` at that point.
+    """
+    problem = equations.problem
+    jacobian = linearised.odometry_jacobian(problem, point.poses)
+    squares, information = _squares(problem, point)
+    blocks = factor.covariance_blocks(equations.layout.odometry_unknowns(problem.odometry))
+    if blocks is None:
+        return Misfit(squares, np.zeros(len(squares)))
+    covariance = jacobian @ blocks @ np.swapaxes(jacobian, 1, 2)
+    return Misfit(squares, 3 - np.einsum("kij,kji->k", information, covariance))
+
+
+def guessed_misfit(equations: Equations, point: Point, factor: BandFactor) -> Misfit:
+    """Several times faster, and good for sums over many links (Hutchinson's estimate).
+
+    The signs are the same for everybody who has the same problem.
+    """
+    problem, layout = equations.problem, equations.layout
+    jacobian = linearised.odometry_jacobian(problem, point.poses)
+    squares, information = _squares(problem, point)
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], (len(jacobian), 3, PROBES))
+    whitened = np.swapaxes(np.linalg.cholesky(information), 1, 2) @ jacobian
+    unknowns = layout.odometry_unknowns(problem.odometry)
+    whitened = np.where((unknowns == NOWHERE)[:, None], 0.0, whitened)
+    unknowns = np.maximum(unknowns, 0)
+    each = (np.swapaxes(whitened, 1, 2) @ signs).reshape(-1, PROBES)
+    size = layout.band + layout.border
+    sums = np.stack([np.bincount(unknowns.ravel(), row, size) for row in each.T], axis=-1)
+    spread = factor.solved(sums)
+    if spread is None:
+        return Misfit(squares, np.zeros(len(squares)))
+    seen: Array = signs * (whitened @ spread[unknowns])
+    return Misfit(squares, 3 - seen.sum(axis=(1, 2)) / PROBES)
+
+
+def _squares(problem: Problem, point: Point) -> tuple[Array, Array]:
+    """e' W e (m,) and W (m, 3, 3)."""
+    information = problem.odometry.information
+    squares: Array = np.einsum("ki,kij,kj->k", point.link, information, point.link)
+    return squares, information
+
+
+def outliers(problem: Problem, point: Point) -> NDArray[np.bool_]:
+    """(n,) which of the ranges are far off the solution."""
+    ranges = problem.ranges
+    return np.asarray(np.abs(point.sight.error) > OUTLIER_SIGMAS * ranges.sigma)
+
+
+def outlier_share(problem: Problem, point: Point) -> Array:
+    """(pairs,) of the ranges of each pair; none of no ranges."""
+    pair = problem.ranges.pair
+    count = np.bincount(pair, minlength=problem.pairs)
+    return np.bincount(pair, outliers(problem, point), problem.pairs) / np.maximum(count, 1)
+
+
+@dataclass(frozen=True)
+class Run:
+    """Outliers of one pair that last until now.
+
+    Attributes:
+        i, j: robots, as the problem numbers them; i < j.
+        n_i, n_j: their keyframes at the first of them, each on the clock of its robot.
+        count: of ranges.
+    """
+
+    i: int
+    j: int
+    n_i: int
+    n_j: int
+    count: int
+
+
+def contradicted(problem: Problem, point: Point) -> NDArray[np.bool_]:
+    """(pairs,) whose ranges of late do not fit the solution: an unbroken run of them, or many."""
+    found = np.zeros(problem.pairs, dtype=bool)
+    wrong = outliers(problem, point)
+    pair = problem.ranges.pair
+    n = problem.n[problem.ranges.i]
+    for k in range(problem.pairs):
+        mine = pair == k
+        lately = mine & (n > n[mine].max(initial=0) - LATELY)
+        count = np.count_nonzero(lately)
+        found[k] = count >= FEWEST_LATELY and wrong[lately].sum() >= MANY_WRONG * count
+    robots = np.unique(problem.robot)
+    ends = problem.robot[np.stack([problem.ranges.i, problem.ranges.j])]
+    for run in runs(problem, point):
+        between = np.isin(ends, robots[[run.i, run.j]]).all(axis=0)
+        found[pair[between]] = True
+    return found
+
+
+def runs(problem: Problem, point: Point) -> list[Run]:
+    """Of all pairs that have one."""
+    ranges = problem.ranges
+    order = np.argsort(np.maximum(ranges.i, ranges.j), kind="stable")
+    wrong = outliers(problem, point)
+    robots = np.unique(problem.robot)
+    found = []
+    for pair in range(problem.pairs):
+        mine = order[ranges.pair[order] == pair][::-1]
+        share = np.cumsum(wrong[mine]) / (np.arange(len(mine)) + 1)
+        # from a last range that is wrong, as far back as most of them are
+        good = np.flatnonzero(wrong[mine] & (share >= OF_RUN))
+        count = int(good[-1]) + 1 if len(good) else 0
+        if count < RUN or not wrong[mine[:RUN]].all():
+            continue
+        first = mine[count - 1]
+        ends = np.array([ranges.i[first], ranges.j[first]])
+        ends = ends[np.argsort(problem.robot[ends])]
+        (i, j), (n_i, n_j) = np.searchsorted(robots, problem.robot[ends]), problem.n[ends]
+        found.append(Run(int(i), int(j), int(n_i), int(n_j), count))
+    return found

@@ -1,0 +1,42 @@
+"""What the banded solver answers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drslamd.slam.optimizer.problem import Calibration, Doubted
+from drslamd.slam.se2 import Array
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Poses (k, 3) in the order of the problem, and how they were reached.
+
+    Attributes:
+        scatter: (pairs,) how many times the configured sigma ranges scatter.
+        joint: (3 k, 3 k) covariance of x, y, theta in w of the k poses that were asked for.
+        spread: sigmas of the calibration.
+        odometry_level: (m,) sigmas of the links of odometry over what was configured, as far as
+            it was seen; feared_level: as far as it must be feared; late_level: of the last seconds.
+        doubted: whose mountings were let go.
+        is_explained: is the model, with these levels, one of what was measured?
+        contradicted: (pairs,) whose ranges of late do not fit.
+    """
+
+    poses: Array
+    calibration: Calibration
+    cost: float
+    iterations: int
+    converged: bool
+    scatter: Array = field(default_factory=lambda: np.zeros(0))
+    joint: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    spread: Calibration | None = None
+    odometry_level: Array = field(default_factory=lambda: np.zeros(0))
+    feared_level: Array = field(default_factory=lambda: np.zeros(0))
+    late_level: Array = field(default_factory=lambda: np.zeros(0))
+    is_explained: bool = True
+    contradicted: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    doubted: Doubted = field(default_factory=lambda: Doubted.none(0))

@@ -1,0 +1,104 @@
+"""What is believed of range biases before anything is measured.
+
+The modules of one team resemble each other. The bias of a pair is that of the team plus what the
+pair has of its own,
+
+    bias_ij = team + own_ij.
+
+All `own` together are of Student's distribution: while all pairs agree each is held tightly, and
+where they differ all are held loosely. Its cost is -2 log of the density, without the constant:
+
+    (dof + pairs) log(1 + sum own^2 / (dof spread^2))
+
+`team` has Cauchy's cost, log(1 + (team / width)^2). Both have Gauss's tails beyond the sigma that
+is configured: without them a bias that motion says little of runs off by metres after whatever else
+is wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drslamd.slam.range_model import RangeModel
+from drslamd.slam.se2 import Array
+
+LEAST_CURVATURE = 0.1
+"""Of a heavy tail over that of a square with the same pull: beyond some value the curvature is
+negative, and a system must stay positive definite."""
+WHOLE = -1.0
+"""In its place: the second derivative as it is, for steps near a minimum."""
+WEIGHT = 1.0
+"""In its place: no less than that square, which no step overshoots, however far it starts."""
+TINY = 1e-12
+"""m^2; no bias is known so well."""
+
+
+@dataclass(frozen=True)
+class BiasPrior:
+    """
+    Attributes:
+        sigma: as configured, m.
+        spread: half width of what pairs have of their own, m.
+        dof: degrees of freedom of its distribution.
+        team: half width of what all pairs have in common, m.
+    """
+
+    sigma: float
+    spread: float
+    dof: float
+    team: float
+
+    @staticmethod
+    def of(sigma: float, model: RangeModel) -> BiasPrior:
+        """For a configured sigma, m, of the bias of a pair."""
+        return BiasPrior(
+            sigma=sigma,
+            spread=model.spread_share * sigma,
+            dof=model.spread_dof,
+            team=model.team_share * sigma,
+        )
+
+    def cost(self, own: Array, team: float) -> float:
+        """Of what pairs have of their own (pairs,), m, and of what is common, m."""
+        squares = float(own @ own)
+        student = (self.dof + len(own)) * np.log1p(squares / (self.dof * self.spread**2))
+        cauchy = np.log1p((team / self.team) ** 2)
+        return float(student + cauchy + (squares + team**2) / self.sigma**2)
+
+    def own_pull(self, own: Array) -> Array:
+        """(pairs,) half the derivative of the cost by what each pair has of its own, 1/m."""
+        return np.asarray((self._student(own) + self.sigma**-2) * own)
+
+    def own_curvature(self, own: Array, least: float = LEAST_CURVATURE) -> Array:
+        """(pairs, pairs) half the second derivative, 1/m^2, kept positive definite.
+
+        Args:
+            least: see `LEAST_CURVATURE`.
+        """
+        squares = float(own @ own)
+        bend = min(2 / self._scale(own), (1 - least) / max(squares, TINY))
+        rounded = self._student(own) * (np.eye(len(own)) - bend * np.outer(own, own))
+        return np.asarray(rounded + self.sigma**-2 * np.eye(len(own)))
+
+    def team_pull(self, team: float) -> float:
+        """Half the derivative of the cost by what is common."""
+        return team * (1 / (self.team**2 + team**2) + self.sigma**-2)
+
+    def team_curvature(self, team: float, least: float = LEAST_CURVATURE) -> float:
+        """Half the second derivative, kept positive."""
+        return float(cauchy_curvature(self.team, np.array([team]), least)[0]) + self.sigma**-2
+
+    def _scale(self, own: Array) -> float:
+        return self.dof * self.spread**2 + float(own @ own)
+
+    def _student(self, own: Array) -> float:
+        return (self.dof + len(own)) / self._scale(own)
+
+
+def cauchy_curvature(width: Array | float, values: Array, least: float = LEAST_CURVATURE) -> Array:
+    """(k,) half the second derivative of log(1 + (value / width)^2), kept positive."""
+    squares = (values / width) ** 2
+    ratio = np.maximum((1 - squares) / (1 + squares), least)
+    return np.asarray(ratio / (1 + squares) / np.square(width))

@@ -1,0 +1,187 @@
+"""Do the ranges of this very second fit where both robots are said to be?
+
+Module 3 knows that something is wrong once its graph shows it, which takes seconds. What it solved
+last, carried on by both odometries, says what each range must be now; a range that is far off for
+two seconds is doubt, long before anybody can say who is wrong.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from drslamd.conventions import GRID_US
+from drslamd.slam import se2
+from drslamd.slam.graph.chain_data import ChainData
+from drslamd.slam.graph.estimate import Learned, TeamEstimate
+from drslamd.slam.pose_now import noise_of_way
+from drslamd.slam.range_model import RangeModel
+from drslamd.slam.relative_pose.pair_end import PairEnd, level
+from drslamd.slam.relative_pose.range_buffer import RangeBuffer
+from drslamd.slam.se2 import Array
+
+FAR_SIGMAS = 3.0
+"""Beyond them a range does not fit."""
+IN_A_ROW = 2
+"""So many seconds of them are doubt; a burst is shorter."""
+LEAST_M = 1e-3
+"""Antennas that touch have no direction."""
+MOST_BIAS_M = 1.0
+"""Of which nothing is known yet."""
+AT_ONCE = 5
+"""Tenths of a second whose median is looked at."""
+
+
+LATE_US = 2_500_000
+"""A peer says where its wheels went every second; one that says nothing for so long stands."""
+
+
+class Partner(NamedTuple):
+    """A robot in range: what its log says, its clock minus ours, us, and the ranges to it."""
+
+    data: ChainData
+    ahead_us: int
+    ranges: RangeBuffer
+
+
+class _End(NamedTuple):
+    """An antenna now.
+
+    Attributes:
+        place: (2,) in w.
+        by_pose: (2, 3) its derivative by the last solved pose.
+        added: (2, 2) covariance of the way since then.
+    """
+
+    place: Array
+    by_pose: Array
+    added: Array
+
+
+class RangeWatch:
+    """Of one robot.
+
+    Attributes:
+        off: of how many seconds in a row the ranges to each peer do not fit.
+    """
+
+    def __init__(self, sigma_m: float, model: RangeModel) -> None:
+        """
+        Args:
+            sigma_m: of a range.
+        """
+        self._sigma_m, self._model = sigma_m, model
+        self.off: dict[int, int] = {}
+
+    @property
+    def doubted(self) -> frozenset[int]:
+        """Peers to whom ranges do not fit."""
+        return frozenset(peer for peer, seconds in self.off.items() if seconds >= IN_A_ROW)
+
+    @property
+    def looked_at(self) -> frozenset[int]:
+        """Peers whose ranges could be held against the solution of late."""
+        return frozenset(self.off)
+
+    def look(
+        self,
+        estimate: TeamEstimate | None,
+        own: PairEnd,
+        partners: dict[int, Partner],
+        utime: int,
+    ) -> None:
+        """Once a second."""
+        found: dict[int, int] = {}
+        for robot, partner in partners.items() if estimate is not None else ():
+            assert estimate is not None
+            sigmas = self._sigmas_off(estimate, own, partner, utime)
+            if sigmas is not None:
+                found[robot] = self.off.get(robot, 0) + 1 if sigmas > FAR_SIGMAS else 0
+        self.off = found
+
+    def _sigmas_off(
+        self, estimate: TeamEstimate, own: PairEnd, partner: Partner, utime: int
+    ) -> float | None:
+        """How many sigmas the newest ranges are off; None where nothing can be said."""
+        at = _newest(own, partner, utime)
+        if at is None:
+            return None
+        n, when = at
+        near = AT_ONCE * GRID_US
+        found = partner.ranges.between(when - near, when + near).in_sight(self._model)
+        a = _antenna(estimate, own.data, _own_way(estimate, own, when))
+        b = _antenna(estimate, partner.data, _way(estimate, partner.data, n))
+        if not len(found.utime) or a is None or b is None:
+            return None
+        pair = (own.data.chain.robot, partner.data.chain.robot)
+        joint = estimate.joint_of(*pair)
+        if joint is None:
+            return None
+        models = own.data.model, partner.data.model
+        measured = float(np.median(level(found.range_m, *models)))
+        u = b.place - a.place
+        distance = max(float(np.hypot(*u)), LEAST_M)
+        u = u / distance
+        by_pose = np.concatenate([-u @ a.by_pose, u @ b.by_pose])
+        bias = estimate.bias_m.get((min(pair), max(pair)), Learned())
+        strong = estimate.near_bias_m.value * float(
+            self._model.near_range_shape(np.array(measured))
+        )
+        variance = by_pose @ joint @ by_pose + u @ (a.added + b.added) @ u
+        variance += self._sigma_m**2 + float(self._model.near_range_sigma(measured)) ** 2
+        variance += min(bias.sigma, MOST_BIAS_M) ** 2
+        return abs(distance + bias.value + strong - measured) / float(np.sqrt(variance))
+
+
+def _newest(own: PairEnd, partner: Partner, utime: int) -> tuple[int, int] | None:
+    """The latest keyframe of a partner, and the time of our clock at which it was there."""
+    keyframes = partner.data.keyframes
+    if not len(keyframes) or not len(own.track):
+        return None
+    n = int(keyframes.n[-1])
+    said_at = n * GRID_US - partner.ahead_us
+    stands = utime - said_at > LATE_US
+    when = own.last_us if stands else said_at
+    return (n, when) if own.first_us <= when <= own.last_us else None
+
+
+def _way(estimate: TeamEstimate, data: ChainData, n: int) -> Array | None:
+    """(k, 3) odometry from the last solved keyframe of a robot to its keyframe n."""
+    solved = estimate.trajectories.get(data.chain.robot)
+    if solved is None or solved.chain != data.chain or not len(solved.n):
+        return None
+    keyframes = data.keyframes
+    (first, last), there = keyframes.find(np.array([float(solved.n[-1]), float(n)]))
+    is_whole = there.all() and first <= last and keyframes.segment[first] == keyframes.segment[last]
+    return keyframes.poses[first : last + 1] if is_whole else None
+
+
+def _own_way(estimate: TeamEstimate, own: PairEnd, utime: int) -> Array | None:
+    """(k, 3) odometry from our last solved keyframe to `utime`."""
+    solved = estimate.trajectories.get(own.data.chain.robot)
+    if solved is None or solved.chain != own.data.chain or not len(solved.n):
+        return None
+    last, now, track = int(solved.n[-1]), int(own.grid(utime)[0]), own.track
+    if now < last:
+        # solved already: back along the way, of which the noise is as large
+        last, now = now, last
+        way = track.poses[last - track.n0 : now - track.n0 + 1] if track.covers(last, now) else None
+        return None if way is None else way[::-1]
+    return track.poses[last - track.n0 : now - track.n0 + 1] if track.covers(last, now) else None
+
+
+def _antenna(estimate: TeamEstimate, data: ChainData, way: Array | None) -> _End | None:
+    """Where the antenna of a robot is at the end of a way from its last solved keyframe."""
+    if way is None:
+        return None
+    robot = data.chain.robot
+    start = estimate.trajectories[robot].poses[-1]
+    step = se2.between(way[:1], estimate.correction(robot).path(way))
+    x, y = estimate.antenna_m.get(robot, (Learned(), Learned()))
+    arm = se2.transform(step[-1], data.model.antenna + [x.value, y.value])
+    arm = se2.rotate(start[2], arm)
+    by_pose = np.array([[1.0, 0.0, -arm[1]], [0.0, 1.0, arm[0]]])
+    level_now = estimate.odometry_level.get(robot, 1.0)
+    added = noise_of_way(float(start[2]), step, data.model.noise, level_now)
+    return _End(start[:2] + arm, by_pose, added[:2, :2])

@@ -1,0 +1,217 @@
+"""Is a pair mounted as configured, and if its windows say no, which mistake explains them all?
+
+Several windows are asked `what_if`; the sums of their chi-squared decide. Short windows fit wheels
+that run backwards as well as wheels as configured, so a pair is believed only once its windows
+exclude that: then it is confirmed, for mountings do not change. If they disagree again and again, a
+clear winner that fits is named. Track and scale look much alike in a window: where one of them wins
+and it is not clear which, nothing is named, and module 3 begins at the best of them.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from drslamd.conventions import SECOND_US
+from drslamd.slam.odometry.mounting import LEARNED, Fault
+from drslamd.slam.relative_pose import what_if
+from drslamd.slam.relative_pose.estimate import Verdict
+from drslamd.slam.relative_pose.range_fit import POOR_FIT
+from drslamd.slam.relative_pose.what_if import CASES, MIRROR, Case
+from drslamd.slam.se2 import Array
+
+RECENT = 10
+"""Windows that are remembered."""
+MANY = 4
+"""So many of them must disagree, or the pair counts as one that agrees."""
+MOST = 7
+"""Where so many do, no new closure is believed."""
+APART_US = 4 * SECOND_US
+"""Between two windows that are asked; a window is up to a minute long."""
+EXCLUDED = 20.0
+"""By how much chi-squared of the newest three windows must be worse where wheels run backwards. Of
+fifteen teams all are confirmed after 12 to 44 s (median 20 s), and of forty with wheels that run
+backwards or count wrongly none is."""
+MOVED_M = 1.0
+"""A robot that drove less in a window looks the same in a mirror."""
+FEWEST_ASKED, MOST_ASKED = 3, 12
+"""Windows that decide."""
+SHARED = 3
+"""So many windows beyond the third are worth one: they share most of their data."""
+WRONG, CLEAR = 60.0, 30.0
+"""By how much chi-squared must fall, over that of a degree of freedom, for the configuration to be
+wrong, and by how much the next kind must be worse, for wheels that run backwards to be named. Of
+twenty-one such robots all are, after 20 to 48 s, and in eighty pairs without such wheels none."""
+BETTER, UNLIKE = 100.0, 40.0
+"""Likewise for a track or a scale to begin with, and by how much all that is no track or scale of
+the same robot must be worse. Of eighteen robots that count wrongly all begin near the truth after
+24 to 72 s; of fifteen healthy pairs none begins elsewhere than configured, and of six whose sight
+is blocked half of the time one does."""
+FITS = 0.7
+"""Chi-squared per degree of freedom of windows that a track or a scale really explains: it is 0.2
+to 0.6, because noise is allowed for generously. Where sight is blocked it is more, whatever is
+tried."""
+INDIFFERENT = -5.0
+"""Who drives straight for long is the same in a mirror: then what is configured is believed."""
+
+_SAID = (Verdict.UNIQUE, Verdict.AMBIGUOUS, Verdict.POOR_FIT)
+
+
+class _Answer(NamedTuple):
+    costs: Array
+    freedom: int
+
+
+class MountingSearch:
+    """Of one pair.
+
+    Attributes:
+        found: what explains the windows of late; None while nothing does.
+        is_clear: is it that and nothing else?
+        is_confirmed: did windows exclude what would look like the configuration?
+    """
+
+    def __init__(self) -> None:
+        self.found: Case | None = None
+        self.is_clear = False
+        self.is_confirmed = False
+        self._fits: deque[bool] = deque(maxlen=RECENT)
+        self._answers: deque[_Answer] = deque(maxlen=MOST_ASKED)
+        self._asked_at: int | None = None
+
+    def on_verdict(self, verdict: Verdict) -> None:
+        """Module 1 has answered, with what is known of the mountings."""
+        if verdict in _SAID:
+            self._fits.append(verdict is not Verdict.POOR_FIT)
+
+    @property
+    def cases(self) -> Sequence[Case]:
+        """What the next window is asked."""
+        return CASES if self.found is None else what_if.variants(self.found)
+
+    @property
+    def poor(self) -> int:
+        """How many windows of late disagree."""
+        return len(self._fits) - sum(self._fits)
+
+    @property
+    def is_puzzled(self) -> bool:
+        """Do they, and no mistake explains it?"""
+        return self.disagrees and self.found is None and len(self._answers) == MOST_ASKED
+
+    @property
+    def disagrees(self) -> bool:
+        """Do ranges and odometries of the pair contradict each other again and again?"""
+        return self.poor >= MOST
+
+    def is_due(self, utime: int, awaits: bool) -> bool:
+        """Is it time to ask?
+
+        Args:
+            awaits: would the pair be believed if it was confirmed?
+        """
+        is_late = self._asked_at is None or utime - self._asked_at >= APART_US
+        is_open = self.found is None and not self.is_confirmed and (self.poor >= MANY or awaits)
+        is_vague = self.found is not None and is_learned(self.found) and self.disagrees
+        return is_late and (is_open or is_vague)
+
+    def begin(self, utime: int) -> None:
+        """A window is asked now."""
+        self._asked_at = utime
+
+    def on_costs(self, costs: Array, measurements: int, is_mirror_told: bool) -> bool:
+        """`what_if.Question.costs` of a window are known. Is something found that was not before?
+
+        Args:
+            is_mirror_told: did both robots drive so that mirrored wheels would show?
+        """
+        self._answers.append(_Answer(costs, measurements - 3))
+        if self.found is not None:
+            return self._refine(self.found)
+        newest = [answer.costs for answer in self._answers][-FEWEST_ASKED:]
+        self.is_confirmed |= is_as_configured(np.sum(newest, axis=0), is_mirror_told)
+        asked = len(self._answers)
+        if asked < FEWEST_ASKED:
+            return False
+        worth = FEWEST_ASKED + (asked - FEWEST_ASKED) / SHARED
+        total = worth * np.mean([answer.costs for answer in self._answers], axis=0)
+        freedom = worth * float(np.mean([answer.freedom for answer in self._answers]))
+        if asked == MOST_ASKED:
+            self.is_confirmed |= bool(_backwards(total - total[0], True) >= INDIFFERENT)
+        case, is_clear = winner(total, freedom)
+        # whatever happens to a mounting that was right is something else
+        if case is None or self.is_confirmed:
+            return False
+        self.found, self.is_clear = case, is_clear
+        self.is_confirmed = is_learned(case)
+        # windows with the repair speak for themselves
+        self._fits.clear()
+        self._answers.clear()
+        return True
+
+    def _refine(self, found: Case) -> bool:
+        """Windows with the repair disagree: is it a little more, or less?"""
+        total = np.sum([answer.costs for answer in self._answers], axis=0)
+        if len(self._answers) < FEWEST_ASKED:
+            return False
+        freedom = sum(answer.freedom for answer in self._answers)
+        self._answers.clear()
+        if total.min() > FITS * freedom:
+            # it was something else
+            self.found, self.is_clear, self.is_confirmed = None, False, False
+            return True
+        self.found = what_if.variants(found)[int(np.argmin(total))]
+        return self.found != found
+
+
+def is_as_configured(chi2: Array, is_mirror_told: bool) -> bool:
+    """Do windows exclude that wheels run backwards, and is no other mistake better?
+
+    Args:
+        chi2: (cases,) of up to three windows.
+    """
+    worse = chi2 - chi2[0]
+    return bool(worse.min() >= 0 and _backwards(worse, is_mirror_told) >= EXCLUDED)
+
+
+def _backwards(worse: Array, is_mirror_told: bool) -> float:
+    """The least of what windows have against wheels that run backwards."""
+    return min(
+        float(by)
+        for by, case in zip(worse, CASES, strict=True)
+        if not is_learned(case) and (is_mirror_told or case != MIRROR)
+    )
+
+
+def winner(chi2: Array, freedom: float) -> tuple[Case | None, bool]:
+    """Which of `CASES` explains windows, if any does, and whether only that one does.
+
+    Args:
+        chi2: (cases,) of all windows together; freedom: degrees of it.
+    """
+    best = int(np.argmin(chi2))
+    level = float(chi2[best]) / freedom
+    if level > POOR_FIT:
+        return None, False
+    worse = (chi2 - chi2[best]) / max(level, 1.0)
+    case = CASES[best]
+    others = min(by for by, other in zip(worse, CASES, strict=True) if other.kind != case.kind)
+    if not is_learned(case):
+        return (case, True) if worse[0] >= WRONG and others >= CLEAR else (None, False)
+    unlike = min(by for by, other in zip(worse, CASES, strict=True) if not _is_like(other, case))
+    is_start = level <= FITS and worse[0] >= BETTER and unlike >= UNLIKE
+    return (case, bool(others >= UNLIKE)) if is_start else (None, False)
+
+
+def is_learned(case: Case) -> bool:
+    """Are these mistakes that module 3 learns?"""
+    return all(repair.fault in (Fault.NONE, *LEARNED) for repair in case)
+
+
+def _is_like(one: Case, other: Case) -> bool:
+    """Are the same robots wrong, by tracks or scales?"""
+    whose = [[repair.fault is not Fault.NONE for repair in case] for case in (one, other)]
+    return is_learned(one) and is_learned(other) and whose[0] == whose[1]

@@ -1,0 +1,127 @@
+"""What if? One window that disagrees, solved again under each thing that people get wrong.
+
+Module 1 says how well a window fits odometry as configured. Here the same ranges meet the odometry
+that the robots would have had if the wheels of one of them were mounted otherwise than configured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from drslamd.conventions import SECOND_US
+from drslamd.slam import se2
+from drslamd.slam.odometry.mounting import (
+    AS_CONFIGURED,
+    MIRRORED,
+    SCALES,
+    SIDES,
+    TRACKS,
+    Repair,
+)
+from drslamd.slam.relative_pose import solver
+from drslamd.slam.relative_pose.estimate import PairNoise
+from drslamd.slam.relative_pose.pair_end import PairEnd
+from drslamd.slam.relative_pose.window import Window
+from drslamd.slam.relative_pose.window_request import WindowRequest
+from drslamd.slam.se2 import Array
+
+
+class Case(NamedTuple):
+    """Repairs of both robots of a pair that are tried together."""
+
+    a: Repair = AS_CONFIGURED
+    b: Repair = AS_CONFIGURED
+
+    @property
+    def kind(self) -> tuple[str, str]:
+        """Cases of one kind differ in a factor only."""
+        return self.a.fault.name, self.b.fault.name
+
+
+MIRROR = Case(b=MIRRORED)
+"""a mirrored and b mirrored are one world and its mirror image: the same ranges."""
+CASES = (
+    Case(),
+    MIRROR,
+    *(Case(a=repair) for repair in (*SIDES, *TRACKS, *SCALES)),
+    *(Case(b=repair) for repair in (*SIDES, *TRACKS, *SCALES)),
+    # a team that was configured from one file is wrong in the same way
+    *(Case(repair, repair) for repair in SCALES),
+)
+
+
+def variants(found: Case) -> tuple[Case, ...]:
+    """The same mistake a little smaller and larger, itself first."""
+    return tuple(Case(a, b) for a in found.a.variants() for b in found.b.variants())
+
+
+@dataclass(frozen=True)
+class WindowTrack:
+    """The 10 Hz track of one robot under a window.
+
+    Attributes:
+        poses: (k, 3) o_T_i.
+        at: (n,) places of the measurements in it, in samples; reference: that of its time.
+        half_track_m: 0 where wheels have no sides.
+    """
+
+    poses: Array
+    at: Array
+    reference: float
+    half_track_m: float
+
+    @staticmethod
+    def of(end: PairEnd, request: WindowRequest) -> WindowTrack:
+        at = end.grid(request.utime + request.window.t * SECOND_US)
+        reference = float(end.grid(request.utime)[0])
+        first, last = (int(np.floor(v)) for v in (min(at[0], reference), max(at[-1], reference)))
+        last = min(last + 1, end.track.end - 1)
+        poses = end.track.at_time(np.arange(first, last + 1))
+        return WindowTrack(poses, at - first, reference - first, end.data.model.half_track_m)
+
+    def can_be(self, repair: Repair) -> bool:
+        return not repair.cross or self.half_track_m > 0
+
+    def repaired(self, repair: Repair) -> Array:
+        """(n, 3) poses at the measurements, seen from that at the reference time."""
+        path = repair.path(self.poses, self.half_track_m)
+        at = np.append(self.at, self.reference)
+        places = np.arange(len(path))
+        poses = np.stack([np.interp(at, places, column) for column in path.T], axis=-1)
+        return se2.between(poses[-1], poses[:-1])
+
+
+@dataclass(frozen=True)
+class Question:
+    """A window that disagrees, and the tracks under it."""
+
+    window: Window
+    a: WindowTrack
+    b: WindowTrack
+
+    @property
+    def way_m(self) -> float:
+        """How far the robot drove that drove less."""
+        ways = (np.diff(stretch.poses[:, :2], axis=0) for stretch in (self.a, self.b))
+        return min(float(np.nansum(np.hypot(*way.T))) for way in ways)
+
+    def costs(self, cases: Sequence[Case], noise: PairNoise, delta: float) -> Array:
+        """(cases,) chi-squared of the best pose under each of them, infinite where none fits."""
+        return np.array([self._cost(case, noise, delta) for case in cases])
+
+    def _cost(self, case: Case, noise: PairNoise, delta: float) -> float:
+        if not (self.a.can_be(case.a) and self.b.can_be(case.b)):
+            return float("inf")
+        a, b = self.a.repaired(case.a), self.b.repaired(case.b)
+        if not (np.isfinite(a).all() and np.isfinite(b).all()):
+            return float("inf")
+        return solver.least_chi2(replace(self.window, a_poses=a, b_poses=b), noise, delta)
+
+
+def ask(request: WindowRequest, a: PairEnd, b: PairEnd) -> Question:
+    """What a computation needs, copied: tracks grow meanwhile."""
+    return Question(request.window, WindowTrack.of(a, request), WindowTrack.of(b, request))

@@ -1,0 +1,42 @@
+"""Where a robot stands: its pose now, what that is worth, and what speaks against it."""
+
+from __future__ import annotations
+
+from drslamd.config import Config
+from drslamd.conventions import Chain
+from drslamd.slam.back_end import BackEnd
+from drslamd.slam.doubt import Doubt, doubt_of, doubted_partners
+from drslamd.slam.front_end import FrontEnd
+from drslamd.slam.graph.estimate import PoseNow
+from drslamd.slam.pose_now import pose_now
+from drslamd.whereabouts import Whereabouts, whereabouts
+
+
+class Standing:
+    """Of one robot."""
+
+    def __init__(self, config: Config, own: Chain, front: FrontEnd, back: BackEnd) -> None:
+        self._most_mps, self._robot = config.wheels.max_speed_mps, own.robot
+        self._front, self._back = front, back
+
+    def pose(self) -> PoseNow | None:
+        """Our latest pose in the frame of the team; None while we are not localised."""
+        estimate, front = self._back.estimate, self._front
+        if estimate is None:
+            return None
+        return pose_now(estimate, self._robot, front.reckoning.track, front.model.noise)
+
+    def whereabouts(self, utime: int) -> Whereabouts:
+        """What that pose is worth now."""
+        track = self._front.reckoning.track
+        return whereabouts(self.pose(), track, self._most_mps, self._doubt(), utime)
+
+    def is_doubted(self) -> tuple[bool, bool]:
+        """Does odometry of ours, or of anybody, say less than what was ranged?"""
+        own = self._doubt() is not None
+        partners = doubted_partners(self._robot, self._back.estimate, self._front.watch.doubted)
+        return own, own or bool(partners)
+
+    def _doubt(self) -> Doubt | None:
+        watch = self._front.watch
+        return doubt_of(self._robot, self._back.estimate, watch.looked_at, watch.doubted)

@@ -1,0 +1,40 @@
+"""Worlds are repeatable, and those without faults are the simulator's own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from lab.recordings import world
+from lab.trust import worlds
+from lab.trust.worlds import World
+
+
+def test_a_world_without_faults_is_the_scene_as_it_is_simulated() -> None:
+    found, simulated = World(worlds.RECORDED).recording(4), world.simulate(worlds.RECORDED, 4)
+    assert np.array_equal(found.ranges, simulated.ranges)
+    for robot, trail in simulated.trails.items():
+        assert np.array_equal(found.trails[robot].odometry, trail.odometry)
+
+
+@pytest.mark.parametrize("made", [worlds.SLIP, worlds.BLOCKED, worlds.HEAVY_TAILS, worlds.LINE])
+def test_the_same_seed_gives_the_same_world_and_another_one_another(made: World) -> None:
+    one, same, other = (made.recording(seed) for seed in (1, 1, 2))
+    assert np.array_equal(one.ranges, same.ranges)
+    assert np.array_equal(one.trails[0].odometry, same.trails[0].odometry)
+    assert not np.array_equal(one.trails[0].truth, other.trails[0].truth)
+
+
+def test_who_turns_on_the_spot_has_an_antenna_off_the_axle_and_knows_it() -> None:
+    recording = worlds.ON_THE_SPOT.recording(0)
+    assert recording.antennas == {0: (0.31, 0.0), 1: (0.31, 0.0)}
+    apart = np.hypot(*(recording.trails[0].truth - recording.trails[1].truth)[0, :2])
+    swing = np.abs(recording.ranges[:, 3] - apart)
+    assert np.percentile(swing, 95) > 0.2
+
+
+def test_corridors_are_long_and_narrow() -> None:
+    trails = worlds.CORRIDOR.recording(1).trails.values()
+    places = np.concatenate([trail.truth[:, :2] for trail in trails])
+    spread = np.ptp(places, axis=0)
+    assert spread[0] > 15
+    assert spread[1] < 2.7

@@ -1,0 +1,132 @@
+"""A robot whose measurements contradict each other: what it says, and what it does about it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pair_scenes import asked_at
+from robot_scenes import RobotScene, notes, sends, solves, status_in
+
+from drslamd.events import JobDone
+from drslamd.gossip import messages
+from drslamd.gossip.message_types import Pose, PoseState
+from drslamd.jobs import WHAT_IF
+from drslamd.slam.doubt import MUCH_WORSE, Reason
+from drslamd.slam.front_end import WhatIfJob
+from drslamd.slam.graph.estimate import Learned
+from drslamd.slam.odometry.mounting import SIDES
+from drslamd.slam.relative_pose.mounting_search import FEWEST_ASKED
+from drslamd.slam.relative_pose.what_if import CASES, Case
+
+
+def localised(level: float = 1.0, contradicted: bool = False) -> RobotScene:
+    """Beside peer 4, with odometry so many times worse of late than configured."""
+    scene = RobotScene()
+    scene.meet(4)
+    scene.drive(1)
+    scene.range_to(4)
+    estimate = replace(
+        scene.localise(),
+        late_level={0: level},
+        bias_m={(0, 4): Learned(0.0, 0.1)},
+        contradicted=frozenset({(0, 4)}) if contradicted else frozenset(),
+    )
+    scene.robot.back.on_solution(estimate)
+    # and it stays so
+    scene.robot.back.begin = lambda *_: None  # type: ignore[method-assign]
+    return scene
+
+
+@pytest.mark.parametrize(
+    ("level", "state"),
+    [(MUCH_WORSE - 0.1, PoseState.LOCALISED), (MUCH_WORSE, PoseState.DOUBTFUL)],
+)
+def test_doubt_is_a_state_of_its_own_in_status_and_pose(level: float, state: PoseState) -> None:
+    scene = localised(level)
+    effects = scene.tick()
+    (status,) = sends(effects, "STATUS")
+    assert status_in(status).state is state
+    where = scene.robot.whereabouts(scene.utime)
+    assert where.state is state
+    poses = [messages.decode("POSE", send.payload) for send in sends(effects, "POSE")]
+    # solutions come with news; that a pose is doubtful is said without any
+    assert len(poses) == (state is PoseState.DOUBTFUL)
+    for pose in poses:
+        assert isinstance(pose, Pose)
+        assert pose.state is state
+
+
+def test_the_reason_is_said_with_what_to_do_and_partners_only_where_the_own_pose_is_good() -> None:
+    scene = localised(5.0)
+    said = [note for _ in range(3) for note in notes(scene.tick(0.3))]
+    (doubt,) = (note for note in said if note.event.startswith("doubt"))
+    assert "slip" in str(doubt.fields)
+    assert not any(note.event.startswith("partners") for note in said)
+
+
+def test_who_is_contradicted_by_all_its_partners_names_them() -> None:
+    scene = localised(contradicted=True)
+    where = scene.robot.whereabouts(scene.utime)
+    assert where.doubt is not None
+    assert (where.doubt.reason, where.doubt.peers) == (Reason.RANGES, (4,))
+
+
+@pytest.mark.parametrize(("level", "count"), [(1.0, 1), (MUCH_WORSE, 3)])
+def test_in_doubt_a_robot_that_seems_to_stand_makes_a_keyframe_a_second(
+    level: float, count: int
+) -> None:
+    scene = localised(level)
+    scene.tick()
+    for _ in range(2):
+        scene.drive(1, metres=0.0)
+        scene.range_to(4)
+        scene.tick()
+    assert len(scene.robot.back.graph.chains[0].keyframes) == count
+
+
+# searches for mistakes
+
+
+def searching(monkeypatch: pytest.MonkeyPatch) -> RobotScene:
+    """A robot that asks a window of a pair whenever it looks; reversed wheels explain it."""
+    scene = RobotScene()
+    pair = scene.own_pair(1)
+    costs = np.array([20.0 if case == Case(b=SIDES[0]) else 1e4 for case in CASES])
+
+    def asked(*_: object) -> list[WhatIfJob]:
+        return [WhatIfJob(pair, asked_at(10), lambda: (costs, 10.0))]
+
+    monkeypatch.setattr(scene.robot.front, "what_if", asked)
+    return scene
+
+
+def test_what_a_search_finds_goes_to_its_pair_and_is_said(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = searching(monkeypatch)
+    pair = scene.robot.front.pairs[1]
+    said: list[str] = []
+    for asked in range(FEWEST_ASKED):
+        (solve,) = solves(scene.tick(1), WHAT_IF)
+        assert pair.search.found is None
+        # one search at a time
+        assert solves(scene.tick(1), WHAT_IF) == []
+        assert scene.robot.handle(JobDone(scene.utime, solve.job_id, solve.run(), 1_000)) == []
+        assert (pair.search.found is None) is (asked + 1 < FEWEST_ASKED)
+    for _ in range(2):
+        said += [str(note.fields) for note in notes(scene.tick(1)) if "mounting" in note.event]
+    assert any("robot 1 run backwards on the left (set wheels.reverse_left)" in s for s in said)
+    # it is no answer of module 1
+    assert pair.closures_seen == 0
+
+
+@pytest.mark.parametrize(("took_us", "goes_on"), [(240_000, True), (260_000, False)])
+def test_a_search_rests_four_times_as_long_as_it_computed(
+    took_us: int, goes_on: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = searching(monkeypatch)
+    (solve,) = solves(scene.tick(1), WHAT_IF)
+    scene.robot.handle(JobDone(scene.utime, solve.job_id, solve.run(), took_us))
+    assert bool(solves(scene.tick(1), WHAT_IF)) is goes_on

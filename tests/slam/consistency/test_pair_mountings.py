@@ -1,0 +1,239 @@
+"""One pair whose robots may not be mounted as configured: what is believed of it, and when."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pair_scenes import BESIDE, OwnedPair, asked_at
+from slam_scenes import Array, config, inverted, product
+
+from drslamd.slam.closure_method import AGREEMENT
+from drslamd.slam.consistency.pair import Agreement
+from drslamd.slam.graph.chain_data import ChainData
+from drslamd.slam.graph.measurements import Keyframe
+from drslamd.slam.odometry.correction import Correction
+from drslamd.slam.odometry.mounting import SIDES, TRACKS
+from drslamd.slam.relative_pose.estimate import RelativePoseEstimate, Verdict
+from drslamd.slam.relative_pose.mounting_search import FEWEST_ASKED, MOST, MOVED_M
+from drslamd.slam.relative_pose.what_if import CASES, MIRROR, Case
+from drslamd.slam.settings import closure_method
+
+TWO = Agreement(least=2, outnumber=2, confirms=False)
+
+
+def chosen(algorithm: str) -> Agreement:
+    """What a configured algorithm asks for."""
+    section = config(extra=f'[relative_pose]\nalgorithm = "{algorithm}"\n').relative_pose
+    return closure_method(section).agreement
+
+
+# believed as configured
+
+
+@pytest.mark.parametrize("algorithm", ["drslamd", "paper"])
+def test_in_ours_windows_must_also_have_excluded_that_wheels_run_backwards(algorithm: str) -> None:
+    pair = OwnedPair(chosen(algorithm))
+    pair.see(BESIDE, 6)
+    assert pair.tracker.connected is (algorithm == "paper")
+    assert pair.tracker.awaits_confirmation is (algorithm == "drslamd")
+    pair.confirm()
+    # what is known of the mountings counts from the next closure on
+    pair.see(BESIDE, 1, first=80)
+    assert pair.tracker.connected
+    assert not pair.tracker.awaits_confirmation
+    assert len(pair.told()) == 7
+
+
+@pytest.mark.parametrize(("agreeing", "awaits"), [(1, False), (2, True)])
+def test_it_is_asked_whether_a_pair_is_mounted_as_configured_once_two_closures_agree(
+    agreeing: int, awaits: bool
+) -> None:
+    pair = OwnedPair(AGREEMENT)
+    assert not pair.tracker.awaits_confirmation
+    pair.see(BESIDE, agreeing)
+    assert pair.tracker.awaits_confirmation is awaits
+
+
+@pytest.mark.parametrize(("disagree", "is_connected"), [(MOST - 1, True), (MOST, False)])
+def test_while_windows_disagree_again_and_again_no_pair_is_connected(
+    disagree: int, is_connected: bool
+) -> None:
+    """One that was is so still: what was believed of its past stays true."""
+    pair, other = OwnedPair(TWO), OwnedPair(TWO)
+    other.see(BESIDE, 3)
+    for tracker in (pair.tracker, other.tracker):
+        for _ in range(disagree):
+            tracker.on_estimate(asked_at(10), RelativePoseEstimate(Verdict.POOR_FIT, ()))
+    pair.see(BESIDE, 2)
+    other.see(BESIDE, 2, first=60)
+    assert pair.tracker.connected is is_connected
+    assert other.tracker.connected
+
+
+def test_of_a_pair_whose_wheels_run_backwards_nothing_more_is_told_and_what_was_is_taken_back() -> (
+    None
+):
+    pair = OwnedPair(TWO)
+    pair.see(BESIDE, 2)
+    assert pair.told() == [(0, True), (1, True)]
+    assert not pair.tracker.is_refused
+    pair.tracker.search.found = Case(b=TRACKS[0])
+    assert not pair.tracker.is_refused
+    assert pair.told() == []
+    pair.tracker.search.found = MIRROR
+    assert pair.tracker.is_refused
+    assert pair.told() == [(0, False), (1, False)]
+
+
+def test_a_closure_says_with_which_scales_and_turns_it_was_found() -> None:
+    known = Correction(0.1, 0.02, 0.4), Correction(-0.06, 0.01, -0.2)
+    pair = OwnedPair(Agreement(1, 0, confirms=False))
+    pair.answer(10, BESIDE)
+    pair.check()
+    pair.answer(20, BESIDE)
+    run = pair.tracker.begin_check(pair.own, pair.peer, pair.own.model.noise, known)
+    assert run is not None
+    pair.tracker.on_check(run())
+    told = {m.number: m.corrected for m in pair.measurements()}
+    assert told == {1: (0.1, 0.4, -0.06, -0.2)}
+
+
+# a mistake is found
+
+
+def best(case: Case) -> Array:
+    """Chi-squared of each case, of which one fits."""
+    return np.array([20.0 if each == case else 1e4 for each in CASES])
+
+
+def search(pair: OwnedPair, case: Case, windows: int = FEWEST_ASKED) -> None:
+    for n in range(windows):
+        pair.tracker.on_costs(asked_at(10 * n), best(case), 10.0)
+
+
+def test_what_was_found_before_a_mistake_was_known_is_worth_nothing() -> None:
+    """Closures that agreed, and those that wait for module 2."""
+    pair = OwnedPair(TWO)
+    pair.see(BESIDE, 3)
+    pair.answer(50, BESIDE)
+    search(pair, Case(b=SIDES[0]), FEWEST_ASKED - 1)
+    assert len(pair.kept()) == 3
+    search(pair, Case(b=SIDES[0]), 1)
+    assert pair.tracker.search.found == Case(b=SIDES[0])
+    assert (pair.kept(), pair.tracker.connected) == ([], False)
+    assert pair.tracker.begin_check(pair.own, pair.peer, pair.own.model.noise) is None
+
+
+def test_a_check_that_ran_meanwhile_is_worth_nothing_too_and_the_next_one_counts() -> None:
+    pair = OwnedPair(TWO)
+    pair.answer(10, BESIDE)
+    run = pair.tracker.begin_check(pair.own, pair.peer, pair.own.model.noise)
+    assert run is not None
+    search(pair, Case(b=TRACKS[0]))
+    pair.tracker.on_check(run())
+    assert pair.kept() == []
+    pair.see(BESIDE, 2, first=20)
+    assert pair.kept() == [1, 2]
+    assert pair.tracker.connected
+
+
+@pytest.mark.parametrize(("way_m", "confirms"), [(MOVED_M - 0.01, True), (MOVED_M + 0.01, False)])
+def test_who_hardly_drove_is_not_asked_about_its_mirror_image(way_m: float, confirms: bool) -> None:
+    pair = OwnedPair(TWO)
+    same = np.array([20.0 if case in (Case(), MIRROR) else 1e4 for case in CASES])
+    pair.tracker.on_costs(asked_at(10), same, way_m)
+    assert pair.tracker.search.is_confirmed is confirms
+
+
+# ways as they should have been
+
+
+class Circling(OwnedPair):
+    """Both drive on circles, with tracks that are wider than their wheels say: a third of each turn
+    is missing in what odometry tells."""
+
+    KNOWN = Correction(turn=0.5), Correction(turn=0.5)
+
+    def __init__(self) -> None:
+        super().__init__(TWO)
+        self.own, self.peer = (ChainData(data.chain) for data in (self.own, self.peer))
+        self.true = []
+        step, told = (0.5, 0.0, 0.3), (0.5, 0.0, 0.2)
+        here, said = np.zeros(3), np.zeros(3)
+        for n in range(10, 200, 10):
+            self.true.append((here, product((4.0, 3.0, 1.0), here)))
+            for data in (self.own, self.peer):
+                x, y, theta = (round(1e4 * float(v)) for v in said)
+                data.add(Keyframe(n, 0, x, y, theta))
+            here, said = product(here, step), product(said, told)
+
+    def see_all(self, known: tuple[Correction, Correction], count: int = 19) -> None:
+        for k, (a, b) in enumerate(self.true[:count]):
+            self.answer(10 * k + 10, tuple(product(inverted(a), b)))
+            self.check_with(known)
+
+    def check_with(self, known: tuple[Correction, Correction]) -> None:
+        run = self.tracker.begin_check(self.own, self.peer, self.own.model.noise, known)
+        assert run is not None
+        self.tracker.on_check(run())
+
+
+def test_closures_agree_along_ways_as_they_should_have_been() -> None:
+    pair = Circling()
+    pair.see_all(Circling.KNOWN)
+    assert len(pair.kept()) == 19
+    for known in ((Correction(), Correction()), (Circling.KNOWN[0], Correction())):
+        other = Circling()
+        other.see_all(known)
+        assert len(other.kept()) < 10
+
+
+@pytest.mark.parametrize("is_peer", [False, True])
+@pytest.mark.parametrize(
+    ("changed", "begins_anew"),
+    [
+        (Correction(turn=0.529), False),
+        (Correction(turn=0.531), True),
+        (Correction(turn=0.469), True),
+        (Correction(scale=0.029, turn=0.5), False),
+        (Correction(scale=-0.031, turn=0.5), True),
+    ],
+)
+def test_a_correction_that_changes_the_way_begins_a_new_set(
+    changed: Correction, begins_anew: bool, is_peer: bool
+) -> None:
+    """Beyond three percent; what is kept until then stays in the graph."""
+    pair = Circling()
+    pair.see_all(Circling.KNOWN, 5)
+    assert pair.tracker.connected
+    assert pair.told() == [(k, True) for k in range(5)]
+    known = (Circling.KNOWN[0], changed) if is_peer else (changed, Circling.KNOWN[1])
+    a, b = pair.true[5]
+    pair.answer(60, tuple(product(inverted(a), b)))
+    pair.check_with(known)
+    assert pair.kept() == ([5] if begins_anew else [0, 1, 2, 3, 4, 5])
+    assert pair.tracker.connected is not begins_anew
+    assert pair.tracker.accepted() >= {0, 1, 2, 3, 4}
+    # nothing that was told is taken back
+    assert all(kept for _, kept in pair.told())
+
+
+def test_where_nothing_is_said_of_odometry_it_is_as_it_was_before() -> None:
+    pair = Circling()
+    pair.see_all(Circling.KNOWN, 5)
+    a, b = pair.true[5]
+    pair.answer(60, tuple(product(inverted(a), b)))
+    pair.check()
+    assert pair.kept() == [0, 1, 2, 3, 4, 5]
+
+
+def test_while_a_check_runs_a_correction_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    pair = Circling()
+    a, b = pair.true[0]
+    pair.answer(10, tuple(product(inverted(a), b)))
+    run = pair.tracker.begin_check(pair.own, pair.peer, pair.own.model.noise)
+    assert run is not None
+    other = pair.tracker.begin_check(pair.own, pair.peer, pair.own.model.noise, Circling.KNOWN)
+    assert other is None
+    pair.tracker.on_check(run())
+    assert pair.kept() == [0]

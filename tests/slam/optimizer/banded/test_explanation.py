@@ -1,0 +1,369 @@
+"""Is the model one of what was measured, and what is taken in its place."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from slam_problems import (
+    held_at,
+    links_of,
+    mismeasured,
+    mismounted,
+    no_ranges,
+    slipping,
+    stuck,
+    team_problem,
+)
+from slam_scenes import Array
+
+from drslamd.slam.optimizer.banded import explanation, mountings, odometry_levels
+from drslamd.slam.optimizer.banded.band_factor import BandFactor
+from drslamd.slam.optimizer.banded.explanation import MUCH, Explanation, explain
+from drslamd.slam.optimizer.banded.misfit import (
+    Misfit,
+    Run,
+    guessed_misfit,
+    misfit,
+    outlier_share,
+    runs,
+)
+from drslamd.slam.optimizer.banded.mountings import Scores
+from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
+from drslamd.slam.optimizer.banded.normal_equations import Equations
+from drslamd.slam.optimizer.banded.odometry_levels import Levels
+from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.problem import Calibration, Problem
+
+ROBOTS, COUNT = 4, 45
+FAULT = (25, 31)
+"""Keyframes between which something happens to robot 1."""
+
+
+def a_team(seed: int) -> tuple[Problem, Array]:
+    problem, truth = team_problem(seed, robots=ROBOTS, count=COUNT, closures=6)
+    return held_at(problem, truth), truth
+
+
+def nominal(problem: Problem) -> Point:
+    start = Calibration.zero(problem.pairs, len(problem.priors.scale))
+    return descend(Equations(problem), start, 60)
+
+
+def explained(problem: Problem, point: Point | None = None) -> Explanation:
+    return explain(Equations(problem), point or nominal(problem), 60, TOLERANCE)
+
+
+def ratio_of(problem: Problem, point: Point, is_guessed: bool = False) -> Array:
+    equations = Equations(problem)
+    factor = BandFactor.of(equations.weighed(point))
+    assert factor is not None
+    of = guessed_misfit if is_guessed else misfit
+    return of(equations, point, factor).ratio(problem.odometry.robot, ROBOTS)
+
+
+def worst(point: Point, truth: Array) -> float:
+    return float(np.hypot(*(point.poses - truth)[:, :2].T).max())
+
+
+# as configured
+
+
+@pytest.mark.parametrize("seed", [1, 2, 7])
+def test_where_all_is_as_configured_nothing_changes(seed: int) -> None:
+    problem, _ = a_team(seed)
+    equations, point = Equations(problem), nominal(problem)
+    found = explain(equations, point, 60, TOLERANCE)
+    assert found.equations is equations
+    assert found.point is point
+    assert found.other is None
+    assert (found.level == 1).all()
+    assert found.feared.min() >= 1
+    assert found.feared.max() < 1.7
+
+
+def test_odometry_that_is_somewhat_worse_is_feared_to_be_as_much_worse_as_it_looks() -> None:
+    """The poses are those of the nominal solution; only what is claimed of them grows."""
+    problem = held_at(*team_problem(3, robots=ROBOTS, count=COUNT, link_error=1.6))
+    point = nominal(problem)
+    found = explained(problem, point)
+    ratio = ratio_of(problem, point, is_guessed=True)
+    assert 1.2 < ratio.max() < 3
+    assert found.point is point
+    assert (found.level == 1).all()
+    assert found.feared == pytest.approx(np.maximum(ratio, 1)[problem.odometry.robot])
+    assert np.array_equal(found.lately, found.feared)
+
+
+def test_a_scale_that_is_far_off_is_learned_and_no_fault() -> None:
+    problem, truth = a_team(1)
+    links = links_of(problem, 2, 0, COUNT)
+    problem = mismeasured(problem, links, problem.odometry.measured[links] * [1.4, 1.4, 1])
+    found = explained(problem)
+    assert (found.level == 1).all()
+    # what is measured is 1.4 times the way
+    assert found.point.calibration.scale[2] == pytest.approx(1 - 1 / 1.4, abs=0.02)
+    assert worst(found.point, truth) < 0.5
+
+
+@pytest.mark.parametrize(("times", "is_computed"), [(1.001, False), (0.999, True)])
+def test_a_guess_that_is_suspicious_is_computed(
+    times: float, is_computed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem, _ = a_team(3)
+    point = nominal(problem)
+    guess = ratio_of(problem, point, is_guessed=True).max()
+    computed = []
+
+    def watched(*args: object) -> Misfit:
+        computed.append(args)
+        return misfit(*args)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(explanation, "SUSPICIOUS", times * guess)
+    monkeypatch.setattr(explanation, "misfit", watched)
+    found = explained(problem, point)
+    assert bool(computed) is is_computed
+    exact = ratio_of(problem, point, is_guessed=not is_computed)
+    assert found.feared == pytest.approx(np.maximum(exact, 1)[problem.odometry.robot])
+
+
+def test_of_poses_that_nothing_holds_nothing_is_asked() -> None:
+    problem, _ = team_problem(3, robots=2, count=6, closures=0)
+    problem = replace(problem, ranges=no_ranges(), pairs=0)
+    point = nominal(problem)
+    found = explained(problem, point)
+    assert found.point is point
+    assert found.other is None
+    assert (found.feared == 1).all()
+
+
+# odometry that was worse for a while
+
+
+@pytest.mark.parametrize(("times", "is_raised"), [(1.001, False), (0.999, True)])
+def test_a_robot_that_stands_out_is_believed_less(
+    times: float, is_raised: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = stuck(a_team(3)[0], 1, *FAULT)
+    point = nominal(problem)
+    assert not runs(problem, point)
+    ratio = ratio_of(problem, point)
+    for module in (explanation, odometry_levels):
+        monkeypatch.setattr(module, "STANDS_OUT", times * ratio.max())
+    found = explained(problem, point)
+    assert (found.point is not point) is is_raised
+    assert bool(found.level.max() > 1) is is_raised
+    if not is_raised:
+        assert found.feared == pytest.approx(np.maximum(ratio, 1)[problem.odometry.robot])
+
+
+def beside(seed: int, first: int, metres: float = 1.0) -> Problem:
+    """From some second on the ranges of robots 0 and 1 are too long."""
+    problem, _ = a_team(seed)
+    ranges = problem.ranges
+    wrong = (ranges.pair == 0) & (ranges.i // ROBOTS >= first)
+    return replace(problem, ranges=replace(ranges, measured=ranges.measured + metres * wrong))
+
+
+@pytest.mark.parametrize(("count", "is_found"), [(3, False), (4, True)])
+def test_a_burst_is_not_looked_into_and_a_run_is(count: int, is_found: bool) -> None:
+    """What is found is that nobody can say who is wrong: the poses stay, and there are others."""
+    problem = beside(1, COUNT - count)
+    equations, point = Equations(problem), nominal(problem)
+    found = explain(equations, point, 60, TOLERANCE)
+    assert (found.other is not None) is is_found
+    assert found.point is point
+    assert found.equations is equations
+
+
+def test_who_slipped_is_believed_less_by_sigmas_as_it_was_seen_and_by_variances_as_is_feared() -> (
+    None
+):
+    problem, truth = a_team(2)
+    problem = slipping(problem, 1, *FAULT)
+    point = nominal(problem)
+    found = explained(problem, point)
+    levels = odometry_levels.levelled(
+        Equations(problem), point, ratio_of(problem, point), [], 60, TOLERANCE
+    )
+    assert found.other is None
+    assert np.allclose(found.level, np.sqrt(levels.seen))
+    assert np.array_equal(found.feared, levels.feared)
+    assert worst(point, truth) > 1.5
+    assert worst(found.point, truth) < 0.7
+
+
+# mountings
+
+
+def long_team() -> tuple[Problem, Array]:
+    problem, truth = team_problem(7, robots=3, count=120)
+    return held_at(problem, truth), truth
+
+
+def test_a_track_that_is_far_off_explains_it_for_good() -> None:
+    """All along its way odometry is as good as configured, with turns that are a third longer."""
+    problem, truth = long_team()
+    problem = mismounted(problem, truth, (0.0, 0.35, 0.0))
+    point = nominal(problem)
+    found = explained(problem, point)
+    assert found.equations.problem.doubted.track.tolist() == [False, True, False]
+    assert not found.equations.problem.doubted.antenna.any()
+    assert found.other is None
+    assert (found.level == 1).all()
+    assert found.feared.max() < 2
+    assert found.point.calibration.turn[1] == pytest.approx(0.35, abs=0.05)
+    assert worst(found.point, truth) < 0.5 * worst(point, truth)
+
+
+def test_an_antenna_that_is_far_off_explains_it_for_good() -> None:
+    problem, truth = long_team()
+    problem = mismounted(problem, truth, antenna=((0.0, 0.0), (0.0, 0.0), (-0.3, 0.2)))
+    found = explained(problem)
+    assert found.equations.problem.doubted.antenna.tolist() == [False, False, True]
+    assert found.other is None
+    assert (found.level == 1).all()
+    assert found.point.calibration.antenna[2] == pytest.approx([-0.3, 0.2], abs=0.05)
+
+
+def test_what_was_let_go_before_is_no_longer_asked_for() -> None:
+    problem, truth = long_team()
+    problem = mismounted(problem, truth, (0.0, 0.35, 0.0))
+    first = explained(problem)
+    again = replace(first.equations.problem, initial=first.point.poses)
+    equations = Equations(again)
+    point = descend(equations, first.point.calibration, 60)
+    assert explain(equations, point, 60, TOLERANCE).equations is equations
+
+
+RUN = Run(0, 1, 0, 0, 10)
+
+
+class Asked:
+    """What is asked of solutions, and what is answered: a model of a model that fails."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, gain: float) -> None:
+        self.problem, _ = team_problem(1, robots=2, count=12)
+        self.equations = Equations(self.problem)
+        self.nominal = nominal(self.problem)
+        self.mounted = Equations(replace(self.problem))
+        self.better = replace(self.nominal, poses=self.nominal.poses + 0.0)
+        self.levelled: list[Equations] = []
+        self.explaining: list[Equations] = []
+        self.is_passed_later = False
+        monkeypatch.setattr(explanation, "_checked", self.check)
+        monkeypatch.setattr(explanation, "_gain", lambda *_: gain)
+        monkeypatch.setattr(mountings, "fitted", self.fitted)
+        monkeypatch.setattr(odometry_levels, "levelled", self.level)
+
+    def check(self, equations: Equations, point: Point) -> explanation._Check:
+        none = np.zeros(2)
+        is_first = equations is self.equations
+        ratio = np.array([1.0, 9.0 if is_first else 1.0 if self.is_passed_later else 8.0])
+        asked = Scores(np.array([99.0, 0.0]) if is_first else none, none)
+        return explanation._Check(ratio, [RUN] if is_first else [], asked)
+
+    def fitted(self, *_: object) -> tuple[Equations, Point]:
+        return self.mounted, self.better
+
+    def level(
+        self, equations: Equations, point: Point, ratio: Array, found: list[Run], *limits: float
+    ) -> Levels:
+        # what stands out is what did so in the solution that is gone on from
+        assert ratio[1] == (9 if equations is self.equations else 8)
+        assert len(found) == (1 if equations is self.equations else 0)
+        assert limits == (60, TOLERANCE)
+        self.levelled.append(equations)
+        many = np.ones(len(self.problem.odometry))
+        return Levels(point, 4 * many, 9 * many, 6 * many, equations in self.explaining)
+
+    def explained(self) -> Explanation:
+        return explain(self.equations, self.nominal, 60, TOLERANCE)
+
+
+def test_mountings_with_which_all_fits_are_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Asked(monkeypatch, gain=0.0)
+    scene.is_passed_later = True
+    found = scene.explained()
+    assert (found.equations, found.point) == (scene.mounted, scene.better)
+    assert scene.levelled == []
+
+
+@pytest.mark.parametrize("share", [0.05, 0.07])
+def test_mountings_that_leave_many_outliers_are_not_enough(
+    share: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = Asked(monkeypatch, gain=0.0)
+    scene.is_passed_later = True
+    monkeypatch.setattr(explanation, "outlier_share", lambda *_: np.array([0.0, share]))
+    assert (scene.explained().equations is scene.mounted) is (share < 0.06)
+
+
+def test_mountings_whose_solution_was_not_reached_are_not_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = Asked(monkeypatch, gain=2 * MUCH)
+    scene.is_passed_later = True
+    scene.better = replace(scene.better, converged=False)
+    assert scene.explained().equations is scene.equations
+    assert scene.levelled == [scene.equations]
+
+
+@pytest.mark.parametrize(("gain", "is_kept"), [(0.99 * MUCH, False), (1.01 * MUCH, True)])
+def test_mountings_that_take_a_lot_off_the_cost_are_kept_under_odometry_that_was_worse(
+    gain: float, is_kept: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = Asked(monkeypatch, gain)
+    scene.explaining = [scene.mounted, scene.equations]
+    found = scene.explained()
+    assert found.equations is (scene.mounted if is_kept else scene.equations)
+    assert found.point is (scene.better if is_kept else scene.nominal)
+    assert found.other is None
+    assert (found.level == 2).all()
+    assert (found.feared == 9).all()
+    assert (found.lately == 6).all()
+    assert len(scene.levelled) == 1
+
+
+def test_where_odometry_explains_nothing_beside_mountings_it_is_asked_without_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = Asked(monkeypatch, 2 * MUCH)
+    scene.explaining = [scene.equations]
+    found = scene.explained()
+    assert scene.levelled == [scene.mounted, scene.equations]
+    assert found.equations is scene.equations
+    assert found.other is None
+
+
+def test_where_nothing_explains_it_the_nominal_solution_stays_beside_another(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = Asked(monkeypatch, 2 * MUCH)
+    found = scene.explained()
+    assert (found.equations, found.point) == (scene.equations, scene.nominal)
+    assert found.other is not None
+    assert (found.feared == 9).all()
+    assert (found.lately == 6).all()
+
+
+def test_a_gain_is_what_the_cost_fell_by_where_ranges_lose_weight_as_before() -> None:
+    problem, truth = long_team()
+    problem = mismounted(problem, truth, (0.0, 0.35, 0.0))
+    equations, point = Equations(problem), nominal(problem)
+    better = explained(problem, point)
+    found = explanation._gain(equations, point, better.equations, better.point)
+    held = replace(better.point, threshold=point.threshold)
+    costs = [e.cost(p, point.threshold) for e, p in ((equations, point), (better.equations, held))]
+    assert found == pytest.approx(costs[0] - costs[1])
+    assert found > MUCH
+    assert not math.isclose(
+        found, costs[0] - better.equations.cost(better.point, better.point.threshold), rel_tol=1e-3
+    )
+
+
+def test_outliers_count_by_the_pair_that_has_most_of_them() -> None:
+    problem = beside(1, COUNT - 3)
+    assert outlier_share(problem, nominal(problem)).argmax() == 0

@@ -1,0 +1,221 @@
+"""What does not fit at a solution, against dense formulas; outliers, and runs of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from dense_problems import link_misfit, packed
+from slam_problems import CLOCKS, no_ranges, pose_edges, team_problem
+from slam_scenes import Array
+
+from drslamd.slam.optimizer.banded import misfit as misfit_module
+from drslamd.slam.optimizer.banded.band_factor import BandFactor
+from drslamd.slam.optimizer.banded.misfit import (
+    OF_RUN,
+    RUN,
+    Misfit,
+    Run,
+    guessed_misfit,
+    misfit,
+    outlier_share,
+    outliers,
+    runs,
+)
+from drslamd.slam.optimizer.banded.newton_descent import descend
+from drslamd.slam.optimizer.banded.normal_equations import Equations
+from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem
+
+
+def solved(problem: Problem) -> tuple[Equations, Point]:
+    equations = Equations(problem)
+    start = Calibration.zero(problem.pairs, len(problem.priors.scale))
+    return equations, descend(equations, start, 60)
+
+
+def weighed(equations: Equations, point: Point) -> BandFactor:
+    factor = BandFactor.of(equations.weighed(point))
+    assert factor is not None
+    return factor
+
+
+def far_edges() -> Problem:
+    problem, _ = team_problem(6, robots=2, count=14, closures=0)
+    rng = np.random.default_rng(7)
+    far = [(3, k) for k in range(20, 28, 2)]
+    return replace(problem, closures=pose_edges(rng, problem.initial, far, (0.05, 0.05, 0.03)))
+
+
+# squares, and what could be checked
+
+
+def mounted() -> Problem:
+    """A track and an antenna are unknowns."""
+    problem, _ = team_problem(1, robots=3, count=7, is_thinned=True)
+    return replace(problem, doubted=Doubted(np.arange(3) == 1, np.arange(3) == 2))
+
+
+@pytest.mark.parametrize("kind", ["band", "border", "mountings"])
+def test_misfit_is_that_of_the_dense_matrices(kind: str) -> None:
+    problem = team_problem(1, robots=3, count=7, is_thinned=True)[0]
+    problem = {"band": problem, "border": far_edges(), "mountings": mounted()}[kind]
+    equations, point = solved(problem)
+    found = misfit(equations, point, weighed(equations, point))
+    x = packed(point.poses, point.calibration, problem.doubted)
+    squares, checked = link_misfit(problem, x, point.threshold)
+    assert found.squares == pytest.approx(squares, rel=1e-4, abs=1e-6)
+    assert found.checked == pytest.approx(checked, abs=1e-4)
+    assert checked.sum() > 1
+
+
+def test_a_guess_of_what_a_robot_could_check_is_near_and_always_the_same() -> None:
+    problem, _ = team_problem(2, robots=3, count=60)
+    equations, point = solved(problem)
+    robot = problem.odometry.robot
+    factor = weighed(equations, point)
+    exact, guess = (of(equations, point, factor) for of in (misfit, guessed_misfit))
+    assert np.array_equal(guess.squares, exact.squares)
+    for number in range(3):
+        sums = [float(m.checked[robot == number].sum()) for m in (exact, guess)]
+        assert sums[1] == pytest.approx(sums[0], abs=0.15 * sums[0] + 1)
+    assert guess.ratio(robot, 3) == pytest.approx(exact.ratio(robot, 3), rel=0.2)
+    assert np.array_equal(guessed_misfit(equations, point, factor).checked, guess.checked)
+
+
+@pytest.mark.parametrize("doubted", [Doubted.none(3), Doubted(np.arange(3) == 1, np.arange(3) < 2)])
+def test_with_many_signs_a_guess_is_what_is_computed(
+    doubted: Doubted, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The gauge is none of the first unknowns, which everybody can name by mistake."""
+    problem, _ = team_problem(2, robots=3, count=20)
+    equations, point = solved(replace(problem, gauge=25, doubted=doubted))
+    factor, robot = weighed(equations, point), problem.odometry.robot
+    monkeypatch.setattr(misfit_module, "PROBES", 4000)
+    sums = [
+        np.bincount(robot, of(equations, point, factor).checked) for of in (misfit, guessed_misfit)
+    ]
+    assert sums[1] == pytest.approx(sums[0], rel=0.05)
+
+
+@pytest.mark.parametrize("is_guessed", [False, True])
+def test_where_nothing_holds_the_poses_nothing_was_checked(is_guessed: bool) -> None:
+    equations, point = solved(team_problem(3, robots=2, count=6)[0])
+    factor = weighed(equations, point)
+    singular = replace(factor, schur=np.zeros_like(factor.schur))
+    found = (guessed_misfit if is_guessed else misfit)(equations, point, singular)
+    assert found.checked.tolist() == [0.0] * 10
+    assert np.array_equal(found.squares, misfit(equations, point, factor).squares)
+
+
+def test_of_what_cannot_be_solved_no_robot_stands_out() -> None:
+    assert Misfit.unknown(3).ratio(np.array([0, 1, 1]), 2).tolist() == [1.0, 1.0]
+
+
+def test_ratios_are_held_at_one_by_one_degree_of_freedom() -> None:
+    """A negative sum of degrees, which a guess may be, counts as none."""
+    found = Misfit(np.array([4.0, 5.0, 2.0, 0.5]), np.array([1.0, 1.0, -3.0, 0.25]))
+    ratio = found.ratio(np.array([0, 0, 2, 3]), 4)
+    assert ratio == pytest.approx([10 / 3, 1.0, 3.0, 1.2])
+
+
+# outliers
+
+
+def errs(sigmas: Array, pair: Array | None = None) -> tuple[Problem, Point]:
+    """Ranges between robots that stand, so many sigmas too long, one a second."""
+    problem, _ = team_problem(4, robots=3, count=len(sigmas))
+    pair = np.zeros(len(sigmas), dtype=int) if pair is None else pair
+    rows = 3 * np.arange(len(sigmas)) + pair
+    ranges = problem.ranges.chosen(np.isin(np.arange(len(problem.ranges)), rows))
+    problem = replace(problem, ranges=ranges)
+    nothing = Calibration.zero(3, 3)
+    apart = Point.of(problem, problem.initial, nothing).sight.error
+    right = ranges.measured + apart + sigmas * ranges.sigma
+    problem = replace(problem, ranges=replace(ranges, measured=right))
+    return problem, Point.of(problem, problem.initial, nothing)
+
+
+@pytest.mark.parametrize("times", [0.99, 1.01, -0.99, -1.01])
+def test_a_range_is_an_outlier_beyond_two_and_a_half_sigmas(times: float) -> None:
+    problem, point = errs(np.array([0.0, times * 2.5, 0.0]))
+    assert outliers(problem, point).tolist() == [False, abs(times) > 1, False]
+
+
+def test_shares_of_outliers_are_those_of_each_pair() -> None:
+    pair = np.array([0, 0, 1, 1, 0, 0])
+    problem, point = errs(np.array([9.0, 0, 9, 9, 0, 0]), pair)
+    assert outlier_share(problem, point).tolist() == [0.25, 1.0, 0.0]
+
+
+# runs
+
+
+def run_of(wrong: str) -> list[Run]:
+    """Of the ranges of robots 0 and 1, `x` for an outlier."""
+    return runs(*errs(np.array([9.0 if c == "x" else 0.0 for c in wrong])))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "count"),
+    [
+        ("......xxx", 0),
+        (".....xxxx", 4),
+        ("xxxx.....", 0),
+        (".xxxxxxx.", 0),
+        ("xxxxx.xxx", 0),
+        # four of five and eight of ten are enough; four of the six before them are not
+        ("....x.xxxx", 6),
+        ("....x..xxxx", 4),
+        ("..x.xxx.xxxx", 10),
+        ("..x..xx.xxxx", 7),
+        ("xx", 0),
+    ],
+)
+def test_a_run_lasts_until_now_and_goes_back_as_far_as_most_are_outliers(
+    wrong: str, count: int
+) -> None:
+    found = run_of(wrong)
+    if not count:
+        assert not found
+        return
+    (run,) = found
+    first = len(wrong) - count
+    assert run == Run(0, 1, CLOCKS[0] + 10 * first, CLOCKS[1] + 10 * first, count)
+    assert count >= RUN
+    assert wrong[first:].count("x") / count >= OF_RUN
+
+
+def test_each_pair_has_its_run_and_names_its_robots_as_the_problem_numbers_them() -> None:
+    """Robots 4, 7 and 9; each says when by its own clock, whichever end of a range it is."""
+    pair = np.array([1, 2] * 6)
+    problem, point = errs(np.full(12, 9.0), pair)
+    names = np.array([4, 7, 9])
+    r = problem.ranges
+    turned = replace(r, i=r.j, j=r.i, q_i=r.q_j, q_j=r.q_i)
+    problem = replace(problem, robot=names[problem.robot], ranges=turned)
+    found = runs(problem, point)
+    assert found == [
+        Run(0, 2, CLOCKS[0], CLOCKS[2], 6),
+        Run(1, 2, CLOCKS[1] + 10, CLOCKS[2] + 10, 6),
+    ]
+
+
+def test_ranges_are_looked_at_in_the_order_of_time() -> None:
+    problem, point = errs(np.array([0.0, 0, 0, 0, 9, 9, 9, 9]))
+    order = np.random.default_rng(5).permutation(8)
+    r = problem.ranges
+    names = [name for name in r.__dataclass_fields__ if name != "carried"]
+    columns = {name: getattr(r, name)[order] for name in names}
+    other = replace(problem, ranges=replace(r, **columns))
+    assert runs(other, Point.of(other, point.poses, point.calibration)) == runs(problem, point)
+    assert len(runs(problem, point)) == 1
+
+
+def test_without_ranges_there_is_no_run() -> None:
+    problem, point = errs(np.zeros(3))
+    problem = replace(problem, ranges=no_ranges())
+    point = Point.of(problem, point.poses, point.calibration)
+    assert runs(problem, point) == []
+    assert outlier_share(problem, point).tolist() == [0, 0, 0]

@@ -1,0 +1,408 @@
+"""When a pair is believed to be mounted as configured, and when a mistake is named.
+
+Chi-squared of every case is made up; thresholds are those of the module.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from slam_scenes import Array
+
+from drslamd.slam.odometry.mounting import MIRRORED, SCALES, SIDES, TRACKS
+from drslamd.slam.relative_pose.estimate import Verdict
+from drslamd.slam.relative_pose.mounting_search import (
+    APART_US,
+    BETTER,
+    CLEAR,
+    EXCLUDED,
+    FEWEST_ASKED,
+    FITS,
+    INDIFFERENT,
+    MANY,
+    MOST,
+    MOST_ASKED,
+    RECENT,
+    SHARED,
+    UNLIKE,
+    WRONG,
+    MountingSearch,
+    is_as_configured,
+    is_learned,
+    winner,
+)
+from drslamd.slam.relative_pose.range_fit import POOR_FIT
+from drslamd.slam.relative_pose.what_if import CASES, MIRROR, Case, variants
+
+FAR = 1e4
+"""Chi-squared of what does not fit at all."""
+FREEDOM = 100
+"""Of all windows together."""
+FIT = 0.9 * FITS * FREEDOM
+"""Chi-squared of what fits them, noise being allowed for generously."""
+GOOD = 0.9 * FITS * 30
+"""Likewise, of one window of 33 measurements."""
+AS_IT_IS = Case()
+LEFT, RIGHT = Case(b=SIDES[0]), Case(b=SIDES[1])
+TRACK, SCALE = Case(b=TRACKS[0]), Case(b=SCALES[0])
+LITTLE = 0.01
+
+
+def costs(known: dict[Case, float], rest: float = FAR) -> Array:
+    """(cases,) in the order of `CASES`."""
+    return np.array([known.get(case, rest) for case in CASES])
+
+
+# who wins
+
+
+@pytest.mark.parametrize("level", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize(
+    ("worse", "next_worse", "wins"),
+    [
+        (WRONG + LITTLE, CLEAR + LITTLE, True),
+        (WRONG - LITTLE, CLEAR + LITTLE, False),
+        (WRONG + LITTLE, CLEAR - LITTLE, False),
+    ],
+)
+def test_wheels_that_run_backwards_win_by_far_and_only_they(
+    level: float, worse: float, next_worse: float, wins: bool
+) -> None:
+    """By multiples of what a degree of freedom scatters, where that is more than it should."""
+    unit, fit = max(level, 1.0), level * FREEDOM
+    found = winner(
+        costs({LEFT: fit, AS_IT_IS: fit + worse * unit, RIGHT: fit + next_worse * unit}), FREEDOM
+    )
+    assert found == ((LEFT, True) if wins else (None, False))
+
+
+@pytest.mark.parametrize("rival", [MIRROR, RIGHT, TRACK, Case(a=SIDES[0])])
+def test_any_other_kind_makes_it_unclear(rival: Case) -> None:
+    known = {LEFT: FIT, AS_IT_IS: FIT + WRONG + LITTLE}
+    assert winner(costs({**known, rival: FIT + CLEAR - LITTLE}), FREEDOM) == (None, False)
+    assert winner(costs({**known, rival: FIT + CLEAR + LITTLE}), FREEDOM) == (LEFT, True)
+
+
+@pytest.mark.parametrize(("level", "wins"), [(POOR_FIT - 0.01, True), (POOR_FIT + 0.01, False)])
+def test_what_does_not_fit_itself_is_no_explanation(level: float, wins: bool) -> None:
+    found, _ = winner(costs({LEFT: level * FREEDOM}), FREEDOM)
+    assert (found == LEFT) is wins
+
+
+@pytest.mark.parametrize(
+    ("worse", "unlike", "is_begun"),
+    [
+        (BETTER + LITTLE, UNLIKE + LITTLE, True),
+        (BETTER - LITTLE, UNLIKE + LITTLE, False),
+        (BETTER + LITTLE, UNLIKE - LITTLE, False),
+    ],
+)
+@pytest.mark.parametrize("best", [TRACK, SCALE, Case(SCALES[1], SCALES[1])])
+def test_a_track_or_a_scale_is_begun_with_where_nothing_unlike_it_fits(
+    best: Case, worse: float, unlike: float, is_begun: bool
+) -> None:
+    found, _ = winner(
+        costs({best: FIT, AS_IT_IS: FIT + worse, Case(a=SIDES[1]): FIT + unlike}), FREEDOM
+    )
+    assert found == (best if is_begun else None)
+
+
+@pytest.mark.parametrize(
+    ("rival", "is_unlike"),
+    [
+        (Case(b=SCALES[3]), False),
+        (Case(b=TRACKS[1]), False),
+        (Case(a=SCALES[3]), True),
+        (Case(SCALES[3], SCALES[3]), True),
+        (LEFT, True),
+        (MIRROR, True),
+    ],
+)
+def test_tracks_and_scales_of_the_same_robots_are_alike(rival: Case, is_unlike: bool) -> None:
+    known = {TRACK: FIT, AS_IT_IS: FIT + BETTER + LITTLE, rival: FIT + LITTLE}
+    found, is_clear = winner(costs(known), FREEDOM)
+    assert found == (None if is_unlike else TRACK)
+    # another track is the same mistake, a scale is another one
+    assert is_clear is (rival.kind == TRACK.kind)
+
+
+@pytest.mark.parametrize(("level", "is_begun"), [(FITS - 0.01, True), (FITS + 0.01, False)])
+def test_a_track_or_a_scale_must_fit_well_itself(level: float, is_begun: bool) -> None:
+    found, _ = winner(costs({SCALE: level * FREEDOM}), FREEDOM)
+    assert found == (SCALE if is_begun else None)
+
+
+def test_what_is_configured_wins_nothing() -> None:
+    assert winner(costs({AS_IT_IS: 10.0}), FREEDOM) == (None, False)
+
+
+def test_what_is_learned_are_tracks_and_scales_and_no_mistake_at_all() -> None:
+    learned = [case for case in CASES if is_learned(case)]
+    backwards = {MIRROR, *(Case(a=side) for side in SIDES), *(Case(b=side) for side in SIDES)}
+    assert set(CASES) - set(learned) == backwards
+    assert AS_IT_IS in learned
+    assert not is_learned(Case(a=TRACKS[0], b=MIRRORED))
+
+
+# what confirms the configuration
+
+
+@pytest.mark.parametrize(
+    ("case", "by", "is_told", "confirms"),
+    [
+        (LEFT, EXCLUDED + LITTLE, True, True),
+        (LEFT, EXCLUDED - LITTLE, True, False),
+        (LEFT, EXCLUDED - LITTLE, False, False),
+        (Case(a=SIDES[1]), EXCLUDED - LITTLE, True, False),
+        (MIRROR, EXCLUDED + LITTLE, True, True),
+        (MIRROR, EXCLUDED - LITTLE, True, False),
+        (MIRROR, EXCLUDED - LITTLE, False, True),
+        (TRACK, LITTLE, True, True),
+        (TRACK, -LITTLE, True, False),
+        (MIRROR, -LITTLE, False, False),
+    ],
+)
+def test_windows_must_exclude_wheels_that_run_backwards_and_find_no_other_mistake_better(
+    case: Case, by: float, is_told: bool, confirms: bool
+) -> None:
+    """A robot that hardly drove is the same in a mirror, and is not asked about that."""
+    assert is_as_configured(costs({AS_IT_IS: FIT, case: FIT + by}), is_told) is confirms
+
+
+def test_a_pair_is_confirmed_once_and_for_all() -> None:
+    for best in (LEFT, TRACK):
+        search = MountingSearch()
+        assert not search.is_confirmed
+        assert not ask(search, {AS_IT_IS: GOOD}, rest=GOOD + EXCLUDED)
+        assert search.is_confirmed
+        for _ in range(MOST_ASKED):
+            assert not ask(search, {best: GOOD})
+        assert search.is_confirmed
+        assert search.found is None
+
+
+def ask(
+    search: MountingSearch, known: dict[Case, float], rest: float = FAR, is_told: bool = True
+) -> bool:
+    """One window of 33 measurements."""
+    return search.on_costs(costs(known, rest), 33, is_told)
+
+
+def test_the_newest_windows_together_exclude_what_one_alone_does_not() -> None:
+    """Each says a little more than a third of what is asked for."""
+    search, each = MountingSearch(), EXCLUDED / FEWEST_ASKED + LITTLE
+    for asked in range(1, FEWEST_ASKED + 1):
+        ask(search, {AS_IT_IS: GOOD, LEFT: GOOD + each})
+        assert search.is_confirmed is (asked == FEWEST_ASKED)
+    later = MountingSearch()
+    # what came before them does not count
+    for _ in range(FEWEST_ASKED):
+        ask(later, {AS_IT_IS: GOOD, LEFT: GOOD})
+    for asked in range(1, FEWEST_ASKED + 1):
+        ask(later, {AS_IT_IS: GOOD, LEFT: GOOD + each})
+        assert later.is_confirmed is (asked == FEWEST_ASKED)
+    vague = MountingSearch()
+    for _ in range(MOST_ASKED - 1):
+        ask(vague, {AS_IT_IS: GOOD, LEFT: GOOD + each - 2 * LITTLE})
+    assert not vague.is_confirmed
+
+
+@pytest.mark.parametrize(("by", "confirms"), [(INDIFFERENT + 1, True), (INDIFFERENT - 1, False)])
+def test_who_is_the_same_in_a_mirror_for_long_is_believed_as_configured(
+    by: float, confirms: bool
+) -> None:
+    """So much better in all windows together, which are worth less than their number."""
+    worth = FEWEST_ASKED + (MOST_ASKED - FEWEST_ASKED) / SHARED
+    search = MountingSearch()
+    for asked in range(1, MOST_ASKED + 1):
+        ask(search, {AS_IT_IS: GOOD, MIRROR: GOOD + by / worth})
+        assert search.is_confirmed is (confirms and asked == MOST_ASKED)
+    assert search.found is None
+
+
+# what is found
+
+
+def test_a_mistake_is_found_after_windows_enough_and_what_was_before_is_forgotten() -> None:
+    search = MountingSearch()
+    for _ in range(RECENT):
+        search.on_verdict(Verdict.POOR_FIT)
+    for asked in range(1, FEWEST_ASKED + 1):
+        assert ask(search, {LEFT: GOOD}) is (asked == FEWEST_ASKED)
+        assert search.found == (LEFT if asked == FEWEST_ASKED else None)
+    assert search.is_clear
+    # of wheels that run backwards nothing is believed
+    assert not search.is_confirmed
+    assert search.poor == 0
+    assert not search.disagrees
+
+
+def test_with_a_track_or_a_scale_the_pair_is_believed() -> None:
+    search = MountingSearch()
+    for _ in range(FEWEST_ASKED):
+        ask(search, {TRACK: GOOD, SCALE: GOOD + LITTLE})
+    assert search.found == TRACK
+    assert search.is_confirmed
+    assert not search.is_clear
+
+
+def test_all_windows_decide_and_those_beyond_the_third_count_for_less() -> None:
+    """By so much each that six of them name it, and five do not."""
+    worth = FEWEST_ASKED + 3 / SHARED
+    each = WRONG / worth + LITTLE
+    assert each * (FEWEST_ASKED + 2 / SHARED) < WRONG
+    search = MountingSearch()
+    for asked in range(1, 7):
+        ask(search, {LEFT: GOOD, AS_IT_IS: GOOD + each})
+        assert (search.found == LEFT) is (asked == 6)
+
+
+def test_degrees_of_freedom_are_those_of_measurements_less_the_three_of_a_pose() -> None:
+    level = POOR_FIT * 30
+    for chi2, is_found in ((level - 1.0, True), (level + 1.0, False)):
+        search = MountingSearch()
+        for _ in range(FEWEST_ASKED):
+            ask(search, {LEFT: chi2})
+        assert (search.found == LEFT) is is_found
+
+
+# a mistake that was found is refined
+
+
+def of_variants(found: Case, best: Case, chi2: float = GOOD) -> Array:
+    return np.array([chi2 if case == best else chi2 + 30 for case in variants(found)])
+
+
+def begun() -> MountingSearch:
+    search = MountingSearch()
+    for _ in range(FEWEST_ASKED):
+        ask(search, {TRACK: GOOD})
+    assert search.cases == variants(TRACK)
+    return search
+
+
+def test_a_mistake_is_refined_by_as_many_windows_as_found_it() -> None:
+    search, better = begun(), variants(TRACK)[3]
+    for asked in range(1, FEWEST_ASKED + 1):
+        changed = search.on_costs(of_variants(TRACK, better), 33, True)
+        assert changed is (asked == FEWEST_ASKED)
+        assert search.found == (better if changed else TRACK)
+    # and again from there
+    assert search.cases == variants(better)
+    for _ in range(FEWEST_ASKED):
+        changed = search.on_costs(of_variants(better, better), 33, True)
+    assert not changed
+    assert search.found == better
+    assert search.is_confirmed
+
+
+@pytest.mark.parametrize(("level", "stays"), [(FITS - 0.01, True), (FITS + 0.01, False)])
+def test_a_mistake_with_which_windows_do_not_fit_after_all_was_none(
+    level: float, stays: bool
+) -> None:
+    search = begun()
+    for asked in range(1, FEWEST_ASKED + 1):
+        changed = search.on_costs(of_variants(TRACK, TRACK, 30 * level), 33, True)
+        assert changed is (asked == FEWEST_ASKED and not stays)
+    assert search.found == (TRACK if stays else None)
+    assert search.is_confirmed is stays
+    assert search.is_clear is stays
+    assert search.cases == (variants(TRACK) if stays else CASES)
+
+
+# when it is asked
+
+
+def test_a_new_pair_is_asked_every_case_there_is() -> None:
+    assert MountingSearch().cases == CASES
+
+
+@pytest.mark.parametrize(
+    ("poor", "awaits", "is_due"),
+    [
+        (0, False, False),
+        (0, True, True),
+        (MANY - 1, False, False),
+        (MANY, False, True),
+    ],
+)
+def test_it_is_asked_where_windows_disagree_or_a_pair_waits_to_be_believed(
+    poor: int, awaits: bool, is_due: bool
+) -> None:
+    search = MountingSearch()
+    for _ in range(poor):
+        search.on_verdict(Verdict.POOR_FIT)
+    assert search.is_due(0, awaits) is is_due
+    search.is_confirmed = True
+    assert not search.is_due(0, awaits)
+
+
+@pytest.mark.parametrize(("apart_us", "is_due"), [(APART_US - 1, False), (APART_US, True)])
+def test_windows_that_are_asked_are_some_seconds_apart(apart_us: int, is_due: bool) -> None:
+    search = MountingSearch()
+    search.begin(1_000)
+    assert search.is_due(1_000 + apart_us, True) is is_due
+
+
+@pytest.mark.parametrize(
+    ("found", "poor", "is_due"),
+    [(TRACK, MOST, True), (TRACK, MOST - 1, False), (LEFT, MOST, False)],
+)
+def test_what_was_found_is_asked_about_again_only_where_it_can_be_refined_and_does_not_fit(
+    found: Case, poor: int, is_due: bool
+) -> None:
+    search = MountingSearch()
+    for _ in range(FEWEST_ASKED):
+        ask(search, {found: GOOD})
+    assert search.found == found
+    for _ in range(poor):
+        search.on_verdict(Verdict.POOR_FIT)
+    assert search.is_due(0, False) is is_due
+
+
+# what windows say
+
+
+@pytest.mark.parametrize(
+    ("verdict", "counts"),
+    [
+        (Verdict.UNIQUE, True),
+        (Verdict.AMBIGUOUS, True),
+        (Verdict.UNOBSERVABLE, False),
+        (Verdict.TOO_FEW, False),
+    ],
+)
+def test_windows_that_say_nothing_do_not_count(verdict: Verdict, counts: bool) -> None:
+    search = MountingSearch()
+    for _ in range(RECENT):
+        search.on_verdict(Verdict.POOR_FIT)
+    search.on_verdict(verdict)
+    assert search.poor == RECENT - counts
+
+
+@pytest.mark.parametrize(("poor", "disagrees"), [(MOST - 1, False), (MOST, True)])
+def test_a_pair_disagrees_where_most_of_its_last_windows_do(poor: int, disagrees: bool) -> None:
+    search = MountingSearch()
+    for k in range(3 * RECENT):
+        search.on_verdict(Verdict.UNIQUE if k % RECENT >= poor else Verdict.POOR_FIT)
+    assert search.disagrees is disagrees
+
+
+@pytest.mark.parametrize(("asked", "is_puzzled"), [(MOST_ASKED - 1, False), (MOST_ASKED, True)])
+def test_nobody_knows_why_once_all_windows_were_asked_in_vain(asked: int, is_puzzled: bool) -> None:
+    """Nothing fits, and what is configured not better than its mirror image."""
+    search = MountingSearch()
+    for _ in range(MOST):
+        search.on_verdict(Verdict.POOR_FIT)
+    for _ in range(asked):
+        ask(search, {MIRROR: FAR / 2})
+    assert search.is_puzzled is is_puzzled
+    fits = MountingSearch()
+    for _ in range(asked):
+        ask(fits, {MIRROR: FAR / 2})
+    assert not fits.is_puzzled
+
+
+def test_the_constants_are_in_an_order_that_makes_sense() -> None:
+    assert 0 < MANY < MOST < RECENT
+    assert FEWEST_ASKED + 3 < MOST_ASKED

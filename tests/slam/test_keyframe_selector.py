@@ -1,0 +1,93 @@
+"""Which samples of our odometry become keyframes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drslamd.slam.graph.measurements import Keyframe
+from drslamd.slam.keyframe_selector import KEYFRAME_M, KEYFRAME_RAD, KeyframeSelector
+from drslamd.slam.odometry.track import Track
+
+STEP = 1e-4
+"""m or rad of one step of a track."""
+MOST_M, MOST_RAD = round(KEYFRAME_M / STEP), round(KEYFRAME_RAD / STEP)
+
+
+class Driven:
+    """A robot whose first keyframe is sample 100, where it stood at (5, -7, 3) steps."""
+
+    def __init__(self) -> None:
+        self.track, self.selector = Track(1_000), KeyframeSelector()
+        self.to(100, 5, -7, 3)
+        self.first = self.selector.next(self.track)
+
+    def to(self, n: int, *steps: int) -> None:
+        self.track.append(n, np.array(steps, dtype=float))
+
+    def next(self, is_doubted: bool = False) -> Keyframe | None:
+        return self.selector.next(self.track, is_doubted)
+
+
+def test_of_no_odometry_there_is_no_keyframe() -> None:
+    assert KeyframeSelector().next(Track(10)) is None
+
+
+def test_the_first_sample_is_a_keyframe_in_whole_steps() -> None:
+    assert Driven().first == Keyframe(100, 0, 5, -7, 3)
+
+
+@pytest.mark.parametrize(
+    ("steps", "is_one"),
+    [
+        ((MOST_M - 1, 0, 0), False),
+        ((MOST_M + 1, 0, 0), True),
+        ((0, -MOST_M + 1, 0), False),
+        ((0, -MOST_M - 1, 0), True),
+        # 3, 4 and 5 have a right angle between them
+        ((3 * MOST_M // 5 - 2, 4 * MOST_M // 5 - 2, 0), False),
+        ((3 * MOST_M // 5 + 2, 4 * MOST_M // 5 + 2, 0), True),
+        ((0, 0, MOST_RAD - 1), False),
+        ((0, 0, MOST_RAD + 1), True),
+        ((0, 0, -MOST_RAD - 1), True),
+    ],
+)
+def test_a_robot_that_moved_or_turned_far_enough_makes_the_next_one(
+    steps: tuple[int, int, int], is_one: bool
+) -> None:
+    robot = Driven()
+    x, y, theta = 5 + steps[0], -7 + steps[1], 3 + steps[2]
+    robot.to(101, x, y, theta)
+    assert robot.next() == (Keyframe(101, 0, x, y, theta) if is_one else None)
+
+
+def test_what_it_moved_counts_from_the_last_keyframe_and_not_from_the_last_look() -> None:
+    robot = Driven()
+    found = []
+    for k in range(1, 9):
+        robot.to(100 + k, 5 + k * (MOST_M // 3), -7, 3)
+        keyframe = robot.next()
+        found += [keyframe.n] if keyframe else []
+    # three thirds are a little less than the whole
+    assert found == [104, 108]
+
+
+def test_who_may_move_though_its_wheels_stand_has_a_place_of_its_own_each_time() -> None:
+    robot = Driven()
+    assert robot.next(is_doubted=True) is None
+    for n in (101, 102):
+        robot.to(n, 5, -7, 3)
+        assert robot.next() is None
+        assert robot.next(is_doubted=True) == Keyframe(n, 0, 5, -7, 3)
+        assert robot.next(is_doubted=True) is None
+
+
+def test_behind_a_hole_a_new_segment_begins_wherever_it_is() -> None:
+    robot = Driven()
+    robot.to(103, 5, -7, 3)
+    assert robot.next() == Keyframe(103, 1, 5, -7, 3)
+    robot.to(104, 5, -7, 3)
+    assert robot.next() is None
+    robot.to(109, 5, -7, 3)
+    robot.to(110, 5, -7, 3)
+    assert robot.next() == Keyframe(110, 2, 5, -7, 3)

@@ -1,0 +1,120 @@
+"""The parts that a configuration chooses: which, with what, and a sentence when one is missing."""
+
+from __future__ import annotations
+
+import builtins
+import importlib.util
+from pathlib import Path
+from typing import Any
+
+import pytest
+from daemon_scenes import CONFIG, Stepped
+
+from drslamd.config import Config, ConfigError, parse
+from drslamd.io.can_bus import CanBus
+from drslamd.io.multicast import Multicast
+from drslamd.io.serial_port import SerialPort
+from drslamd.parts import dbc_text, make_transport, make_wheels
+
+KOBUKI = 'source = "kobuki"\nport = "/dev/none"\n'
+ODRIVE = """source = "odrive"
+track_m = 0.5
+left_axis = 0
+right_axis = 1
+wheel_radius_m = 0.1
+"""
+DBC = """source = "dbc"
+dbc_file = "{}"
+measures = "wheel_speeds"
+left = "A.B"
+right = "A.C"
+track_m = 0.5
+"""
+
+
+def configured(wheels: str = KOBUKI, more: str = "") -> Config:
+    assert KOBUKI in CONFIG
+    return parse(CONFIG.replace(KOBUKI, wheels) + more)
+
+
+@pytest.fixture
+def without(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Let a package be missing from now on."""
+    true_import = builtins.__import__
+
+    def forget(package: str) -> None:
+        def fake(name: str, *arguments: Any, **keywords: Any) -> Any:
+            if name == package:
+                raise ModuleNotFoundError(f"No module named '{package}'")
+            return true_import(name, *arguments, **keywords)
+
+        monkeypatch.setattr(builtins, "__import__", fake)
+
+    return forget
+
+
+def told(make: Any, config: Config) -> Any:
+    """What `make` gives, and that it has our clock and tells us its events."""
+    clock, events = Stepped(), []  # type: ignore[var-annotated]
+    part = make(config, clock, events.append)
+    assert part._clock is clock
+    assert events == []
+    return part
+
+
+def test_the_network_is_our_own_transport_unless_lcm_is_asked_for() -> None:
+    assert isinstance(told(make_transport, configured()), Multicast)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("lcm") is None, reason="no package lcm")
+def test_lcm_is_taken_when_it_is_asked_for() -> None:
+    from drslamd.io.liblcm import Liblcm
+
+    config = configured(more='[gossip]\nprovider = "liblcm"\n')
+    assert isinstance(told(make_transport, config), Liblcm)
+
+
+def test_lcm_that_is_missing_is_one_sentence(without: Any) -> None:
+    without("lcm")
+    with pytest.raises(ConfigError, match="pip install lcm"):
+        make_transport(configured(more='[gossip]\nprovider = "liblcm"\n'), Stepped(), print)
+
+
+def test_wheels_on_a_serial_line_have_the_port_and_the_speed_of_their_section() -> None:
+    port = told(make_wheels, configured(KOBUKI + "baud = 57_600\n"))
+    assert isinstance(port, SerialPort)
+    assert (port._port, port._path, port._baud) == ("wheels", "/dev/none", 57_600)
+
+
+def test_wheels_on_a_can_bus_have_the_bus_of_their_section() -> None:
+    pytest.importorskip("can", reason="python-can is not installed")
+    bus = told(make_wheels, configured(ODRIVE + '[wheels.can]\nchannel = "can3"\n'))
+    assert isinstance(bus, CanBus)
+    assert bus._section.channel == "can3"
+
+
+def test_a_package_for_can_that_is_missing_is_one_sentence(without: Any) -> None:
+    without("can")
+    with pytest.raises(ConfigError, match="pip install"):
+        make_wheels(configured(ODRIVE), Stepped(), print)
+
+
+def test_a_dbc_file_is_read_only_for_wheels_that_have_one(tmp_path: Path) -> None:
+    path = tmp_path / "base.dbc"
+    path.write_text('VERSION "é"\n')
+    assert dbc_text(configured(DBC.format(path))) == 'VERSION "é"\n'
+    assert dbc_text(configured()) == dbc_text(configured(ODRIVE)) == ""
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"), [(None, "No such file or directory"), (b"\xff\xfe", "not a text file")]
+)
+def test_a_dbc_file_that_cannot_be_read_is_one_sentence(
+    tmp_path: Path, content: bytes | None, sentence: str
+) -> None:
+    path = tmp_path / "base.dbc"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(ConfigError) as caught:
+        dbc_text(configured(DBC.format(path)))
+    assert caught.value.faults == [f"wheels.dbc_file = '{path}': {sentence}"]

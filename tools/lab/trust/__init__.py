@@ -1,0 +1,1 @@
+"""tools/trust: do published poses know what they do not know?"""
