@@ -30,7 +30,9 @@ TIERS = SHARED / "data" / "tiers_turtlebots" / "tiers_4robots_cora.pyfg"
 
 MOST_M, MOST_DEG = 0.10, 3.0
 SAME_M = 0.02
-FASTER = 10.0
+FASTER = 6.0
+"""Than real time, all robots of a team on one core: it was 10 before poses knew what they do not
+know. A robot takes 3 % of a core."""
 
 
 @pytest.fixture(scope="module", params=["simulated", "TIERS"])
@@ -81,7 +83,7 @@ def test_real_and_virtual_time_give_the_same(
     assert abs(difference) <= SAME_M
 
 
-def test_virtual_time_is_ten_times_faster_than_real_time(recording: Recording) -> None:
+def test_virtual_time_is_six_times_faster_than_real_time(recording: Recording) -> None:
     took = []
     for _ in range(3):
         began = time.process_time()

@@ -90,10 +90,9 @@ SIDES = (
     Repair(Fault.LEFT_REVERSED, way=0.0, turn=0.0, cross=1.0),
     Repair(Fault.RIGHT_REVERSED, way=0.0, turn=0.0, cross=-1.0),
 )
-TRACKS = tuple(Repair(Fault.TRACK, turn=k) for k in (0.67, 0.74, 0.82, 1.22, 1.35, 1.5))
-"""With a scale and a turn between two of them windows and odometry agree well enough."""
-SCALES = tuple(
-    Repair(Fault.SCALE, k, k)
-    for k in (0.5, 0.55, 0.61, 0.67, 0.74, 0.82, 1.22, 1.35, 1.5, 1.65, 1.82, 2.0)
-)
+TRACKS = tuple(Repair(Fault.TRACK, turn=k) for k in (0.67, 0.8, 1.25, 1.5))
+"""What lies between is found by `Repair.variants`."""
+SCALES = tuple(Repair(Fault.SCALE, k, k) for k in (0.5, 0.58, 0.67, 0.8, 1.25, 1.5, 1.73, 2.0))
 """See `TRACKS`; all counts are wrong by the same factor, those of turns too."""
+COARSE_SCALES = SCALES[::2]
+"""Of a whole team that was configured from one file."""

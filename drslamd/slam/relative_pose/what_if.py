@@ -16,6 +16,7 @@ from drslamd.conventions import SECOND_US
 from drslamd.slam import se2
 from drslamd.slam.odometry.mounting import (
     AS_CONFIGURED,
+    COARSE_SCALES,
     MIRRORED,
     SCALES,
     SIDES,
@@ -50,7 +51,7 @@ CASES = (
     *(Case(a=repair) for repair in (*SIDES, *TRACKS, *SCALES)),
     *(Case(b=repair) for repair in (*SIDES, *TRACKS, *SCALES)),
     # a team that was configured from one file is wrong in the same way
-    *(Case(repair, repair) for repair in SCALES),
+    *(Case(repair, repair) for repair in COARSE_SCALES),
 )
 
 
