@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from slam_scenes import Array
 
-from drslamd.slam.odometry.mounting import MIRRORED, SCALES, SIDES, TRACKS
+from drslamd.slam.odometry.mounting import COARSE_SCALES, MIRRORED, SCALES, SIDES, TRACKS
 from drslamd.slam.relative_pose.estimate import Verdict
 from drslamd.slam.relative_pose.mounting_search import (
     APART_US,
@@ -97,7 +97,7 @@ def test_what_does_not_fit_itself_is_no_explanation(level: float, wins: bool) ->
         (BETTER + LITTLE, UNLIKE - LITTLE, False),
     ],
 )
-@pytest.mark.parametrize("best", [TRACK, SCALE, Case(SCALES[1], SCALES[1])])
+@pytest.mark.parametrize("best", [TRACK, SCALE, Case(COARSE_SCALES[1], COARSE_SCALES[1])])
 def test_a_track_or_a_scale_is_begun_with_where_nothing_unlike_it_fits(
     best: Case, worse: float, unlike: float, is_begun: bool
 ) -> None:
@@ -113,7 +113,7 @@ def test_a_track_or_a_scale_is_begun_with_where_nothing_unlike_it_fits(
         (Case(b=SCALES[3]), False),
         (Case(b=TRACKS[1]), False),
         (Case(a=SCALES[3]), True),
-        (Case(SCALES[3], SCALES[3]), True),
+        (Case(COARSE_SCALES[3], COARSE_SCALES[3]), True),
         (LEFT, True),
         (MIRROR, True),
     ],

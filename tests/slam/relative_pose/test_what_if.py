@@ -13,7 +13,15 @@ from slam_scenes import EXACT, NOISE, Array, product
 from drslamd.conventions import GRID_US, SECOND_US, Chain
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import Keyframe
-from drslamd.slam.odometry.mounting import AS_CONFIGURED, MIRRORED, SCALES, SIDES, TRACKS, Repair
+from drslamd.slam.odometry.mounting import (
+    AS_CONFIGURED,
+    COARSE_SCALES,
+    MIRRORED,
+    SCALES,
+    SIDES,
+    TRACKS,
+    Repair,
+)
 from drslamd.slam.odometry.track import Track
 from drslamd.slam.range_model import RangeNoise
 from drslamd.slam.relative_pose import what_if
@@ -233,7 +241,7 @@ def test_cases_begin_with_the_configuration_and_its_mirror_image_and_name_each_o
         assert Case(a=repair) in CASES
         assert Case(b=repair) in CASES
     both = {case for case in CASES if AS_CONFIGURED not in case}
-    assert both == {Case(repair, repair) for repair in SCALES}
+    assert both == {Case(repair, repair) for repair in COARSE_SCALES}
 
 
 def test_cases_of_one_kind_differ_in_a_factor_only() -> None:
