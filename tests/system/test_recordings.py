@@ -30,9 +30,9 @@ TIERS = SHARED / "data" / "tiers_turtlebots" / "tiers_4robots_cora.pyfg"
 
 MOST_M, MOST_DEG = 0.10, 3.0
 SAME_M = 0.02
-FASTER = 6.0
+FASTER = 5.0
 """Than real time, all robots of a team on one core: it was 10 before poses knew what they do not
-know. A robot takes 3 % of a core."""
+know. A robot takes 3 to 4 % of a core."""
 
 
 @pytest.fixture(scope="module", params=["simulated", "TIERS"])
@@ -83,7 +83,7 @@ def test_real_and_virtual_time_give_the_same(
     assert abs(difference) <= SAME_M
 
 
-def test_virtual_time_is_six_times_faster_than_real_time(recording: Recording) -> None:
+def test_virtual_time_is_five_times_faster_than_real_time(recording: Recording) -> None:
     took = []
     for _ in range(3):
         began = time.process_time()
@@ -108,4 +108,4 @@ def test_the_scores_have_every_field_of_the_schema(recording: Recording, virtual
     assert set(scores["pairs"]["0-1"]) == relative
     assert 0 < scores["closures"]["kept"] <= scores["closures"]["seen"]
     assert set(scores["bytes_sent"]) == robots
-    assert set(scores["ms"]) == {"relative_pose", "consistency", "optimizer"}
+    assert set(scores["ms"]) == {"relative_pose", "consistency", "optimizer", "what_if"}
