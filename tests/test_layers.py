@@ -93,6 +93,7 @@ IMPURE = CLOCKS_AND_CHANCE | THREADS_AND_PROCESSES | PORTS_AND_FILES
 MAX_FILE, MAX_FUNCTION = 350, 60
 
 NOUNS = {
+    "cli.exit_codes",
     "conventions",
     "events",
     "gossip.message_types",

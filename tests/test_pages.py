@@ -16,6 +16,7 @@ from pages import Page, pages, read
 from places import REPOSITORY
 
 from drslamd import cli
+from drslamd.cli.check import toml_lines
 from drslamd.config import SOURCES, Config, ConfigError, parse
 
 PAGES = pages()
@@ -64,7 +65,7 @@ def faults(fragment: dict[str, Any]) -> list[str]:
     if "key_file" in merged["team"]:
         merged["team"] = {k: v for k, v in merged["team"].items() if k != "insecure"}
     try:
-        parse("\n".join(cli._toml(merged)))
+        parse("\n".join(toml_lines(merged)))
     except ConfigError as error:
         return error.faults
     return []

@@ -19,7 +19,7 @@ from deploy_helpers import (
     refused,
 )
 
-from drslamd.cli import BAD_CONFIG, OK, USAGE
+from drslamd.cli.exit_codes import BAD_CONFIG, OK, USAGE
 from drslamd.gossip.seal import KEY_BYTES
 
 LONGEST_CPU_S = 1.5

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from deploy_helpers import LONGEST_STOP_S, ORDINARY, UWB, WHEELS, Daemon, example_in
 
-from drslamd.cli import BUG, OK
+from drslamd.cli.exit_codes import BUG, OK
 
 pytestmark = pytest.mark.slow
 

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 from deploy_helpers import EXAMPLE, LONGEST_STOP_S, REPOSITORY
 
-from drslamd import cli, daemon
+from drslamd import daemon
+from drslamd.cli import exit_codes
 from drslamd.config import parse
 
 UNIT = REPOSITORY / "systemd" / "drslamd@.service"
@@ -65,7 +66,7 @@ def test_the_exposure_is_at_most_two() -> None:
 
 def test_systemd_does_not_restart_what_only_a_person_can_mend() -> None:
     unit = settings()
-    assert unit["RestartPreventExitStatus"] == [f"{cli.USAGE} {cli.BAD_CONFIG}"]
+    assert unit["RestartPreventExitStatus"] == [f"{exit_codes.USAGE} {exit_codes.BAD_CONFIG}"]
     # a failed ExecStartPre= is restarted whatever its exit code (systemd issue 11868)
     assert "ExecStartPre" not in unit
 
@@ -111,7 +112,7 @@ def test_the_serial_drivers_of_the_udev_rules_are_allowed_and_loaded_before() ->
 
 def test_the_read_me_explains_every_exit_code_and_installs_every_file() -> None:
     text = (UNIT.parent / "README.md").read_text()
-    for code in (cli.OK, cli.USAGE, cli.BAD_CONFIG, cli.BUG):
+    for code in (exit_codes.OK, exit_codes.USAGE, exit_codes.BAD_CONFIG, exit_codes.BUG):
         assert re.search(rf"^\| (\d+, )*{code} \|", text, re.MULTILINE), code
     for path in (UNIT, SYSUSERS, EXAMPLE):
         assert str(path.relative_to(REPOSITORY)) in text

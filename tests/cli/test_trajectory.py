@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import tempfile
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +13,10 @@ import pytest
 from lab.recordings import world
 from lab.score import metrics
 from scipy.spatial.transform import Rotation
+from status_answers import answering
 from teams import EASY, VirtualTeam
 
 from drslamd import cli, report
-from drslamd.io.status_socket import StatusSocket
 
 SCENE = world.Scene(
     robots=2, seconds=40.0, ranges=EASY.ranges, odometry=EASY.odometry, odometry_hz=20, range_hz=10
@@ -37,31 +34,6 @@ port = "/dev/none"
 [daemon]
 status_socket = "{}"
 """
-
-
-@contextmanager
-def answering(path: Path, answer: Any) -> Iterator[None]:
-    """A status socket in a thread of its own, as the daemon has one."""
-    ready = threading.Event()
-    ends: list[tuple[asyncio.AbstractEventLoop, asyncio.Event]] = []
-
-    async def serve() -> None:
-        server, end = StatusSocket(path, {"trajectory": lambda: answer}), asyncio.Event()
-        assert await server.open() == ""
-        ends.append((asyncio.get_running_loop(), end))
-        ready.set()
-        await end.wait()
-        await server.close()
-
-    thread = threading.Thread(target=lambda: asyncio.run(serve()))
-    thread.start()
-    try:
-        assert ready.wait(10)
-        yield
-    finally:
-        loop, end = ends[0]
-        loop.call_soon_threadsafe(end.set)
-        thread.join()
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,37 @@
+"""A status socket with a set answer, in the place of a daemon."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from drslamd.io.status_socket import StatusSocket
+
+
+@contextmanager
+def answering(path: Path, answer: Any, question: str = "trajectory") -> Iterator[None]:
+    """A status socket in a thread of its own, as the daemon has one."""
+    ready = threading.Event()
+    ends: list[tuple[asyncio.AbstractEventLoop, asyncio.Event]] = []
+
+    async def serve() -> None:
+        server, end = StatusSocket(path, {question: lambda: answer}), asyncio.Event()
+        assert await server.open() == ""
+        ends.append((asyncio.get_running_loop(), end))
+        ready.set()
+        await end.wait()
+        await server.close()
+
+    thread = threading.Thread(target=lambda: asyncio.run(serve()))
+    thread.start()
+    try:
+        assert ready.wait(10)
+        yield
+    finally:
+        loop, end = ends[0]
+        loop.call_soon_threadsafe(end.set)
+        thread.join()
