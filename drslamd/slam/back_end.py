@@ -81,15 +81,16 @@ class BackEnd:
     ) -> Job | None:
         """Begin to renew the estimate; None when nothing is new or connected.
 
-        An estimate that has not converged is renewed without any news. With `rbcd` it has to be
-        our turn too.
+        An estimate that is not final is renewed without any news: then all who hold the same
+        come to the same, whatever each of them solved before. With `rbcd` it has to be our turn
+        too.
 
         Args:
             present: robots that live.
             talking: those of them that hear us as we hear them.
         """
         now = _Known(self._inserted, frozenset(present), self.exchange.news)
-        if now == self._known and (self.estimate is None or self.estimate.converged):
+        if now == self._known and (self.estimate is None or self.estimate.is_final):
             self.exchange.rest(utime)
             return None
         if self._takes_turns and not self.exchange.begin(self._neighbours(talking), utime):

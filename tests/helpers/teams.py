@@ -13,6 +13,7 @@ from lab.recordings.recording import Recording
 from lab.score.outcome import Outcome, score
 
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
+from drslamd.slam.tuning import DEFAULTS, Tuning
 
 EASY = world.Scene(
     robots=3,
@@ -37,9 +38,10 @@ class VirtualTeam:
         on: tuple[int, ...] | None = None,
         secrets: dict[int, bytes] | None = None,
         solve_us: int = 20_000,
+        tuning: Tuning = DEFAULTS,
     ) -> None:
         self.recording: Recording = world.simulate(scene, seed)
-        self.simulator = Simulator(seed, network, solve_us)
+        self.simulator = Simulator(seed, network, solve_us, tuning)
         self.hardware: dict[int, Hardware] = equip(self.recording)
         self._rng = np.random.default_rng(seed)
         self._clocks = {robot: skewed_clock(self._rng) for robot in self.hardware}

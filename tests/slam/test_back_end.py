@@ -159,14 +159,19 @@ def test_with_turns_a_neighbour_that_lives_is_waited_for(team: SmallTeam) -> Non
     assert len(asked.groups) == 3
 
 
-@pytest.mark.parametrize("converged", [True, False])
-def test_what_has_not_converged_goes_on_without_news(team: SmallTeam, converged: bool) -> None:
+@pytest.mark.parametrize(
+    ("converged", "settled_too", "goes_on"),
+    [(True, True, False), (True, False, True), (False, True, True)],
+)
+def test_what_is_not_final_goes_on_without_news(
+    team: SmallTeam, converged: bool, settled_too: bool, goes_on: bool
+) -> None:
     back, asked = settled(team)
     assert back.estimate is not None
-    result = replace(back.estimate, converged=converged)
+    result = replace(back.estimate, converged=converged, settled=settled_too)
     back.on_solution(result)
-    assert (begin(back) is not None) is not converged
-    if not converged:
+    assert (begin(back) is not None) is goes_on
+    if goes_on:
         assert asked.previous is result
 
 

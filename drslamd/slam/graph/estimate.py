@@ -83,6 +83,8 @@ class TeamEstimate:
         late_level: likewise, of the last seconds only.
         contradicted: pairs whose ranges of late do not fit the rest.
         is_explained: is the model, with what was learned, one of what was measured?
+        converged: is it good enough to be used?
+        settled: is it the same from wherever it was begun?
         lifted: state of the relaxation, with `rbcd`.
     """
 
@@ -104,7 +106,13 @@ class TeamEstimate:
     cost: float = 0.0
     iterations: int = 0
     converged: bool = True
+    settled: bool = True
     lifted: Lifted | None = None
+
+    @property
+    def is_final(self) -> bool:
+        """Would another solution of the same be no other?"""
+        return self.converged and self.settled
 
     def covariance(self, robot: int) -> Array | None:
         """(3, 3) of the last pose of a robot; None where nothing is known of it."""

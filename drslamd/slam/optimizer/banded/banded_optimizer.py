@@ -23,12 +23,14 @@ from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.banded import banded_solver
+from drslamd.slam.optimizer.banded.banded_solver import SETTLED
+from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE
 from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.factors import Numbering
 from drslamd.slam.optimizer.problem import Calibration, Doubted, Priors, Problem
 from drslamd.slam.range_model import LINKTRACK, RangeModel
-from drslamd.slam.se2 import Array
+from drslamd.slam.se2 import Array, Index
 
 Name = TypeVar("Name")
 
@@ -80,6 +82,8 @@ class TeamProblem:
         start: calibration to start from.
         chains: of the robots that calibration numbers; pairs: that its biases number.
         places: of the keyframes.
+        is_known: is there a solution of the same keyframes? Then it is solved to the end, which
+            costs some steps more and would be in vain while others come.
     """
 
     problem: Problem
@@ -87,6 +91,7 @@ class TeamProblem:
     chains: list[Chain]
     pairs: list[tuple[int, int]]
     places: Numbering
+    is_known: bool
 
 
 def build_problem(
@@ -122,7 +127,19 @@ def build_problem(
         model=numbers.model,
     )
     start = _start(previous, known, pairs, robots)
-    return TeamProblem(problem, start, [data.chain for data in chains], pairs, places)
+    solved = {chain.chain: places.n[places.of_robot(chain.chain.robot)] for chain in chains}
+    is_known = _knows(previous, group, solved)
+    return TeamProblem(problem, start, list(solved), pairs, places, is_known)
+
+
+def _knows(previous: TeamEstimate | None, group: Group, keyframes: Mapping[Chain, Index]) -> bool:
+    """Is there a good solution of these keyframes (k,) in the frame of the group?"""
+    if previous is None or previous.frame != group.frame or not previous.converged:
+        return False
+    known = {t.chain: t.n for t in previous.trajectories.values()}
+    return known.keys() == keyframes.keys() and all(
+        np.array_equal(known[chain], n) for chain, n in keyframes.items()
+    )
 
 
 def _start(
@@ -177,7 +194,9 @@ def _solve(team: TeamProblem, group: Group) -> TeamEstimate:
     """Solve, with the uncertainty of everybody's latest pose, and sort the answer by robot."""
     mine = {chain.robot: team.places.of_robot(chain.robot) for chain in team.chains}
     last = tuple(int(at[-1]) for at in mine.values())
-    solution = banded_solver.solve(team.problem, team.start, last)
+    solution = banded_solver.solve(
+        team.problem, team.start, last, tolerance=SETTLED if team.is_known else TOLERANCE
+    )
     learned, spread, doubted = solution.calibration, solution.spread, solution.doubted
     assert spread is not None
     turn = _named(list(mine), learned.turn, spread.turn)
@@ -207,7 +226,9 @@ def _solve(team: TeamProblem, group: Group) -> TeamEstimate:
         is_explained=solution.is_explained,
         cost=solution.cost,
         iterations=solution.iterations,
-        converged=solution.converged,
+        # (a good one stays good, should the last digits not come to rest)
+        converged=solution.converged or team.is_known,
+        settled=team.is_known,
     )
 
 

@@ -23,6 +23,10 @@ from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.problem import Calibration, Problem
 from drslamd.slam.se2 import Array
 
+SETTLED = 1e-7
+"""m and rad: the last step of a solution that is the same, to a tenth of it, from wherever it was
+begun."""
+
 
 def solve(
     problem: Problem,

@@ -148,8 +148,8 @@ def test_mountings_that_are_still_in_doubt_are_named_by_their_robots(
     group = group_of(team.graph)
     plain = banded_solver.solve
 
-    def solve(*args: Any) -> Solution:
-        found = plain(*args)
+    def solve(*args: Any, **how: Any) -> Solution:
+        found = plain(*args, **how)
         assert found.spread is not None
         values = replace(
             found.calibration, turn=np.array([0.1, 0.2, 0.3]), antenna=np.arange(6.0).reshape(3, 2)
@@ -258,7 +258,8 @@ def test_the_next_solution_goes_on_from_the_last_one() -> None:
     assert problem_and_start.start.near_bias.tolist() == [first.near_bias_m.value] != [0.0]
     assert problem_and_start.start.team_bias.tolist() == [first.team_bias_m.value] != [0.0]
     again = solved(team.graph, group, first)
-    assert again.iterations <= 2
+    start = problem_and_start.start
+    assert banded_solver.solve(problem_and_start.problem, start).iterations <= 2
     for robot, trajectory in again.trajectories.items():
         assert np.abs(trajectory.poses - first.trajectories[robot].poses).max() < 1e-3
 
@@ -286,6 +287,21 @@ def test_two_robots_with_the_same_items_agree_whatever_their_history() -> None:
     other = solved(team.graph, group_of(team.graph), earlier)
     for robot, trajectory in one.trajectories.items():
         assert np.abs(trajectory.poses - other.trajectories[robot].poses).max() < 1e-3
+
+
+def test_a_solution_is_settled_when_it_was_begun_from_one_of_the_same_keyframes() -> None:
+    team = small_team(5, count=60)
+    group = group_of(team.graph)
+    first = solved(team.graph, group)
+    again = solved(team.graph, group, first)
+    assert (first.is_final, again.is_final) == (False, True)
+    for changed in (
+        replace(first, converged=False),
+        replace(first, frame=Segment(*team.chains[1], 0)),
+        replace(first, trajectories={r: t for r, t in first.trajectories.items() if r}),
+    ):
+        assert not solved(team.graph, group, changed).is_final
+    assert solved(team.graph, group, again).iterations == 1
 
 
 def test_clocks_that_differ_leave_the_problem_narrow() -> None:
