@@ -64,9 +64,13 @@ class WhatIfJob(NamedTuple):
 
 
 def _asked(
-    question: what_if.Question, cases: Sequence[Case], noise: PairNoise, delta: float
+    question: what_if.Question,
+    cases: Sequence[Case],
+    noise: PairNoise,
+    delta: float,
+    first: Sequence[int],
 ) -> tuple[Array, float]:
-    return question.costs(cases, noise, delta), question.way_m
+    return question.costs(cases, noise, delta, first), question.way_m
 
 
 class FrontEnd:
@@ -276,7 +280,8 @@ class FrontEnd:
             pair.search.begin(utime)
             question = what_if.ask(found, a, b)
             noise = self._noise(pair, b)
-            run = partial(_asked, question, pair.search.cases, noise, self._delta)
+            search = pair.search
+            run = partial(_asked, question, search.cases, noise, self._delta, search.asked_first)
             out.append(WhatIfJob(pair, found, run))
         return out
 

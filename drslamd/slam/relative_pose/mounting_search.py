@@ -93,6 +93,12 @@ class MountingSearch:
         return CASES if self.found is None else what_if.variants(self.found)
 
     @property
+    def asked_first(self) -> Sequence[int]:
+        """The places of those that may spare the others; none where windows disagree."""
+        spares = self.found is None and self.poor < MANY
+        return what_if.OUTPOSTS if spares else ()
+
+    @property
     def poor(self) -> int:
         """How many windows of late disagree."""
         return len(self._fits) - sum(self._fits)

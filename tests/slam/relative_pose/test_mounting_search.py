@@ -337,6 +337,16 @@ def test_it_is_asked_where_windows_disagree_or_a_pair_waits_to_be_believed(
     assert not search.is_due(0, awaits)
 
 
+@pytest.mark.parametrize(("poor", "is_short"), [(MANY - 1, True), (MANY, False)])
+def test_where_windows_agree_some_cases_may_spare_the_others(poor: int, is_short: bool) -> None:
+    search = MountingSearch()
+    for _ in range(poor):
+        search.on_verdict(Verdict.POOR_FIT)
+    assert bool(search.asked_first) is is_short
+    search.found = TRACK
+    assert not search.asked_first
+
+
 @pytest.mark.parametrize(("apart_us", "is_due"), [(APART_US - 1, False), (APART_US, True)])
 def test_windows_that_are_asked_are_some_seconds_apart(apart_us: int, is_due: bool) -> None:
     search = MountingSearch()

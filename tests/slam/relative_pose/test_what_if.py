@@ -20,6 +20,7 @@ from drslamd.slam.odometry.mounting import (
     SCALES,
     SIDES,
     TRACKS,
+    Fault,
     Repair,
 )
 from drslamd.slam.odometry.track import Track
@@ -28,7 +29,15 @@ from drslamd.slam.relative_pose import what_if
 from drslamd.slam.relative_pose.estimate import PairNoise
 from drslamd.slam.relative_pose.pair_end import PairEnd
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
-from drslamd.slam.relative_pose.what_if import CASES, MIRROR, Case, Question, ask, variants
+from drslamd.slam.relative_pose.what_if import (
+    CASES,
+    MIRROR,
+    OUTPOSTS,
+    Case,
+    Question,
+    ask,
+    variants,
+)
 from drslamd.slam.relative_pose.window_request import WindowRequest, WindowRule, request
 from drslamd.slam.robot_model import RobotModel
 
@@ -165,6 +174,20 @@ def test_of_all_that_is_tried_the_truth_is_best() -> None:
     assert np.sort(costs)[1] > 20
 
 
+def test_who_is_as_configured_is_asked_a_part_of_the_cases_only() -> None:
+    costs = seen().question.costs(CASES, PAIR_NOISE, DELTA, first=OUTPOSTS)
+    asked = np.isfinite(costs)
+    assert np.flatnonzero(asked).tolist() == list(OUTPOSTS)
+    assert costs[asked] == pytest.approx(seen().question.costs(CASES, PAIR_NOISE, DELTA)[asked])
+
+
+@pytest.mark.parametrize("true", [Case(b=SCALES[0]), Case(b=SCALES[-1]), Case(a=TRACKS[1])])
+def test_where_one_of_these_is_better_all_cases_are_asked(true: Case) -> None:
+    costs = seen(*true).question.costs(CASES, PAIR_NOISE, DELTA, first=OUTPOSTS)
+    assert np.isfinite(costs).all()
+    assert CASES[int(costs.argmin())] == true
+
+
 @pytest.mark.parametrize("repair", SIDES)
 def test_wheels_without_sides_have_none_that_run_backwards(repair: Repair) -> None:
     question = seen(half_track_m=0.0).question
@@ -242,6 +265,17 @@ def test_cases_begin_with_the_configuration_and_its_mirror_image_and_name_each_o
         assert Case(b=repair) in CASES
     both = {case for case in CASES if AS_CONFIGURED not in case}
     assert both == {Case(repair, repair) for repair in COARSE_SCALES}
+
+
+def test_the_cases_that_are_asked_first_lie_around_the_configuration() -> None:
+    outposts = [CASES[place] for place in OUTPOSTS]
+    assert outposts[0] == Case()
+    for repair in (*SIDES, *TRACKS):
+        assert Case(a=repair) in outposts
+        assert Case(b=repair) in outposts
+    scales = {case.b.way for case in outposts if case.b.fault is Fault.SCALE}
+    assert scales == {0.67, 0.8, 1.25, 1.5}
+    assert not any(AS_CONFIGURED not in case for case in outposts)
 
 
 def test_cases_of_one_kind_differ_in_a_factor_only() -> None:
