@@ -181,6 +181,12 @@ def _why_not_connected(pair: PairTracker) -> str:
         return pair.last_verdict or "nothing measured yet"
     if pair.connected:
         return "connected, the graph is about to be solved"
+    enough = len(pair.kept) >= pair.agreement.least
+    if pair.agreement.confirms and enough and not pair.search.is_confirmed:
+        return (
+            f"{len(pair.kept)} of {pair.closures_seen} closures agree, but the same ranges would "
+            "fit wheels that run backwards, until both have driven more"
+        )
     return (
         f"{len(pair.kept)} of {pair.closures_seen} closures agree, "
         f"{pair.agreement.least} must and outnumber all others"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import pytest
 from frames import ascii_line
 from message_builders import a_status, forged
@@ -279,6 +281,19 @@ def test_a_window_that_named_a_pose_is_no_reason(poses: int) -> None:
     assert why(scene) == told(
         "0 of 3 closures agree, 5 must and outnumber all others (with robot 4)"
     )
+
+
+@pytest.mark.parametrize(("kept", "is_said"), [(4, False), (5, True)])
+def test_closures_that_agree_wait_for_the_proof_that_no_wheel_runs_backwards(
+    kept: int, is_said: bool
+) -> None:
+    scene = with_pair(4)
+    answered(scene, 4, *[1] * 5)
+    pair = scene.robot.front.pairs[4]
+    pair.kept = cast(Any, (object(),) * kept)
+    assert ("would fit wheels that run backwards" in why(scene)) is is_said
+    pair.search.is_confirmed = True
+    assert "run backwards" not in why(scene)
 
 
 def test_when_windows_fail_after_some_that_did_not_the_last_one_is_the_reason() -> None:
