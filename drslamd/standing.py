@@ -5,7 +5,7 @@ from __future__ import annotations
 from drslamd.config import Config
 from drslamd.conventions import Chain
 from drslamd.slam.back_end import BackEnd
-from drslamd.slam.doubt import Doubt, doubt_of, doubted_partners
+from drslamd.slam.doubt import Doubt, Partners, doubt_of, doubted_partners
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.graph.estimate import PoseNow
 from drslamd.slam.pose_now import pose_now
@@ -24,12 +24,15 @@ class Standing:
         estimate, front = self._back.estimate, self._front
         if estimate is None:
             return None
-        return pose_now(estimate, self._robot, front.reckoning.track, front.model.noise)
+        found = pose_now(estimate, self._robot, front.reckoning.track, front.model.noise)
+        if found is None:
+            return None
+        return found._replace(covariance=found.covariance * self._back.revisions.boldness)
 
     def whereabouts(self, utime: int) -> Whereabouts:
         """What that pose is worth now."""
-        track = self._front.reckoning.track
-        return whereabouts(self.pose(), track, self._most_mps, self._doubt(), utime)
+        track, gap_m = self._front.reckoning.track, self._front.watch.gap_m
+        return whereabouts(self.pose(), track, self._most_mps, self._doubt(), utime, gap_m)
 
     def is_doubted(self) -> tuple[bool, bool]:
         """Does odometry of ours, or of anybody, say less than what was ranged?"""
@@ -38,5 +41,7 @@ class Standing:
         return own, own or bool(partners)
 
     def _doubt(self) -> Doubt | None:
-        watch = self._front.watch
-        return doubt_of(self._robot, self._back.estimate, watch.looked_at, watch.doubted)
+        estimate, front = self._back.estimate, self._front
+        watch = Partners(front.watch.looked_at, front.watch.doubted)
+        windows = front.partners_by_windows(estimate.trajectories if estimate else ())
+        return doubt_of(self._robot, estimate, watch, windows, self._back.revisions.boldness)

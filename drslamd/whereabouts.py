@@ -57,7 +57,12 @@ NOWHERE = Whereabouts(PoseState.NOT_LOCALISED)
 
 
 def whereabouts(
-    found: PoseNow | None, track: Track, most_mps: float, doubt: Doubt | None, utime: int
+    found: PoseNow | None,
+    track: Track,
+    most_mps: float,
+    doubt: Doubt | None,
+    utime: int,
+    gap_m: float = 0.0,
 ) -> Whereabouts:
     """What to say of a robot at `utime`.
 
@@ -66,13 +71,16 @@ def whereabouts(
         track: its odometry.
         most_mps: what its wheels can do.
         doubt: what speaks against that pose.
+        gap_m: how far all ranges of this second are off: the pose is as wrong as that, whatever the
+            reason, and long before anybody can say which.
     """
     if found is None:
         return NOWHERE
     age_us = utime - found.utime
     if age_us <= VALID_US:
         state = PoseState.DOUBTFUL if doubt else PoseState.LOCALISED
-        return Whereabouts(state, found, age_us, doubt)
+        wider = found.covariance + np.diag([gap_m**2, gap_m**2, 0.0])
+        return Whereabouts(state, found._replace(covariance=wider), age_us, doubt)
     if age_us > LOST_US:
         return NOWHERE
     speed, turning = likely_speeds(track, most_mps)

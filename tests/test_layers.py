@@ -59,6 +59,7 @@ SLAM_ORDER = [
     "settings",
     "range_watch",
     "doubt",
+    "revisions",
     "keyframe_selector",
     "front_end",
     "back_end",

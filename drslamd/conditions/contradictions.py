@@ -72,6 +72,24 @@ def doubt(found: Doubt | None) -> str | None:
             f"the pose is doubtful: odometry is {_times(found.level)} as wrong as configured; "
             "the wheels slip or spin, or a counter stands; look at them, or drive more slowly"
         )
+    if found.reason is Reason.SCALE:
+        # in halves, so that the sentence stays the same while it means the same
+        return (
+            f"the pose is doubtful: it fits only if odometry is about {round(2 * found.level) / 2} "
+            "times as long and turns as configured, which no usual mistake explains; look at the "
+            "wheels of both sides, their size and their counts"
+        )
+    if found.reason is Reason.WINDOWS:
+        named = " and ".join(map(str, found.peers))
+        return (
+            f"the pose is doubtful: most ranges with robot {named} fit no motion that wheels of "
+            "both measured; look at the wheels, or drive more slowly; is sight blocked?"
+        )
+    if found.reason is Reason.REVISIONS:
+        return (
+            "the pose is doubtful: later measurements moved it further than was claimed; wheels "
+            "slipped or stood, or sight was blocked, within the last half minute"
+        )
     if len(found.peers) == 1:
         return (
             f"the pose is doubtful: ranges to robot {found.peers[0]} and the odometry of both do "

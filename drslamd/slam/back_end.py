@@ -19,6 +19,7 @@ from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.rbcd import lifted_neighbours
 from drslamd.slam.optimizer.rbcd.pose_exchange import PoseExchange
 from drslamd.slam.optimizer.rbcd.rbcd_optimizer import at_anchor
+from drslamd.slam.revisions import Revisions
 from drslamd.slam.tuning import DEFAULTS, Tuning
 
 URGENT = 1e-4
@@ -51,6 +52,7 @@ class BackEnd:
         self.exchange = PoseExchange(own)
         self.graph = PoseGraph(tuning.recent_s)
         self.history = History()
+        self.revisions = Revisions()
         self.group: set[Segment] = set()
         self.estimate: TeamEstimate | None = None
         self._inserted = 0
@@ -134,6 +136,7 @@ class BackEnd:
     def on_solution(self, result: TeamEstimate, utime: int = 0) -> list[PublicPoses]:
         """Module 3 has answered; what must be said of it."""
         self.estimate = result = self._anchored(result)
+        self.revisions.on_solution(result, self._own.robot)
         own = result.trajectories.get(self._own.robot)
         if own is not None:
             self.history.update(own)

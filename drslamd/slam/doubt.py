@@ -1,8 +1,10 @@
 """Is a robot where it is said to be? Who speaks against it, and what that may be.
 
-Three witnesses: odometry that must have been worse than configured (module 3), ranges of the last
-seconds that do not fit the solution (module 3), and ranges of this very second that do not fit
-where both robots are said to be (`range_watch`). A robot that all its partners contradict is
+Witnesses: odometry that must have been worse than configured, or longer than anybody mounts it
+(module 3); ranges of the last seconds that do not fit the solution (module 3); ranges of this very
+second that do not fit where both robots are said to be (`range_watch`); windows of which most do
+not fit whatever is known of the mountings (module 1); solutions that move what earlier ones claimed
+(`revisions`). A robot that all its partners contradict is
 doubtful, and they are not; of two robots alone nobody can tell, and both are.
 """
 
@@ -10,18 +12,42 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 from drslamd.slam.graph.estimate import TeamEstimate
 
 MUCH_WORSE = 3.0
 """Times the configured sigma of odometry: as modelled it is below 2."""
+ODD_SCALE = 0.5
+"""Of the way, where turns are as configured: who miscounts both wheels miscounts turns as well. As
+modelled it is below 0.3; where it is more, something else was bent until it fitted."""
+
+BOLD = 2.0
+"""Times the variance that was claimed of late, that solutions moved on."""
 
 
 class Reason(Enum):
     """What speaks against a robot."""
 
     ODOMETRY = "odometry"
+    SCALE = "scale"
+    REVISIONS = "revisions"
     RANGES = "ranges"
+    WINDOWS = "windows"
+
+
+class Partners(NamedTuple):
+    """Robots that a witness holds against one, and those of them that contradict it."""
+
+    seen: frozenset[int] = frozenset()
+    wrong: frozenset[int] = frozenset()
+
+    @property
+    def all_contradict(self) -> bool:
+        return bool(self.wrong) and self.wrong == self.seen
+
+
+NOBODY = Partners()
 
 
 @dataclass(frozen=True)
@@ -30,8 +56,8 @@ class Doubt:
 
     Attributes:
         robot: whose pose it is about.
-        peers: whose ranges contradict it.
-        level: how many times worse than configured odometry is.
+        peers: whose ranges or windows contradict it.
+        level: how many times worse than configured odometry is, or how many times as long.
     """
 
     robot: int
@@ -43,25 +69,37 @@ class Doubt:
 def doubt_of(
     robot: int,
     estimate: TeamEstimate | None,
-    watched: frozenset[int] = frozenset(),
-    off: frozenset[int] = frozenset(),
+    watch: Partners = NOBODY,
+    windows: Partners = NOBODY,
+    boldness: float = 1.0,
 ) -> Doubt | None:
     """What speaks against the pose of a robot; None while nothing does.
 
     Args:
-        watched: peers whose ranges are held against it this second; off: those that do not fit.
+        watch: peers by their ranges of this second; windows: by those of our pairs.
+        boldness: see `Revisions`.
     """
     if estimate is None:
         return None
     level = estimate.late_level.get(robot, 1.0)
     if level >= MUCH_WORSE:
         return Doubt(robot, Reason.ODOMETRY, level=level)
+    if _is_odd(robot, estimate):
+        return Doubt(robot, Reason.SCALE, level=1 + estimate.correction(robot).scale)
     partners = {b if a == robot else a for a, b in estimate.bias_m if robot in (a, b)}
     against = {b if a == robot else a for a, b in estimate.contradicted if robot in (a, b)}
-    for seen, wrong in ((partners, against), (watched, off)):
-        if wrong and wrong == seen:
-            return Doubt(robot, Reason.RANGES, tuple(sorted(wrong)))
-    return None
+    against |= {partner for partner in partners if _is_odd(partner, estimate)}
+    solved = Partners(frozenset(partners), frozenset(against))
+    witnesses = ((Reason.RANGES, solved), (Reason.RANGES, watch), (Reason.WINDOWS, windows))
+    for reason, found in witnesses:
+        if found.all_contradict:
+            return Doubt(robot, reason, tuple(sorted(found.wrong)))
+    return Doubt(robot, Reason.REVISIONS) if boldness >= BOLD else None
+
+
+def _is_odd(robot: int, estimate: TeamEstimate) -> bool:
+    scale = estimate.correction(robot).scale
+    return abs(scale) >= ODD_SCALE and robot not in estimate.turn
 
 
 def doubted_partners(

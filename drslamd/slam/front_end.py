@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -13,6 +13,7 @@ from drslamd.slam import settings
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
 from drslamd.slam.calibration.window_calibration import PairCalibration
 from drslamd.slam.consistency.pair import Checked, PairTracker
+from drslamd.slam.doubt import Partners
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import ClosureMeasurement, Keyframe, RangeMeasurement
 from drslamd.slam.graph.pose_graph import PoseGraph
@@ -284,6 +285,12 @@ class FrontEnd:
             run = partial(_asked, question, search.cases, noise, self._delta, search.asked_first)
             out.append(WhatIfJob(pair, found, run))
         return out
+
+    def partners_by_windows(self, solved: Collection[int]) -> Partners:
+        """Robots of our pairs that are in a solution, and those with whom windows disagree."""
+        pairs = {robot: pair for robot, pair in self.pairs.items() if robot in solved}
+        wrong = frozenset(robot for robot, pair in pairs.items() if pair.search.disagrees)
+        return Partners(frozenset(pairs), wrong)
 
     # module 2
 

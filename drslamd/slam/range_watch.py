@@ -73,6 +73,12 @@ class RangeWatch:
         """
         self._sigma_m, self._model = sigma_m, model
         self.off: dict[int, int] = {}
+        self._gaps_m: dict[int, float] = {}
+
+    @property
+    def gap_m(self) -> float:
+        """How far ranges to all whom we see are off at least; 0 where any of them fits."""
+        return min(self._gaps_m.values(), default=0.0)
 
     @property
     def doubted(self) -> frozenset[int]:
@@ -93,17 +99,22 @@ class RangeWatch:
     ) -> None:
         """Once a second."""
         found: dict[int, int] = {}
+        gaps_m: dict[int, float] = {}
         for robot, partner in partners.items() if estimate is not None else ():
             assert estimate is not None
-            sigmas = self._sigmas_off(estimate, own, partner, utime)
-            if sigmas is not None:
-                found[robot] = self.off.get(robot, 0) + 1 if sigmas > FAR_SIGMAS else 0
-        self.off = found
+            off = self._off(estimate, own, partner, utime)
+            if off is not None:
+                metres, sigma = off
+                is_far = metres > FAR_SIGMAS * sigma
+                found[robot] = self.off.get(robot, 0) + 1 if is_far else 0
+                gaps_m[robot] = metres if is_far else 0.0
+        self.off, self._gaps_m = found, gaps_m
 
-    def _sigmas_off(
+    def _off(
         self, estimate: TeamEstimate, own: PairEnd, partner: Partner, utime: int
-    ) -> float | None:
-        """How many sigmas the newest ranges are off; None where nothing can be said."""
+    ) -> tuple[float, float] | None:
+        """How far the newest ranges are off, m, and the sigma of that; None where nothing can be
+        said."""
         at = _newest(own, partner, utime)
         if at is None:
             return None
@@ -131,7 +142,7 @@ class RangeWatch:
         variance = by_pose @ joint @ by_pose + u @ (a.added + b.added) @ u
         variance += self._sigma_m**2 + float(self._model.near_range_sigma(measured)) ** 2
         variance += min(bias.sigma, MOST_BIAS_M) ** 2
-        return abs(distance + bias.value + strong - measured) / float(np.sqrt(variance))
+        return abs(distance + bias.value + strong - measured), float(np.sqrt(variance))
 
 
 def _newest(own: PairEnd, partner: Partner, utime: int) -> tuple[int, int] | None:

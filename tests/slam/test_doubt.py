@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from drslamd.conventions import Segment
-from drslamd.slam.doubt import MUCH_WORSE, Doubt, Reason, doubt_of, doubted_partners
+from drslamd.slam.doubt import (
+    BOLD,
+    MUCH_WORSE,
+    ODD_SCALE,
+    Doubt,
+    Partners,
+    Reason,
+    doubt_of,
+    doubted_partners,
+)
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
 
 NOBODY: frozenset[int] = frozenset()
@@ -29,7 +40,7 @@ def team(
 
 
 def test_without_a_solution_there_is_nothing_to_doubt() -> None:
-    assert doubt_of(0, None, frozenset({1}), frozenset({1})) is None
+    assert doubt_of(0, None, Partners(frozenset({1}), frozenset({1}))) is None
     assert doubted_partners(0, None, frozenset({1})) == NOBODY
 
 
@@ -91,9 +102,44 @@ def test_who_has_no_pair_at_all_is_contradicted_by_nobody() -> None:
 def test_ranges_of_this_second_are_doubt_where_none_of_them_fits(
     watched: set[int], off: set[int], peers: tuple[int, ...] | None
 ) -> None:
-    found = doubt_of(0, team(), frozenset(watched), frozenset(off))
+    found = doubt_of(0, team(), Partners(frozenset(watched), frozenset(off)))
     assert found == (None if peers is None else Doubt(0, Reason.RANGES, peers))
 
 
 def test_partners_are_doubted_by_what_was_solved_and_by_what_is_ranged_now() -> None:
     assert doubted_partners(0, team((0, 2), (1, 2)), frozenset({5})) == {2, 5}
+
+
+@pytest.mark.parametrize(
+    ("scale", "is_odd"), [(0.49, False), (0.5, True), (-0.49, False), (-0.5, True)]
+)
+def test_odometry_of_another_length_that_turns_as_configured_is_no_mounting(
+    scale: float, is_odd: bool
+) -> None:
+    estimate = replace(team(), scale={1: Learned(scale, 0.01)})
+    found = doubt_of(1, estimate)
+    assert found == (Doubt(1, Reason.SCALE, level=1 + scale) if is_odd else None)
+    # who miscounts both sides turns as wrongly, and that is learned
+    assert doubt_of(1, replace(estimate, turn={1: Learned(scale, 0.01)})) is None
+
+
+def test_a_robot_of_odd_odometry_contradicts_a_single_partner_and_not_two() -> None:
+    odd = {1: Learned(ODD_SCALE, 0.01)}
+    assert doubt_of(0, replace(team(), scale=odd)) is None
+    found = doubt_of(0, replace(team(pairs=((0, 1),)), scale=odd))
+    assert found == Doubt(0, Reason.RANGES, (1,))
+
+
+def test_windows_of_all_pairs_that_disagree_are_doubt() -> None:
+    some = Partners(frozenset({1, 2}), frozenset({2}))
+    every = Partners(frozenset({1, 2}), frozenset({1, 2}))
+    assert doubt_of(0, team(), windows=some) is None
+    assert doubt_of(0, team(), windows=every) == Doubt(0, Reason.WINDOWS, (1, 2))
+    # ranges of this second say it sooner
+    assert doubt_of(0, team(), every, every) == Doubt(0, Reason.RANGES, (1, 2))
+
+
+@pytest.mark.parametrize(("boldness", "is_doubt"), [(BOLD - 0.01, False), (BOLD, True)])
+def test_claims_that_solutions_moved_too_far_are_doubt(boldness: float, is_doubt: bool) -> None:
+    found = doubt_of(0, team(), boldness=boldness)
+    assert found == (Doubt(0, Reason.REVISIONS) if is_doubt else None)

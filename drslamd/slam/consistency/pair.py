@@ -111,9 +111,7 @@ class PairTracker:
         Args:
             epsilon: significance of equation (3).
         """
-        self.peer = peer
-        self.ranges = ranges
-        self.sampler = sampler
+        self.peer, self.ranges, self.sampler = peer, ranges, sampler
         self._epsilon, self.agreement = epsilon, agreement
         self.verdicts: Counter[str] = Counter()
         self.last_verdict = ""
@@ -130,6 +128,7 @@ class PairTracker:
         self._pending: deque[tuple[int, WindowRequest, RelativePoseEstimate]]
         self._pending = deque(maxlen=PENDING)
         self._told: dict[int, ClosureMeasurement] = {}
+        self._withdrawn: list[ClosureMeasurement] = []
         self._kept_before: set[int] = set()
         self._number = 0
 
@@ -168,7 +167,9 @@ class PairTracker:
             way_m: how far the robot drove that drove less.
         """
         if self.search.on_costs(costs, len(request.window), way_m > MOVED_M):
-            # what was found with odometry as configured is worth nothing
+            # what was found with odometry as believed until now is worth nothing
+            self._withdrawn += [replace(m, kept=False) for m in self._told.values()]
+            self._told.clear()
             self._pending.clear()
             self._checked, self.connected, self.kept = None, False, ()
             self._is_obsolete = self._is_busy
@@ -297,12 +298,13 @@ class PairTracker:
             every: closures are the graph's edges, so each one counts; otherwise one in a while
                 tells where the peer is and the ranges do the rest.
         """
+        gone, self._withdrawn = self._withdrawn, []
         if self._checked is None:
-            return []
+            return gone
         believed = self.connected and not self.is_refused
         kept = {m.number: m for m in self.kept} if believed else {}
         remembered = min((m.number for m in self._checked.measurements), default=0)
-        gone = [
+        gone += [
             replace(m, kept=False)
             for number, m in self._told.items()
             if number >= remembered and kept.get(number) != m

@@ -35,7 +35,13 @@ RUN = 4
 OF_RUN = 0.8
 """Share of the ranges since its beginning that are outliers."""
 
-
+LAST = 10
+"""Ranges of a pair that are held against their sigmas together: a solution that was bent until the
+ranges fit leaves them scattering to both sides, without a run."""
+MOST_SCATTER = 3.5
+"""Mean square of these, in sigmas; as modelled it is 0.2 to 1.5, and a burst of three makes 3."""
+CLIPPED = 3.0
+"""Sigmas that count at most, so that a burst alone is no misfit."""
 LATELY = 200
 """Steps of the keyframes' grid."""
 MANY_WRONG = 0.4
@@ -170,15 +176,13 @@ def runs(problem: Problem, point: Point) -> list[Run]:
     ranges = problem.ranges
     order = np.argsort(np.maximum(ranges.i, ranges.j), kind="stable")
     wrong = outliers(problem, point)
+    sigmas = np.abs(point.sight.error) / ranges.sigma
     robots = np.unique(problem.robot)
     found = []
     for pair in range(problem.pairs):
         mine = order[ranges.pair[order] == pair][::-1]
-        share = np.cumsum(wrong[mine]) / (np.arange(len(mine)) + 1)
-        # from a last range that is wrong, as far back as most of them are
-        good = np.flatnonzero(wrong[mine] & (share >= OF_RUN))
-        count = int(good[-1]) + 1 if len(good) else 0
-        if count < RUN or not wrong[mine[:RUN]].all():
+        count = _run_length(wrong[mine]) or _scattered(sigmas[mine])
+        if not count:
             continue
         first = mine[count - 1]
         ends = np.array([ranges.i[first], ranges.j[first]])
@@ -186,3 +190,19 @@ def runs(problem: Problem, point: Point) -> list[Run]:
         (i, j), (n_i, n_j) = np.searchsorted(robots, problem.robot[ends]), problem.n[ends]
         found.append(Run(int(i), int(j), int(n_i), int(n_j), count))
     return found
+
+
+def _run_length(wrong: NDArray[np.bool_]) -> int:
+    """From a last range that is wrong, as far back as most of them are; the newest comes first."""
+    share = np.cumsum(wrong) / (np.arange(len(wrong)) + 1)
+    good = np.flatnonzero(wrong & (share >= OF_RUN))
+    count = int(good[-1]) + 1 if len(good) else 0
+    return count if count >= RUN and wrong[:RUN].all() else 0
+
+
+def _scattered(sigmas: Array) -> int:
+    """As far back as the first outlier of the last ranges, if all of them scatter too much."""
+    last = np.minimum(sigmas[:LAST], CLIPPED)
+    if len(last) < LAST or np.mean(last**2) <= MOST_SCATTER:
+        return 0
+    return int(np.flatnonzero(last > OUTLIER_SIGMAS)[-1]) + 1
