@@ -81,7 +81,7 @@ def played(seed: int) -> tuple[VirtualTeam, int]:
 
 
 @pytest.mark.parametrize(
-    "seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 8))]
+    "seed", [pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 8)]
 )
 def test_robots_that_hold_the_same_have_one_graph_and_come_to_the_same_paths(seed: int) -> None:
     team, same = played(seed)

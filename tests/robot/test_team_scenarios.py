@@ -125,6 +125,7 @@ def test_a_robot_that_restarts_joins_again_and_the_others_keep_their_map() -> No
     assert chain.epoch == 2
 
 
+@pytest.mark.slow
 def test_when_the_lowest_robot_dies_the_next_gives_the_frame() -> None:
     team = VirtualTeam()
     team.run(40.0)
@@ -154,6 +155,7 @@ def test_a_partition_heals() -> None:
     assert team.errors()["ate_rmse_m"] < 0.10
 
 
+@pytest.mark.slow
 def test_robots_that_hear_each_other_only_through_a_third_hold_the_same_graph() -> None:
     team = VirtualTeam(network=Network(connected=lambda a, b, _: {a, b} != {0, 2}))
     team.run(SETTLED + 5)
@@ -187,6 +189,7 @@ def test_robots_that_stand_still_do_not_invent_poses() -> None:
     assert "made by robots 0; ask them" in team.problems(1)
 
 
+@pytest.mark.slow
 def test_a_pulled_uwb_cable_is_named_and_the_team_goes_on_when_it_is_back() -> None:
     team = VirtualTeam(on=())
     team.cut = lambda robot, port, t: robot == 1 and port == "uwb" and 30 < t < 40

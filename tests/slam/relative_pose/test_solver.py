@@ -322,6 +322,7 @@ def refined(window: Window, seeds: Array) -> Array:
     return fit.poses(descent.minima().centred)
 
 
+@pytest.mark.slow
 def test_the_refinement_reaches_the_minima_of_minpack() -> None:
     """From the same seeds, with Huber's loss, a bias, noise and bursts."""
     near, windows = 0, 14
