@@ -73,11 +73,10 @@ def doubt(found: Doubt | None) -> str | None:
             "the wheels slip or spin, or a counter stands; look at them, or drive more slowly"
         )
     if found.reason is Reason.SCALE:
-        # in halves, so that the sentence stays the same while it means the same
         return (
-            f"the pose is doubtful: it fits only if odometry is about {round(2 * found.level) / 2} "
-            "times as long and turns as configured, which no usual mistake explains; look at the "
-            "wheels of both sides, their size and their counts"
+            f"the pose is doubtful: it fits only if odometry is {_long(found.level)} and turns as "
+            "configured, which no usual mistake explains; look at the wheels of both sides, their "
+            "size and their counts"
         )
     if found.reason is Reason.WINDOWS:
         named = " and ".join(map(str, found.peers))
@@ -105,6 +104,11 @@ def doubt(found: Doubt | None) -> str | None:
 def _times(level: float) -> str:
     """In few words, so that a sentence stays the same while it means the same."""
     return "over ten times" if level > 10 else "some times"
+
+
+def _long(level: float) -> str:
+    """In halves, likewise."""
+    return f"about {round(2 * level) / 2} times as long" if level > 1 else "at most half as long"
 
 
 def partners(robots: Iterable[int]) -> str | None:

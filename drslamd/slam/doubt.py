@@ -85,7 +85,7 @@ def doubt_of(
     if level >= MUCH_WORSE:
         return Doubt(robot, Reason.ODOMETRY, level=level)
     if _is_odd(robot, estimate):
-        return Doubt(robot, Reason.SCALE, level=1 + estimate.correction(robot).scale)
+        return Doubt(robot, Reason.SCALE, level=1 - estimate.correction(robot).scale)
     partners = {b if a == robot else a for a, b in estimate.bias_m if robot in (a, b)}
     against = {b if a == robot else a for a, b in estimate.contradicted if robot in (a, b)}
     against |= {partner for partner in partners if _is_odd(partner, estimate)}

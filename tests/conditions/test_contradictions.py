@@ -135,6 +135,45 @@ def test_of_one_witness_both_robots_may_be_at_fault_and_of_two_only_the_own() ->
         assert "sight is blocked" in sentence
 
 
+@pytest.mark.parametrize(
+    ("level", "long"),
+    [
+        (1.5, "about 1.5 times"),
+        (1.74, "about 1.5 times"),
+        (1.76, "about 2.0 times"),
+        (7.1, "about 7.0 times"),
+        (0.5, "at most half"),
+        (0.14, "at most half"),
+        (-0.2, "at most half"),
+    ],
+)
+def test_odometry_of_odd_length_is_told_in_halves(level: float, long: str) -> None:
+    sentence = contradictions.doubt(Doubt(0, Reason.SCALE, level=level))
+    assert sentence is not None
+    start = "the pose is doubtful: it fits only if odometry is "
+    assert sentence.startswith(f"{start}{long} as long and turns as configured,")
+    assert "look at the wheels of both sides" in sentence
+
+
+@pytest.mark.parametrize(("peers", "named"), [((4,), "robot 4"), ((4, 7), "robot 4 and 7")])
+def test_windows_that_fit_no_motion_are_told_with_their_robots(
+    peers: tuple[int, ...], named: str
+) -> None:
+    sentence = contradictions.doubt(Doubt(0, Reason.WINDOWS, peers))
+    assert sentence is not None
+    start = f"the pose is doubtful: most ranges with {named} fit no motion that wheels"
+    assert sentence.startswith(start)
+    assert "look at the wheels" in sentence
+    assert "is sight blocked?" in sentence
+
+
+def test_a_pose_that_was_moved_is_told_as_what_lies_behind() -> None:
+    assert contradictions.doubt(Doubt(0, Reason.REVISIONS)) == (
+        "the pose is doubtful: later measurements moved it further than was claimed; wheels "
+        "slipped or stood, or sight was blocked, within the last half minute"
+    )
+
+
 def test_partners_in_doubt_are_named_in_order() -> None:
     assert contradictions.partners([]) is None
     assert contradictions.partners({7}) == (

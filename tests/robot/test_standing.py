@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 from robot_scenes import RobotScene
 
-from drslamd.conventions import SECOND_US
+from drslamd.conventions import SECOND_US, Chain
 from drslamd.gossip.message_types import PoseState
 from drslamd.slam.doubt import MUCH_WORSE, Doubt, Reason
-from drslamd.slam.graph.estimate import Learned
+from drslamd.slam.graph.estimate import Learned, Trajectory
+from drslamd.slam.range_watch import RangeWatch
+from drslamd.slam.relative_pose.estimate import Verdict
+from drslamd.slam.relative_pose.mounting_search import MOST
+from drslamd.slam.revisions import ALLOWED
 from drslamd.standing import Standing
 
 
@@ -100,3 +104,59 @@ def test_ranges_of_this_second_are_a_witness_too(seconds: int) -> None:
     assert standing(scene).is_doubted() == (is_doubt, is_doubt)
     scene.robot.front.watch.off = {4: seconds, 7: 0}
     assert standing(scene).is_doubted() == (False, is_doubt)
+
+
+@pytest.mark.parametrize(
+    ("moved_m", "boldness", "is_doubt"),
+    [(0.3, 1.0, False), (0.5, 0.25 / 0.03 / ALLOWED, False), (0.8, 0.64 / 0.03 / ALLOWED, True)],
+)
+def test_a_pose_is_as_wide_as_solutions_moved_what_was_claimed_before(
+    moved_m: float, boldness: float, is_doubt: bool
+) -> None:
+    """Solved with a sigma of 0.1 m, it was moved along x."""
+    honest, bold = driven(), driven()
+    estimate = bold.robot.back.estimate
+    assert estimate is not None
+    own = estimate.trajectories[0]
+    moved = replace(own, poses=own.poses + [moved_m, 0.0, 0.0])
+    bold.robot.back.on_solution(replace(estimate, trajectories={0: moved}))
+    expected, found = standing(honest).pose(), standing(bold).pose()
+    assert expected is not None
+    assert found is not None
+    assert found.covariance == pytest.approx(boldness * expected.covariance)
+    assert standing(bold).is_doubted()[0] is is_doubt
+    where = standing(bold).whereabouts(bold.utime)
+    assert where.doubt == (Doubt(0, Reason.REVISIONS) if is_doubt else None)
+    assert where.pose is not None
+    assert where.pose.covariance == pytest.approx(found.covariance)
+
+
+def test_ranges_that_are_off_widen_where_it_is_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = driven()
+    pose = standing(scene).pose()
+    assert pose is not None
+    monkeypatch.setattr(RangeWatch, "gap_m", 0.7)
+    where = standing(scene).whereabouts(scene.utime)
+    assert where.state is PoseState.LOCALISED
+    assert where.pose is not None
+    wider = pose.covariance + np.diag([0.49, 0.49, 0.0])
+    assert where.pose.covariance == pytest.approx(wider)
+
+
+@pytest.mark.parametrize("is_solved", [True, False])
+@pytest.mark.parametrize("windows", [MOST - 1, MOST])
+def test_windows_with_robots_of_the_solution_are_a_witness(windows: int, is_solved: bool) -> None:
+    scene = driven()
+    estimate = scene.robot.back.estimate
+    assert estimate is not None
+    peer = Trajectory(Chain(4, 1), np.array([1_000]), np.zeros((1, 3)))
+    trajectories = {**estimate.trajectories, 4: peer}
+    both = replace(estimate, trajectories=trajectories, joint=0.01 * np.eye(6))
+    scene.robot.back.on_solution(both if is_solved else estimate)
+    pair = scene.own_pair(4)
+    for _ in range(windows):
+        pair.search.on_verdict(Verdict.POOR_FIT)
+    is_doubt = is_solved and windows == MOST
+    expected = Doubt(0, Reason.WINDOWS, (4,)) if is_doubt else None
+    assert standing(scene).whereabouts(scene.utime).doubt == expected
+    assert standing(scene).is_doubted() == (is_doubt, is_doubt)

@@ -35,11 +35,15 @@ def a_track(*speeds_mps: float, turning: float = 0.0) -> Track:
 
 
 def after(
-    age_us: int, track: Track | None = None, most_mps: float = 3.0, doubt: Doubt | None = None
+    age_us: int,
+    track: Track | None = None,
+    most_mps: float = 3.0,
+    doubt: Doubt | None = None,
+    gap_m: float = 0.0,
 ) -> Whereabouts:
     """What is said of a robot so long after its last pose."""
     found = PoseNow(T0, np.array([1.0, 2.0, 0.5]), COVARIANCE)
-    return whereabouts(found, track or a_track(0.5), most_mps, doubt, T0 + age_us)
+    return whereabouts(found, track or a_track(0.5), most_mps, doubt, T0 + age_us, gap_m)
 
 
 # what a pose is worth
@@ -69,6 +73,29 @@ def test_what_is_doubted_is_said_with_its_reason_and_is_as_wide_as_it_was(age_us
     assert not where.is_old
     assert where.pose is not None
     assert np.array_equal(where.pose.covariance, COVARIANCE)
+
+
+@pytest.mark.parametrize("doubt", [None, DOUBT])
+@pytest.mark.parametrize("age_us", [0, SECOND_US])
+def test_a_pose_may_be_off_by_as_much_as_ranges_of_now_are_and_its_angle_is_as_it_was(
+    age_us: int, doubt: Doubt | None
+) -> None:
+    where = after(age_us, doubt=doubt, gap_m=0.7)
+    assert where.state is (PoseState.DOUBTFUL if doubt else PoseState.LOCALISED)
+    assert where.pose is not None
+    assert where.pose.covariance == pytest.approx(COVARIANCE + np.diag([0.49, 0.49, 0.0]))
+    assert np.array_equal(where.pose.pose, [1.0, 2.0, 0.5])
+    # what was given is left as it was
+    assert COVARIANCE[0, 0] == 0.09
+
+
+def test_what_was_ranged_says_nothing_of_an_old_pose() -> None:
+    old, wide = after(3 * SECOND_US), after(3 * SECOND_US, gap_m=50.0)
+    assert old.pose is not None
+    assert wide.pose is not None
+    assert wide.state is PoseState.STALE
+    assert np.array_equal(wide.pose.covariance, old.pose.covariance)
+    assert after(601 * SECOND_US, gap_m=50.0) == NOWHERE
 
 
 def test_an_old_pose_is_old_whatever_was_doubted_of_it() -> None:

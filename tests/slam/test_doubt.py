@@ -116,9 +116,10 @@ def test_partners_are_doubted_by_what_was_solved_and_by_what_is_ranged_now() -> 
 def test_odometry_of_another_length_that_turns_as_configured_is_no_mounting(
     scale: float, is_odd: bool
 ) -> None:
+    """A positive scale says that ways are shorter."""
     estimate = replace(team(), scale={1: Learned(scale, 0.01)})
     found = doubt_of(1, estimate)
-    assert found == (Doubt(1, Reason.SCALE, level=1 + scale) if is_odd else None)
+    assert found == (Doubt(1, Reason.SCALE, level=1 - scale) if is_odd else None)
     # who miscounts both sides turns as wrongly, and that is learned
     assert doubt_of(1, replace(estimate, turn={1: Learned(scale, 0.01)})) is None
 

@@ -5,15 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from front_scenes import SECONDS, FrontScene
+from pair_scenes import tracker
 from slam_scenes import product
 
 from drslamd.conventions import GRID_US, SECOND_US, Chain, Segment
 from drslamd.sensors.samples import Motion
+from drslamd.slam.closure_method import AGREEMENT
+from drslamd.slam.doubt import NOBODY, Partners
 from drslamd.slam.front_end import WhatIfJob
 from drslamd.slam.graph.estimate import Learned, TeamEstimate, Trajectory
 from drslamd.slam.odometry.mounting import TRACKS
 from drslamd.slam.relative_pose.estimate import Verdict
-from drslamd.slam.relative_pose.mounting_search import APART_US, MANY
+from drslamd.slam.relative_pose.mounting_search import APART_US, MANY, MOST
 from drslamd.slam.relative_pose.what_if import CASES, Case, variants
 
 
@@ -81,6 +84,23 @@ def test_a_pair_that_waits_to_be_believed_is_asked_too() -> None:
     pair.connected = True
     scene.drive(5)
     assert asked(scene) == []
+
+
+# windows as a witness
+
+
+def test_partners_are_those_of_our_pairs_that_are_solved_and_windows_name_who_is_wrong() -> None:
+    """Windows with robot 1 fit but for one too few, with 2 and 4 they do not; 4 is not solved."""
+    front = FrontScene().front
+    assert front.partners_by_windows({0, 1}) == NOBODY
+    for robot, poor in ((1, MOST - 1), (2, MOST), (4, MOST)):
+        front.pairs[robot] = tracker(Chain(robot, 1), AGREEMENT)
+        for _ in range(poor):
+            front.pairs[robot].search.on_verdict(Verdict.POOR_FIT)
+    found = front.partners_by_windows({0, 1, 2, 3})
+    assert found == Partners(frozenset({1, 2}), frozenset({2}))
+    assert front.partners_by_windows({0, 4}).all_contradict
+    assert front.partners_by_windows(()) == NOBODY
 
 
 # ranges of now

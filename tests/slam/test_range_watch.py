@@ -130,7 +130,7 @@ BOTH_SIDES = [
 
 
 @pytest.mark.parametrize(("sigmas", "wrong"), BOTH_SIDES)
-def test_a_range_is_off_beyond_four_sigmas_of_its_noise(sigmas: float, wrong: bool) -> None:
+def test_a_range_is_off_beyond_three_sigmas_of_its_noise(sigmas: float, wrong: bool) -> None:
     assert is_off(Scene(), solved(), measured(between(), sigmas, SIGMA)) is wrong
 
 
@@ -334,3 +334,63 @@ def test_antennas_that_touch_have_a_direction_of_any_kind() -> None:
     there = Trajectory(Chain(PARTNER, 1), np.array([SOLVED + AHEAD]), peer[None])
     estimate = replace(solved(), trajectories={**solved().trajectories, PARTNER: there})
     assert is_off(scene, estimate, 1.25) is False
+
+
+# by how much
+
+TWIN = 7
+"""Another partner, that drives where the first one does."""
+
+
+def gap_m(**metres_off: float) -> float:
+    """Of one second in which ranges to the partner, to its twin, or to both are so far off."""
+    scene = Scene()
+    twin = ChainData(Chain(TWIN, 1))
+    twin.take_model(0, MODELS[1])
+    for n in range(SOLVED, NEWEST + 1, 10):
+        twin.add(Keyframe(n + AHEAD, 0, *scene.steps(n)))
+    one = solved()
+    there = Trajectory(Chain(TWIN, 1), np.array([SOLVED + AHEAD]), W_PARTNER[None])
+    trajectories, biases = {**one.trajectories, TWIN: there}, {**one.bias_m, (OWN, TWIN): SURE}
+    estimate = replace(one, trajectories=trajectories, bias_m=biases, joint=np.zeros((9, 9)))
+    partners = {}
+    for name, data in (("partner", scene.partner), ("twin", twin)):
+        scene.ranges = RangeBuffer(10.0)
+        if name in metres_off:
+            metres = measured(between() + metres_off[name], 0.0, SIGMA)
+            scene.hear(metres, NEWEST - 8, NEWEST + 1)
+        partners[data.chain.robot] = Partner(data, AHEAD * GRID_US, scene.ranges)
+    scene.watch.look(estimate, PairEnd(scene.track, scene.own), partners, scene.utime)
+    assert len(scene.watch.looked_at) == len(metres_off)
+    # one second is no doubt yet
+    assert scene.watch.doubted == frozenset()
+    return scene.watch.gap_m
+
+
+@pytest.mark.parametrize(
+    ("partner", "twin", "least"),
+    [(2.0, 3.0, 2.0), (3.0, -2.0, 2.0), (-2.0, -3.0, 2.0), (2.0, 0.0, 0.0), (0.1, 3.0, 0.0)],
+)
+def test_a_pose_is_as_far_off_as_the_range_that_fits_best_and_not_at_all_where_one_fits(
+    partner: float, twin: float, least: float
+) -> None:
+    assert gap_m(partner=partner, twin=twin) == pytest.approx(least, abs=1e-3)
+
+
+def test_who_cannot_be_looked_at_has_no_say_in_how_far_a_pose_is_off() -> None:
+    assert gap_m(partner=2.0) == pytest.approx(2.0, abs=1e-3)
+    assert gap_m(twin=-1.5) == pytest.approx(1.5, abs=1e-3)
+    assert gap_m() == 0.0
+
+
+@pytest.mark.parametrize(("sigmas", "wrong"), BOTH_SIDES)
+def test_what_is_noise_makes_no_gap(sigmas: float, wrong: bool) -> None:
+    scene, metres = Scene(), measured(between(), sigmas, SIGMA)
+    assert scene.watch.gap_m == 0.0
+    assert is_off(scene, solved(), metres) is wrong
+    level_m = math.sqrt(metres**2 - (MODELS[1].antenna_z_m - MODELS[0].antenna_z_m) ** 2)
+    expected = abs(level_m - between()) if wrong else 0.0
+    assert scene.watch.gap_m == pytest.approx(expected, abs=1e-3)
+    # it is that of the last second only
+    assert scene.look(None) == {}
+    assert scene.watch.gap_m == 0.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pair_scenes import BESIDE, OwnedPair, asked_at
@@ -135,6 +137,59 @@ def test_a_check_that_ran_meanwhile_is_worth_nothing_too_and_the_next_one_counts
     pair.see(BESIDE, 2, first=20)
     assert pair.kept() == [1, 2]
     assert pair.tracker.connected
+
+
+@pytest.mark.parametrize("every", [True, False])
+def test_what_was_told_before_a_mistake_was_known_is_taken_back_once(every: bool) -> None:
+    """Though nothing was checked since; a withdrawal says the same closure again."""
+    pair = OwnedPair(TWO)
+    pair.see(BESIDE, 3)
+    first = pair.measurements(every)
+    assert len(first) == (3 if every else 1)
+    search(pair, Case(b=TRACKS[0]), FEWEST_ASKED - 1)
+    assert pair.told(every) == []
+    search(pair, Case(b=TRACKS[0]), 1)
+    assert pair.measurements(every) == [replace(m, kept=False) for m in first]
+    assert pair.told(every) == []
+    pair.see(BESIDE, 2, first=100)
+    assert pair.told(every)[0] == (3, True)
+
+
+def test_what_was_told_is_taken_back_before_what_was_checked_since_is_told() -> None:
+    pair = OwnedPair(TWO)
+    pair.see(BESIDE, 2)
+    assert pair.told() == [(0, True), (1, True)]
+    search(pair, Case(b=TRACKS[0]))
+    pair.see(BESIDE, 2, first=30)
+    assert pair.told() == [(0, False), (1, False), (2, True), (3, True)]
+    assert pair.told() == []
+
+
+def test_what_was_told_is_taken_back_while_a_check_runs() -> None:
+    pair = OwnedPair(TWO)
+    pair.see(BESIDE, 2)
+    assert len(pair.told()) == 2
+    pair.answer(30, BESIDE)
+    run = pair.tracker.begin_check(pair.own, pair.peer, pair.own.model.noise)
+    assert run is not None
+    search(pair, Case(b=TRACKS[0]))
+    assert pair.told() == [(0, False), (1, False)]
+    pair.tracker.on_check(run())
+    assert pair.told() == []
+
+
+def test_a_mistake_that_was_none_takes_back_what_was_told_with_it() -> None:
+    """No window fits anything that is like it."""
+    pair = OwnedPair(TWO)
+    search(pair, Case(b=TRACKS[0]))
+    pair.see(BESIDE, 2)
+    assert pair.told() == [(0, True), (1, True)]
+    for _ in range(FEWEST_ASKED):
+        assert pair.told() == []
+        pair.tracker.on_costs(asked_at(10), np.full(3, 1e4), 10.0)
+    assert pair.tracker.search.found is None
+    assert pair.told() == [(0, False), (1, False)]
+    assert pair.told() == []
 
 
 @pytest.mark.parametrize(("way_m", "confirms"), [(MOVED_M - 0.01, True), (MOVED_M + 0.01, False)])

@@ -201,8 +201,9 @@ def _run_length(wrong: NDArray[np.bool_]) -> int:
 
 
 def _scattered(sigmas: Array) -> int:
-    """As far back as the first outlier of the last ranges, if all of them scatter too much."""
+    """As far back as the oldest outlier of the last ranges, or all of them, if they scatter."""
     last = np.minimum(sigmas[:LAST], CLIPPED)
-    if len(last) < LAST or np.mean(last**2) <= MOST_SCATTER:
+    if not (len(last) == LAST and np.mean(last**2) > MOST_SCATTER):
         return 0
-    return int(np.flatnonzero(last > OUTLIER_SIGMAS)[-1]) + 1
+    wrong = np.flatnonzero(last > OUTLIER_SIGMAS)
+    return int(wrong[-1]) + 1 if len(wrong) else LAST

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from drslamd.slam.optimizer.banded.misfit import (
     RUN,
     Misfit,
     Run,
+    contradicted,
     guessed_misfit,
     misfit,
     outlier_share,
@@ -219,3 +221,86 @@ def test_without_ranges_there_is_no_run() -> None:
     point = Point.of(problem, point.poses, point.calibration)
     assert runs(problem, point) == []
     assert outlier_share(problem, point).tolist() == [0, 0, 0]
+
+
+# ranges that scatter without a run
+
+BAD = 9.0
+
+
+def scattered(*sigmas: float) -> int:
+    """Ranges of the run that is found among these, oldest first; 0 if none is."""
+    found = runs(*errs(np.array(sigmas)))
+    assert len(found) < 2
+    return found[0].count if found else 0
+
+
+@pytest.mark.parametrize(("sign", "last"), [(1.0, 0.0), (-1.0, 0.0), (-1.0, BAD)])
+def test_outliers_of_both_signs_are_a_misfit_without_a_run(sign: float, last: float) -> None:
+    """Four or five of the last ten, back to the oldest of them."""
+    sigmas = [0.0, 0.0, BAD, 0.0, sign * BAD, 0.0, BAD, 0.0, sign * BAD, last]
+    assert scattered(*sigmas) == 8
+
+
+@pytest.mark.parametrize(("rest", "count"), [(0.0, 0), (1.06, 0), (1.08, 4)])
+def test_a_burst_of_three_is_a_misfit_only_if_the_others_scatter_too(
+    rest: float, count: int
+) -> None:
+    """However long its ranges are, they count as three sigmas: (3 * 9 + 7 * 1.069^2) / 10 = 3.5."""
+    for burst in (3.01, 300.0):
+        others = [rest, -rest] * 3
+        assert scattered(*others, burst, burst, burst, rest) == count
+
+
+@pytest.mark.parametrize(("sigmas", "count"), [(2.64, 0), (2.65, 9), (-2.64, 0), (-2.65, 9)])
+def test_what_is_less_than_three_sigmas_counts_as_it_is(sigmas: float, count: int) -> None:
+    """Five of ten: 2.646^2 / 2 = 3.5."""
+    assert scattered(*[0.0, sigmas] * 5) == count
+
+
+@pytest.mark.parametrize(("sigmas", "count"), [(1.86, 0), (1.88, 10), (2.49, 10)])
+def test_where_no_range_is_an_outlier_and_all_are_off_it_goes_back_to_the_last_ten(
+    sigmas: float, count: int
+) -> None:
+    """1.871^2 = 3.5."""
+    assert scattered(*[0.0] * 3, *[sigmas, -sigmas] * 5) == count
+
+
+def test_nine_ranges_are_too_few_and_older_ones_than_ten_count_for_nothing() -> None:
+    nine = [BAD, 0.0, BAD, 0.0, BAD, 0.0, BAD, BAD, 0.0]
+    assert scattered(*nine) == 0
+    assert scattered(0.0, *nine) == 9
+    assert scattered(*[BAD, 0.0] * 10) == 10
+    assert scattered(*[0.0, BAD] * 10) == 9
+    assert scattered(*[BAD, 0.0] * 10, 0.0, 0.0, 0.0, 0.0) == 0
+
+
+def test_ranges_of_which_nothing_is_known_are_no_misfit() -> None:
+    assert scattered(*[math.nan] * 12) == 0
+
+
+def test_a_run_that_goes_back_further_says_so() -> None:
+    assert scattered(*[0.0] * 4, *[BAD] * 12) == 12
+
+
+@pytest.mark.parametrize("pair", [0, 2])
+def test_a_pair_that_scatters_is_contradicted_and_the_others_are_not(pair: int) -> None:
+    """Three of ten are too few to be many; with the others they scatter."""
+    other = 2 - pair
+    numbers = np.array([pair, other] * 10)
+    sigmas = np.zeros(20)
+    for rest, is_wrong in ((1.06, False), (1.08, True)):
+        sigmas[::2] = [BAD, rest, rest, rest, -BAD, rest, rest, BAD, rest, rest]
+        found = contradicted(*errs(sigmas, numbers))
+        assert found.tolist() == [is_wrong and k == pair for k in range(3)]
+
+
+@pytest.mark.parametrize(
+    ("count", "wrong", "expected"), [(8, 4, True), (8, 3, False), (7, 3, False)]
+)
+def test_many_outliers_of_late_contradict_a_pair(count: int, wrong: int, expected: bool) -> None:
+    """Four of ten ranges, and of no fewer than eight; none of these is a run."""
+    sigmas = np.zeros(count)
+    sigmas[:wrong] = BAD
+    found = contradicted(*errs(sigmas))
+    assert found.tolist() == [expected, False, False]
