@@ -219,13 +219,13 @@ def test_who_is_not_mounted_as_configured_is_placed_by_odometry_as_it_should_hav
 def test_a_frame_begins_where_odometry_began_and_not_where_wrong_wheels_say_that_it_went(
     number: int, moves: bool
 ) -> None:
-    """An arc of 1 m to the left that turned by 0.3, before the first keyframe, of which odometry saw
-    0.2; where a later segment began nobody knows."""
+    """An arc of 1 m to the left that turned by 0.3, of which odometry saw 0.2, before the first
+    keyframe; where a later segment began nobody knows."""
     seen, true = (np.append(np.sinc(t / 2 / np.pi) * along(t / 2), t) for t in (0.2, 0.3))
     graph = PoseGraph()
     graph.insert(CHAIN, GraphEntry(0, None, keyframes([8, 18], [seen, seen], number)))
     first = corrected(graph, Segment(*CHAIN, number), {CHAIN.robot: Correction(turn=0.5)}).poses
-    assert same_pose(first[0], true if moves else seen, 1e-3)
+    assert same_pose(first[0], true if moves else seen, 5e-3)
     assert np.allclose(corrected(graph, Segment(*CHAIN, number), {}).poses[0], seen, atol=1e-4)
 
 
