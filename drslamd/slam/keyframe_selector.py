@@ -23,7 +23,8 @@ class KeyframeSelector:
         self._last: Keyframe | None = None
 
     def next(self, track: Track, is_doubted: bool = False) -> Keyframe | None:
-        """The latest sample of our odometry, if we moved since the last keyframe.
+        """The latest sample of our odometry, if we moved since the last keyframe; the first sample
+        of a segment.
 
         Args:
             is_doubted: who may move though its wheels say nothing has a place of its own each time.
@@ -34,7 +35,9 @@ class KeyframeSelector:
             self._segment += 1
             self._last = None
         self._segment_start = track.segment_start
-        n = track.end - 1
+        # the frame of a segment begins where its odometry does: what is driven until the first look
+        # is a link like any other, with its noise and with whatever is learned of the wheels
+        n = track.end - 1 if self._last is not None else max(track.n0, track.segment_start)
         x, y, theta = (int(v) for v in track.steps(n, 1)[0])
         if self._last is not None:
             last = self._last

@@ -124,7 +124,10 @@ def test_our_log_grows_by_what_we_drove_and_is_sent_to_who_is_in_range() -> None
     scene = RobotScene()
     connected(scene)
     assert len(sends(scene.tick(), "GRAPH")) == 1
+    # where it began, then where it is
     assert len(scene.robot.back.graph.chains[0].keyframes) == 1
+    assert len(sends(scene.tick(1), "GRAPH")) == 1
+    assert len(scene.robot.back.graph.chains[0].keyframes) == 2
     # who stands still adds nothing
     assert sends(scene.tick(1), "GRAPH") == []
 

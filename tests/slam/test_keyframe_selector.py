@@ -37,6 +37,22 @@ def test_the_first_sample_is_a_keyframe_in_whole_steps() -> None:
     assert Driven().first == Keyframe(100, 0, 5, -7, 3)
 
 
+@pytest.mark.parametrize("hole", [0, 5])
+def test_a_segment_begins_at_its_first_sample_however_late_one_looks(hole: int) -> None:
+    """Who drives off at once would begin the frame of the team somewhere on its way."""
+    track, selector = Track(1_000), KeyframeSelector()
+    for n in range(8):
+        track.append(50 + n, np.array([n * MOST_M, 0, 0], dtype=float))
+    assert selector.next(track) == Keyframe(50, 0, 0, 0, 0)
+    assert selector.next(track) == Keyframe(57, 0, 7 * MOST_M, 0, 0)
+    for n in range(4):
+        track.append(57 + hole + n + 1, np.array([(8 + n) * MOST_M, 0, 0], dtype=float))
+    found = selector.next(track)
+    assert found == (
+        Keyframe(58 + hole, 1, 8 * MOST_M, 0, 0) if hole else Keyframe(61, 0, 11 * MOST_M, 0, 0)
+    )
+
+
 @pytest.mark.parametrize(
     ("steps", "is_one"),
     [
@@ -90,4 +106,4 @@ def test_behind_a_hole_a_new_segment_begins_wherever_it_is() -> None:
     assert robot.next() is None
     robot.to(109, 5, -7, 3)
     robot.to(110, 5, -7, 3)
-    assert robot.next() == Keyframe(110, 2, 5, -7, 3)
+    assert robot.next() == Keyframe(109, 2, 5, -7, 3)

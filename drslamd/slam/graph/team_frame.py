@@ -25,8 +25,6 @@ from drslamd.slam.se2 import Array, Index
 
 NO_CORRECTIONS: Mapping[int, Correction] = MappingProxyType({})
 """Everybody is mounted as configured."""
-ORIGIN = np.zeros((1, 3))
-"""Where odometry begins."""
 
 
 @dataclass(frozen=True)
@@ -100,9 +98,9 @@ def placed(
         corrections: of the odometry of robots that are not mounted as configured.
     """
     out: dict[Segment, Array] = {}
-    known = _in_frame(graph, group.frame, previous, corrections)
+    known = _in_frame(graph, group.frame, previous)
     for segment in sorted(group.members):
-        keyframes = corrected(graph, segment, corrections)
+        keyframes = _corrected(graph, segment, corrections)
         trajectory = known.get(segment.robot)
         if trajectory is not None and trajectory.chain == segment.chain:
             there = np.isin(keyframes.n, trajectory.n)
@@ -110,40 +108,30 @@ def placed(
                 at = np.searchsorted(trajectory.n, keyframes.n[there])
                 out[segment] = by_odometry(keyframes, keyframes.chosen(there), trajectory.poses[at])
     if group.frame not in out:
-        out = {group.frame: corrected(graph, group.frame, corrections).poses}
+        out = {group.frame: _corrected(graph, group.frame, corrections).poses}
     while len(out) < len(group.members):
         segment, n, poses = _next_to_place(graph, group.members, out)
-        keyframes = corrected(graph, segment, corrections)
+        keyframes = _corrected(graph, segment, corrections)
         anchors = keyframes.chosen(np.searchsorted(keyframes.n, n))
         out[segment] = by_odometry(keyframes, anchors, poses)
     return out
 
 
-def corrected(
+def _corrected(
     graph: PoseGraph, segment: Segment, corrections: Mapping[int, Correction]
 ) -> KeyframeTable:
-    """The keyframes of a segment where odometry should have had them.
-
-    The first segment begins where odometry began, and that is where its frame is: half a second of
-    wrong turns before the first keyframe would turn the map of the whole team.
-    """
+    """The keyframes of a segment where odometry should have had them."""
     keyframes = graph.view.segment(segment)
     correction = corrections.get(segment.robot)
     if correction is None:
         return keyframes
     rows = keyframes.rows.copy()
-    if segment.segment == 0:
-        rows[:, 2:] = correction.path(np.concatenate([ORIGIN, keyframes.poses]))[1:]
-    else:
-        rows[:, 2:] = correction.path(keyframes.poses)
+    rows[:, 2:] = correction.path(keyframes.poses)
     return KeyframeTable(rows)
 
 
 def _in_frame(
-    graph: PoseGraph,
-    frame: Segment,
-    previous: TeamEstimate | None,
-    corrections: Mapping[int, Correction],
+    graph: PoseGraph, frame: Segment, previous: TeamEstimate | None
 ) -> dict[int, Trajectory]:
     """The previous trajectories, carried into `frame`; nothing when they do not know it."""
     if previous is None:
@@ -153,7 +141,7 @@ def _in_frame(
     old = previous.trajectories.get(frame.robot)
     if old is None or old.chain != frame.chain:
         return {}
-    keyframes = corrected(graph, frame, corrections)
+    keyframes = graph.view.segment(frame)
     known = keyframes.chosen(np.isin(keyframes.n, old.n))
     if not len(known):
         return {}

@@ -127,8 +127,7 @@ def initial_poses(
         rows = graph.view.chains[segment.robot].keyframes.of_segment(segment.segment)
         initial[places.place[segment.robot][rows]] = poses
     # where the frame is said nobody's memory of it, but the odometry that defines it
-    origin = team_frame.corrected(graph, group.frame, known).poses[0]
-    initial[gauge_place(graph, group, places)] = origin
+    initial[gauge_place(graph, group, places)] = graph.view.segment(group.frame).poses[0]
     return initial
 
 

@@ -25,14 +25,7 @@ from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.tables import KeyframeTable
-from drslamd.slam.graph.team_frame import (
-    Group,
-    by_odometry,
-    corrected,
-    gauge_segment,
-    groups,
-    placed,
-)
+from drslamd.slam.graph.team_frame import Group, by_odometry, gauge_segment, groups, placed
 from drslamd.slam.odometry.correction import Correction
 
 CHAINS = [Chain(r, 10 + r) for r in range(5)]
@@ -193,13 +186,6 @@ def wide(robots: tuple[int, ...]) -> tuple[PoseGraph, Group, dict[int, Array]]:
     return other, group, truth
 
 
-CHAIN = Chain(0, 10)
-
-
-def along(angle: float) -> Array:
-    return np.array([np.cos(angle), np.sin(angle)])
-
-
 KNOWN = {0: Correction(turn=0.5), 2: Correction(turn=0.5)}
 
 
@@ -213,20 +199,6 @@ def test_who_is_not_mounted_as_configured_is_placed_by_odometry_as_it_should_hav
     plain = placed(graph, group, None)
     assert not same_pose(plain[group.frame][-1], truth[0][-1], 1.0)
     assert np.array_equal(start[group.frame][0], plain[group.frame][0])
-
-
-@pytest.mark.parametrize(("number", "moves"), [(0, True), (1, False)])
-def test_a_frame_begins_where_odometry_began_and_not_where_wrong_wheels_say_that_it_went(
-    number: int, moves: bool
-) -> None:
-    """An arc of 1 m to the left that turned by 0.3, of which odometry saw 0.2, before the first
-    keyframe; where a later segment began nobody knows."""
-    seen, true = (np.append(np.sinc(t / 2 / np.pi) * along(t / 2), t) for t in (0.2, 0.3))
-    graph = PoseGraph()
-    graph.insert(CHAIN, GraphEntry(0, None, keyframes([8, 18], [seen, seen], number)))
-    first = corrected(graph, Segment(*CHAIN, number), {CHAIN.robot: Correction(turn=0.5)}).poses
-    assert same_pose(first[0], true if moves else seen, 5e-3)
-    assert np.allclose(corrected(graph, Segment(*CHAIN, number), {}).poses[0], seen, atol=1e-4)
 
 
 def test_its_new_keyframes_follow_the_solved_ones_by_that_odometry_too() -> None:
