@@ -11,6 +11,7 @@ from drslamd.io.can_bus import CanBus, require_python_can
 from drslamd.io.clock import Clock
 from drslamd.io.liblcm import Liblcm, require_lcm
 from drslamd.io.multicast import Multicast
+from drslamd.io.owners import denied
 from drslamd.io.serial_port import SerialPort
 from drslamd.io.transport import Transport
 
@@ -55,4 +56,5 @@ def dbc_text(config: Config) -> str:
         return path.read_text()
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
-        raise ConfigError([f"wheels.dbc_file = {str(path)!r}: {reason}"]) from None
+        remedy = denied(path) if isinstance(error, PermissionError) else "correct the path"
+        raise ConfigError([f"wheels.dbc_file = {str(path)!r}: {reason}; {remedy}"]) from None

@@ -34,7 +34,7 @@ RINGS = {
         "status_text",
     ],
     "shell": ["io"],
-    "entry": ["parts", "daemon", "cli", "__main__"],
+    "entry": ["parts", "machine", "doctor", "daemon", "cli", "__main__"],
 }
 """From the inside out; a module imports only from its own ring and those before it."""
 
@@ -99,6 +99,7 @@ NOUNS = {
     "events",
     "gossip.message_types",
     "io.transport",
+    "machine.finding",
     "sensors.samples",
     "slam.graph.measurements",
     "slam.optimizer.banded.solution",

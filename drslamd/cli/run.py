@@ -7,9 +7,14 @@ import asyncio
 import os
 import signal
 import sys
+from typing import TYPE_CHECKING, NoReturn
 
 from drslamd.cli.exit_codes import BUG, OK
 from drslamd.cli.parser import Verbs, configured_verb, load
+from drslamd.config import Config
+
+if TYPE_CHECKING:
+    from drslamd.machine.finding import Finding
 
 
 def add(verbs: Verbs) -> None:
@@ -31,6 +36,30 @@ def _run(options: argparse.Namespace) -> int:
     for number in (signal.SIGTERM, signal.SIGINT):
         # until the daemon listens itself: the modules take half a second to load
         signal.signal(number, lambda *_: os._exit(OK))
+    refused = _refusals(config)
+    if refused:
+        from drslamd.cli.verdict import exit_code, lines
+
+        print("\n".join(lines(options.config, refused)), file=sys.stderr)
+        return exit_code(refused)
+    return _serve(config)
+
+
+def _refusals(config: Config) -> list[Finding]:
+    """Why it will not start; if there is nothing, no other daemon will while this process lives."""
+    from drslamd.io.claim import Claim, holder
+    from drslamd.machine.folders import socket_path
+    from drslamd.machine.refusals import already_runs, refusals
+
+    found = refusals(config)
+    if found:
+        return found
+    path = socket_path(config)
+    return [] if Claim(path).take() else [already_runs(config, holder(path))]
+
+
+def _serve(config: Config) -> NoReturn:
+    """Until it is stopped; the process ends here."""
     import structlog
 
     from drslamd.daemon import Daemon

@@ -21,6 +21,7 @@ from drslamd.events import Datagram, Event, NetworkState
 from drslamd.gossip import lc02
 from drslamd.io.backoff import Backoff
 from drslamd.io.clock import Clock
+from drslamd.io.interfaces import fault_of
 
 IP_MULTICAST_ALL = 49
 """Linux, <linux/in.h>; the socket module does not name it."""
@@ -79,7 +80,7 @@ class Multicast:
         except OSError as error:
             self.dropped += 1
             if not isinstance(error, BlockingIOError):
-                self._fail(f"cannot send on {self._where}: {_reason(error)}")
+                self._fail(send_fault(self._section, error))
             return
         self._recent.append(datagram)
         if self._unheard_since is None:
@@ -87,15 +88,13 @@ class Multicast:
 
     @property
     def _where(self) -> str:
-        return self._section.interface or "the default interface"
+        return _where(self._section)
 
     def _open(self) -> bool:
         try:
             self._socket = open_group(self._section)
         except OSError as error:
-            hint = "" if self._section.interface else "; name one as gossip.interface"
-            why = f"cannot join {self._section.group} on {self._where}: {_reason(error)}{hint}"
-            self._state(False, why)
+            self._state(False, join_fault(self._section, error))
             return False
         self._failed.clear()
         self._unheard_since = None
@@ -122,7 +121,7 @@ class Multicast:
             except BlockingIOError:
                 return
             except OSError as error:
-                self._fail(f"cannot receive on {self._where}: {_reason(error)}")
+                self._fail(f"cannot receive on {self._where}: {error.strerror or error}")
                 return
             if data in self._recent:
                 self._heard_ourselves()
@@ -150,8 +149,25 @@ class Multicast:
             self._deliver(NetworkState(self._clock.now(), up, detail))
 
 
-def _reason(error: OSError) -> str:
-    return error.strerror or str(error)
+def join_fault(section: GossipSection, error: OSError) -> str:
+    """Why the group cannot be joined."""
+    return f"cannot join {section.group} on {_where(section)}: {_reason(section, error)}"
+
+
+def send_fault(section: GossipSection, error: OSError) -> str:
+    """Why nothing can be sent to the group."""
+    return f"cannot send on {_where(section)}: {_reason(section, error)}"
+
+
+def _where(section: GossipSection) -> str:
+    return section.interface or "the default interface"
+
+
+def _reason(section: GossipSection, error: OSError) -> str:
+    """What the kernel says, and what it does not say of the interface."""
+    if not section.interface:
+        return f"{error.strerror or error}; name one as gossip.interface"
+    return fault_of(section.interface) or error.strerror or str(error)
 
 
 def open_group(section: GossipSection) -> socket.socket:

@@ -1,0 +1,43 @@
+"""The network of the team: can the group be joined, and does the interface carry anything?"""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Iterator
+
+from drslamd.config import Config
+from drslamd.io.interfaces import fault_of, interfaces
+from drslamd.io.multicast import join_fault, open_group, send_fault
+from drslamd.machine.finding import Finding, Severity
+from drslamd.machine.host import Host
+
+CHECK = "network"
+
+
+def network(config: Config, host: Host) -> Iterator[Finding]:
+    """What the daemon would wait for; the providers of liblcm are their own affair."""
+    section = config.gossip
+    if section.provider != "native":
+        return
+    try:
+        open_group(section).close()
+    except OSError as error:
+        yield _warning(join_fault(section, error))
+        return
+    named = next((i for i in interfaces(host.net) if i.name == section.interface), None)
+    if named is None:
+        return
+    if fault_of(named.name, host.net):
+        unreachable = OSError(errno.ENETUNREACH, os.strerror(errno.ENETUNREACH))
+        yield _warning(send_fault(section, unreachable))
+    elif host.text(host.net / named.name / "carrier") == "0":
+        yield _warning(
+            f"gossip.interface = {named.name!r}: not connected to anything; plug its cable in, or "
+            "join the wireless network"
+        )
+
+
+def _warning(sentence: str) -> Finding:
+    cause, _, remedy = sentence.partition("; ")
+    return Finding(CHECK, Severity.WARNING, cause, remedy or "correct gossip.interface")
