@@ -64,12 +64,9 @@ def _misspelt_choice(fault: Any, root: type[BaseModel]) -> list[tuple[int, str]]
     key, _, field = _place(fault["loc"], root)
     assert field is not None
     chooser = str(field.discriminator)
+    hint = f"unknown key; did you mean {chooser}?"
     return [
-        (
-            _MISSPELT,
-            f"{key}.{_shown_key(name)} = {_shown(fault['input'][name])}: unknown key; "
-            f"did you mean {chooser}?",
-        )
+        (_MISSPELT, f"{key}.{_shown_key(name)} = {_shown(fault['input'][name])}: {hint}")
         for name in _close(chooser, fault["input"])
     ]
 

@@ -7,14 +7,11 @@ import asyncio
 import os
 import signal
 import sys
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 from drslamd.cli.exit_codes import BUG, OK
 from drslamd.cli.parser import Verbs, configured_verb, load
 from drslamd.config import Config
-
-if TYPE_CHECKING:
-    from drslamd.machine.finding import Finding
 
 
 def add(verbs: Verbs) -> None:
@@ -33,29 +30,27 @@ def _run(options: argparse.Namespace) -> int:
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     config = load(options.config)  # before the modules that take their time
-    for number in (signal.SIGTERM, signal.SIGINT):
-        # until the daemon listens itself: the modules take half a second to load
-        signal.signal(number, lambda *_: os._exit(OK))
-    refused = _refusals(config)
-    if refused:
-        from drslamd.cli.verdict import exit_code, lines
-
-        print("\n".join(lines(options.config, refused)), file=sys.stderr)
-        return exit_code(refused)
-    return _serve(config)
-
-
-def _refusals(config: Config) -> list[Finding]:
-    """Why it will not start; if there is nothing, no other daemon will while this process lives."""
+    _heed_signals()
+    from drslamd.cli.verdict import exit_code, lines
     from drslamd.io.claim import Claim, holder
     from drslamd.machine.folders import socket_path
     from drslamd.machine.refusals import already_runs, refusals
 
     found = refusals(config)
-    if found:
-        return found
-    path = socket_path(config)
-    return [] if Claim(path).take() else [already_runs(config, holder(path))]
+    if not found:
+        path = socket_path(config)
+        with Claim(path) as is_ours:
+            if is_ours:
+                return _serve(config)
+        found = [already_runs(config, holder(path))]
+    print("\n".join(lines(options.config, found)), file=sys.stderr)
+    return exit_code(found)
+
+
+def _heed_signals() -> None:
+    """Until the daemon listens itself: the modules take half a second to load."""
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: os._exit(OK))
 
 
 def _serve(config: Config) -> NoReturn:

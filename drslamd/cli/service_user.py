@@ -41,7 +41,7 @@ def as_user(name: str, look: Callable[[], int]) -> int:
         print(f"--user {name}: there is no such user", file=sys.stderr)
         return USAGE
     if os.geteuid() not in (0, user.pw_uid):
-        print(f"--user {name}: only root may look as another user: sudo drslamd check ...")
+        print(f"--user {name}: only root may look as another user; use sudo", file=sys.stderr)
         return USAGE
     sys.stdout.flush()
     child = os.fork()

@@ -20,14 +20,20 @@ MAX_PID_BYTES = 16
 
 
 class Claim:
-    """Of one process to one status socket."""
+    """Of one process to one status socket; a context that says whether it is ours."""
 
     def __init__(self, socket_path: Path) -> None:
         self._path = lock_path(socket_path)
         self._descriptor = -1
 
+    def __enter__(self) -> bool:
+        return self.take()
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
     def take(self) -> bool:
-        """False when another daemon holds it; where no file can be made there is nothing to hold."""
+        """False when another holds it; where no file can be made there is nothing to hold."""
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             self._descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)

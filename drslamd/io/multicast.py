@@ -15,13 +15,14 @@ import socket
 import struct
 from collections import deque
 from collections.abc import Callable
+from pathlib import Path
 
 from drslamd.config import GossipSection
 from drslamd.events import Datagram, Event, NetworkState
 from drslamd.gossip import lc02
 from drslamd.io.backoff import Backoff
 from drslamd.io.clock import Clock
-from drslamd.io.interfaces import fault_of
+from drslamd.io.interfaces import SYSFS, fault_of
 
 IP_MULTICAST_ALL = 49
 """Linux, <linux/in.h>; the socket module does not name it."""
@@ -154,20 +155,20 @@ def join_fault(section: GossipSection, error: OSError) -> str:
     return f"cannot join {section.group} on {_where(section)}: {_reason(section, error)}"
 
 
-def send_fault(section: GossipSection, error: OSError) -> str:
+def send_fault(section: GossipSection, error: OSError, sysfs: Path = SYSFS) -> str:
     """Why nothing can be sent to the group."""
-    return f"cannot send on {_where(section)}: {_reason(section, error)}"
+    return f"cannot send on {_where(section)}: {_reason(section, error, sysfs)}"
 
 
 def _where(section: GossipSection) -> str:
     return section.interface or "the default interface"
 
 
-def _reason(section: GossipSection, error: OSError) -> str:
+def _reason(section: GossipSection, error: OSError, sysfs: Path = SYSFS) -> str:
     """What the kernel says, and what it does not say of the interface."""
     if not section.interface:
         return f"{error.strerror or error}; name one as gossip.interface"
-    return fault_of(section.interface) or error.strerror or str(error)
+    return fault_of(section.interface, sysfs) or error.strerror or str(error)
 
 
 def open_group(section: GossipSection) -> socket.socket:

@@ -46,8 +46,11 @@ def barrier(path: Path) -> Path:
 def denied(path: Path) -> str:
     """A remedy for a file that may not be read."""
     wall = barrier(path)
-    of = f"{wall}: {permissions(wall)}" if permissions(wall) else f"{wall}"
-    return f"this is user {user_name()}, and {of}; chown it to the user that runs drslamd"
+    seen = permissions(wall)
+    whose = f"{wall} has {seen}" if seen else f"{wall} cannot be seen"
+    is_ours = bool(seen) and wall.stat().st_uid == os.geteuid()
+    mend = f"chmod u+rX {wall}" if is_ours else "let it belong to the user that runs drslamd: chown"
+    return f"this is user {user_name()}, and {whose}: {mend}"
 
 
 def _user(uid: int) -> str:

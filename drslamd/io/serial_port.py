@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import errno
 import os
-import stat
 import termios
 from collections.abc import Callable
 from typing import NamedTuple
@@ -27,6 +26,7 @@ _CONDITIONS = {
     errno.EBUSY: PortCondition.BUSY,
     errno.EAGAIN: PortCondition.BUSY,
     errno.ENOTTY: PortCondition.UNFIT,
+    errno.EISDIR: PortCondition.UNFIT,
 }
 
 
@@ -40,14 +40,12 @@ class PortFault(NamedTuple):
 def opened(path: str, baud: int) -> serial.Serial | PortFault:
     """A port of our own: nobody else who asks gets it meanwhile."""
     try:
-        if not stat.S_ISCHR(os.stat(path).st_mode):
-            raise OSError(errno.ENOTTY, os.strerror(errno.ENOTTY))
         return serial.Serial(path, baud, timeout=0, write_timeout=0, exclusive=True)
     except OSError as error:
         # pyserial says only in words that a device takes no terminal's settings
         code = error.errno or (errno.ENOTTY if _is_of_terminals(error) else errno.EIO)
         condition = _CONDITIONS.get(code, PortCondition.LOST)
-        detail = "not a serial port" if code == errno.ENOTTY else os.strerror(code)
+        detail = "not a serial port" if condition is PortCondition.UNFIT else os.strerror(code)
         return PortFault(condition, f"{path}: {detail}")
     except ValueError as error:
         return PortFault(PortCondition.UNFIT, f"{path}: {error}")

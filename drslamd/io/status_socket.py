@@ -13,6 +13,8 @@ LONGEST_QUESTION = 256
 PATIENCE_S = 5.0
 MAX_PATH_BYTES = 107
 """Of a socket, without its final NUL; unix(7)."""
+PATH_TOO_LONG = "AF_UNIX path too long"
+"""What Python says of a longer one."""
 
 
 def cannot_listen(path: Path, reason: str) -> str:

@@ -26,11 +26,11 @@ def insecure(config: Config, host: Host) -> Iterator[Finding]:
 
 
 WAITS: tuple[Callable[[Config, Host], Iterator[Finding]], ...] = (
-    state_folder,
-    status_folder,
     serial_ports,
     can_link,
     network,
+    state_folder,
+    status_folder,
     insecure,
 )
 """What the daemon waits for or goes without, in the order in which one follows from another."""

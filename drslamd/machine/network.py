@@ -13,6 +13,11 @@ from drslamd.machine.finding import Finding, Severity
 from drslamd.machine.host import Host
 
 CHECK = "network"
+REMEDIES = {
+    errno.EACCES: "ports below 1024 are root's: give all robots another gossip.port",
+    errno.EADDRINUSE: "another program has the port for itself: stop it, or give all robots "
+    "another gossip.port",
+}
 
 
 def network(config: Config, host: Host) -> Iterator[Finding]:
@@ -23,14 +28,14 @@ def network(config: Config, host: Host) -> Iterator[Finding]:
     try:
         open_group(section).close()
     except OSError as error:
-        yield _warning(join_fault(section, error))
+        yield _warning(join_fault(section, error), REMEDIES.get(error.errno or 0, ""))
         return
     named = next((i for i in interfaces(host.net) if i.name == section.interface), None)
     if named is None:
         return
     if fault_of(named.name, host.net):
         unreachable = OSError(errno.ENETUNREACH, os.strerror(errno.ENETUNREACH))
-        yield _warning(send_fault(section, unreachable))
+        yield _warning(send_fault(section, unreachable, host.net))
     elif host.text(host.net / named.name / "carrier") == "0":
         yield _warning(
             f"gossip.interface = {named.name!r}: not connected to anything; plug its cable in, or "
@@ -38,6 +43,7 @@ def network(config: Config, host: Host) -> Iterator[Finding]:
         )
 
 
-def _warning(sentence: str) -> Finding:
+def _warning(sentence: str, by_reason: str = "") -> Finding:
     cause, _, remedy = sentence.partition("; ")
-    return Finding(CHECK, Severity.WARNING, cause, remedy or "correct gossip.interface")
+    remedy = remedy or by_reason or "correct gossip.interface"
+    return Finding(CHECK, Severity.WARNING, cause, remedy)

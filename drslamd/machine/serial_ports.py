@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from drslamd.io.serial_port import PortFault, opened
 from drslamd.machine.finding import Finding, Severity
 from drslamd.machine.host import Host
 
+GROUP_MAY = stat.S_IRGRP | stat.S_IWGRP
 MAX_SHOWN = 6
 """Names of devices in one sentence."""
 
@@ -81,7 +83,13 @@ def _instead(port: Port, path: str, host: Host) -> str:
 def _let_in(path: Path) -> str:
     wall = barrier(path)
     owner = permissions(wall)
-    if wall == path and owner:
-        group = group_name(path.stat().st_gid)
-        return f"this is user {user_name()}, and it has {owner}: usermod -aG {group} {user_name()}"
-    return f"this is user {user_name()}, which may not enter {wall}"
+    if wall != path or not owner:
+        return f"this is user {user_name()}, which may not enter {wall}"
+    status = path.stat()
+    has_group = status.st_gid != 0 and status.st_mode & GROUP_MAY == GROUP_MAY
+    mend = (
+        f"usermod -aG {group_name(status.st_gid)} {user_name()}, then log in again"
+        if has_group
+        else "install etc/udev/60-drslamd.rules, and plug it in again"
+    )
+    return f"this is user {user_name()}, and it has {owner}: {mend}"

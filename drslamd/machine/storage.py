@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 from drslamd.config import Config, ConfigError
 from drslamd.io.owners import barrier, permissions, user_name
 from drslamd.io.state_store import StateStore, cannot_write
-from drslamd.io.status_socket import MAX_PATH_BYTES, cannot_listen
+from drslamd.io.status_socket import MAX_PATH_BYTES, PATH_TOO_LONG, cannot_listen
 from drslamd.machine.finding import Finding, Severity
 from drslamd.machine.folders import socket_path, state_dir
 from drslamd.machine.host import Host
@@ -43,11 +44,11 @@ def status_folder(config: Config, host: Host) -> Iterator[Finding]:
         path = socket_path(config)
     except ConfigError:
         return  # a refusal
-    remedy = "name a folder that can be written in daemon.status_socket"
     if len(os.fsencode(path)) > MAX_PATH_BYTES:
-        reason = f"a path of a socket has at most {MAX_PATH_BYTES} bytes"
-        yield _warning("status socket", cannot_listen(path, reason), "shorten daemon.status_socket")
+        remedy = f"shorten daemon.status_socket to {MAX_PATH_BYTES} bytes"
+        yield _warning("status socket", cannot_listen(path, PATH_TOO_LONG), remedy)
     elif reason := _obstacle(path.parent, path.with_suffix(".check"), "RUNTIME_DIRECTORY"):
+        remedy = _open_up(path.parent, "daemon.status_socket")
         yield _warning("status socket", cannot_listen(path, reason), remedy)
 
 
@@ -70,14 +71,19 @@ def _obstacle(folder: Path, trial: Path, variable: str) -> str:
         trial.unlink()
         return ""
     above = _nearest(folder)
-    if above == folder or not os.path.isdir(above):
-        return "a file stands where the folder should be"
+    if above == folder:
+        return os.strerror(errno.EEXIST)
+    if not os.path.isdir(above):
+        return os.strerror(errno.ENOTDIR)
     allowed = os.access(above, os.W_OK | os.X_OK, effective_ids=True)
     return "" if allowed else "Permission denied"
 
 
 def _open_up(folder: Path, key: str) -> str:
-    wall = barrier(_nearest(folder))
+    above = _nearest(folder)
+    if not os.path.isdir(above):
+        return f"{above} is a file and no folder: name another in {key}"
+    wall = barrier(above)
     return (
         f"this is user {user_name()}, and {wall} has {permissions(wall) or 'no owner'}: make it "
         f"writable, or name another folder in {key}"

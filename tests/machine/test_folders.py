@@ -96,7 +96,9 @@ def test_without_a_home_there_is_no_folder_and_a_sentence_says_which_key_to_set(
     else:
         monkeypatch.setenv("HOME", home)
     for place in (state_dir, socket_path, socket_to_ask):
-        with pytest.raises(ConfigError, match=r"daemon\.state_dir: not given, .* \(HOME is not set"):
+        with pytest.raises(
+            ConfigError, match=r"daemon\.state_dir: not given, .* \(HOME is not set"
+        ):
             place(at())
     assert state_dir(at(state_dir="/data")) == Path("/data")
 
