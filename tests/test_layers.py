@@ -32,6 +32,7 @@ RINGS = {
         "robot",
         "report",
         "status_text",
+        "status_table",
     ],
     "shell": ["io"],
     "entry": ["parts", "machine", "doctor", "daemon", "cli", "__main__"],
