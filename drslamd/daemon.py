@@ -33,7 +33,7 @@ from drslamd.events import (
     Write,
 )
 from drslamd.gossip.seal import team_key
-from drslamd.io.clock import Clock, MonotonicClock
+from drslamd.io.clock import Clock, MonotonicClock, cpu_s
 from drslamd.io.pace import Pace
 from drslamd.io.serial_port import SerialPort
 from drslamd.io.state_store import StateStore, read_key
@@ -263,6 +263,7 @@ class Daemon:
         """The robot's own picture, and what only the process knows."""
         picture = report.status(self.robot, self._clock.now())
         picture["network"]["dropped"] = self._transport.dropped
+        picture["cpu_s"] = round(cpu_s(), 3)
         return {**picture, "ms": self._pace.milliseconds(), "loop_lag_ms": self._pace.lag()}
 
     def _one_line(self) -> str:
