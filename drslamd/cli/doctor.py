@@ -40,7 +40,8 @@ def _doctor(options: argparse.Namespace) -> int:
     config = load(options.config)
     found, no_answer = rounds.of_machine(config), ""
     try:
-        found += rounds.of_daemon(_patient(config, options.config))
+        daemon = rounds.of_daemon(_patient(config, options.config))
+        found = rounds.together(found, daemon)
     except NoAnswer as error:
         no_answer = str(error)
     refused = exit_code(found)
@@ -90,5 +91,5 @@ def _lines(found: list[Finding], no_answer: str) -> list[str]:
     if no_answer:
         return [*out, no_answer]
     if found:
-        return [*out, f"{len(found)} of what {len(names())} checks looked at is to be mended"]
+        return [*out, f"{len(found)} found by {len(names())} checks, what may be a cause first"]
     return [f"nothing is wrong; looked at: {', '.join(names())}"]

@@ -69,6 +69,12 @@ def of_daemon(patient: Patient) -> list[Finding]:
     return [finding for look in DAEMON for finding in look(patient)]
 
 
+def together(machine: list[Finding], daemon: list[Finding]) -> list[Finding]:
+    """All of it; of what both say, what the daemon says, who knows since when."""
+    told = {finding.cause for finding in daemon}
+    return [finding for finding in machine if finding.cause not in told] + daemon
+
+
 def names() -> list[str]:
     """Of all checks, in words."""
     looks = ["machine", *(look.__name__ for look in MACHINE), *(look.__name__ for look in DAEMON)]

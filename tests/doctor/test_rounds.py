@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,8 @@ from patients import Case
 from places import REPOSITORY
 
 from drslamd.conditions.health import CAUSES_FIRST
-from drslamd.doctor.rounds import DAEMON, MACHINE, names, of_daemon, of_machine
+from drslamd.doctor.patient import warning
+from drslamd.doctor.rounds import DAEMON, MACHINE, names, of_daemon, of_machine, together
 from drslamd.io.claim import Claim
 from drslamd.machine.folders import socket_path
 
@@ -18,12 +20,15 @@ from drslamd.machine.folders import socket_path
 @pytest.mark.parametrize(("folder", "looks"), [("daemon", DAEMON), ("machine", MACHINE)])
 def test_every_file_is_one_check_that_is_asked(folder: str, looks: tuple[object, ...]) -> None:
     files = {p.stem for p in (REPOSITORY / "drslamd" / "doctor" / folder).glob("[a-z]*.py")}
-    assert [look.__name__ for look in looks] == sorted(files, key=names_order(looks))  # type: ignore[attr-defined]
+    asked = [str(getattr(look, "__name__", "")) for look in looks]
+    assert sorted(asked) == sorted(files)
     assert all(name.replace("_", " ") in names() for name in files)
 
 
-def names_order(looks: tuple[object, ...]) -> object:
-    return [look.__name__ for look in looks].index  # type: ignore[attr-defined]
+def test_what_machine_and_daemon_both_say_is_told_once_with_since_when() -> None:
+    machine = [warning("network", "it is down", ""), warning("disk", "it is full", "")]
+    daemon = [replace(machine[0], since_s=9)]
+    assert together(machine, daemon) == [machine[1], daemon[0]]
 
 
 def test_of_a_robot_in_good_order_nothing_is_found() -> None:

@@ -21,7 +21,7 @@ def traffic_budget(patient: Patient) -> Iterator[Finding]:
             "raise gossip.max_bytes_per_s if the network can carry it",
         )
     dropped = patient.rate("network", "dropped")
-    if dropped > 0:
+    if dropped > 0 and patient.now["network"]["up"]:
         yield warning(
             "budget",
             f"the network did not take {dropped:.1f} messages a second",

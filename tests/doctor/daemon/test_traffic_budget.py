@@ -24,3 +24,5 @@ def test_messages_that_the_network_does_not_take() -> None:
     case.grow("network", "dropped", by=3)
     (said,) = found(traffic_budget, case)
     assert "did not take 1.5 messages a second" in said
+    case.now["network"]["up"] = False  # said by another check
+    assert found(traffic_budget, case) == []
