@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from drslamd.config import Config, ConfigError, DbcSection, SerialWheelSection
+from drslamd.host.owners import denied
 from drslamd.io.can_bus import CanBus, require_python_can
 from drslamd.io.clock import Clock
 from drslamd.io.liblcm import Liblcm, require_lcm
 from drslamd.io.multicast import Multicast
-from drslamd.io.owners import denied
 from drslamd.io.serial_port import SerialPort
 from drslamd.io.transport import Transport
 

@@ -34,7 +34,7 @@ RINGS = {
         "status_text",
         "status_table",
     ],
-    "shell": ["io"],
+    "shell": ["host", "io"],
     "entry": ["parts", "machine", "doctor", "daemon", "cli", "__main__"],
 }
 """From the inside out; a module imports only from its own ring and those before it."""

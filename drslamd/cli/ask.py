@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from drslamd.cli.parser import load
-from drslamd.io.owners import permissions, user_name
+from drslamd.host.owners import permissions, user_name
 from drslamd.io.status_socket import ask
 from drslamd.machine.folders import socket_to_ask
 

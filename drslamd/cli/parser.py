@@ -10,7 +10,7 @@ from typing import Any, NoReturn, TypeAlias
 
 from drslamd.cli.exit_codes import USAGE
 from drslamd.config import Config, ConfigError, parse
-from drslamd.io.owners import denied
+from drslamd.host.owners import denied
 
 Verbs: TypeAlias = "argparse._SubParsersAction[Any]"
 """What the parser of a verb is added to."""

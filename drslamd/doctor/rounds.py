@@ -26,9 +26,9 @@ from drslamd.doctor.machine.igmp import igmp
 from drslamd.doctor.machine.multicast_echo import multicast_echo
 from drslamd.doctor.machine.rp_filter import rp_filter
 from drslamd.doctor.patient import Patient
+from drslamd.host.kernel import Host
 from drslamd.machine.examination import examination
 from drslamd.machine.finding import Finding
-from drslamd.machine.host import Host
 from drslamd.machine.refusals import SECOND_DAEMON
 
 MACHINE: tuple[Callable[[Config, Host], Iterator[Finding]], ...] = (

@@ -20,9 +20,9 @@ from pathlib import Path
 from drslamd.config import GossipSection
 from drslamd.events import Datagram, Event, NetworkState
 from drslamd.gossip import lc02
+from drslamd.host.interfaces import SYSFS, fault_of
 from drslamd.io.backoff import Backoff
 from drslamd.io.clock import Clock
-from drslamd.io.interfaces import SYSFS, fault_of
 
 IP_MULTICAST_ALL = 49
 """Linux, <linux/in.h>; the socket module does not name it."""

@@ -20,8 +20,8 @@ from drslamd.config import ConfigError
 from drslamd.conventions import ROBOT_NAMES, SECOND_US
 from drslamd.gossip.epochs import is_kept_epoch, next_epoch
 from drslamd.gossip.seal import KEY_BYTES
+from drslamd.host.owners import denied
 from drslamd.io.clock import uptime_s, wall_s
-from drslamd.io.owners import denied
 from drslamd.slam.calibration import sensor_calibration
 
 SCHEMA = 1

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from drslamd.conditions.ports import port_cause
 from drslamd.config import CanWheelSection, Config
 from drslamd.events import PortCondition
+from drslamd.host.interfaces import CAN_TYPE, interfaces
+from drslamd.host.kernel import Host
 from drslamd.io.can_bus import opened
-from drslamd.io.interfaces import CAN_TYPE, interfaces
 from drslamd.machine.finding import Finding, Severity
-from drslamd.machine.host import Host
 
 
 def can_link(config: Config, host: Host) -> Iterator[Finding]:

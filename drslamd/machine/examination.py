@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from drslamd.config import Config
+from drslamd.host.kernel import Host
 from drslamd.machine.can_link import can_link
 from drslamd.machine.finding import Finding, Severity
-from drslamd.machine.host import Host
 from drslamd.machine.network import network
 from drslamd.machine.refusals import SECOND_DAEMON, refusals
 from drslamd.machine.serial_ports import serial_ports

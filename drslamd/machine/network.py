@@ -7,10 +7,10 @@ import os
 from collections.abc import Iterator
 
 from drslamd.config import Config
-from drslamd.io.interfaces import fault_of, interfaces
+from drslamd.host.interfaces import fault_of, interfaces
+from drslamd.host.kernel import Host
 from drslamd.io.multicast import join_fault, open_group, send_fault
 from drslamd.machine.finding import Finding, Severity
-from drslamd.machine.host import Host
 
 CHECK = "network"
 REMEDIES = {

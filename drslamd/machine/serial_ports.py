@@ -13,10 +13,10 @@ import serial
 from drslamd.conditions.ports import port_cause, port_key, port_remedy
 from drslamd.config import Config, SerialWheelSection
 from drslamd.events import Port, PortCondition
-from drslamd.io.owners import barrier, group_name, permissions, user_name
+from drslamd.host.kernel import Host
+from drslamd.host.owners import barrier, group_name, permissions, user_name
 from drslamd.io.serial_port import PortFault, opened
 from drslamd.machine.finding import Finding, Severity
-from drslamd.machine.host import Host
 
 GROUP_MAY = stat.S_IRGRP | stat.S_IWGRP
 MAX_SHOWN = 6

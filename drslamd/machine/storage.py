@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from drslamd.config import Config, ConfigError
-from drslamd.io.owners import barrier, permissions, user_name
+from drslamd.host.kernel import Host
+from drslamd.host.owners import barrier, permissions, user_name
 from drslamd.io.state_store import StateStore, cannot_write
 from drslamd.io.status_socket import MAX_PATH_BYTES, PATH_TOO_LONG, cannot_listen
 from drslamd.machine.finding import Finding, Severity
 from drslamd.machine.folders import socket_path, state_dir
-from drslamd.machine.host import Host
 
 LEAST_BYTES = 16 << 20
 """Of free room: the state is small, but a full disk is seldom alone."""

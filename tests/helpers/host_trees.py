@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from drslamd.machine.host import Host
+from drslamd.host.kernel import Host
 
 ETHERNET, CAN = 1, 280
 UP, DOWN = 0x1003, 0x1002

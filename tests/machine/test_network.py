@@ -8,7 +8,7 @@ import pytest
 from daemon_scenes import configured
 from host_trees import DOWN, HostTree
 
-from drslamd.io import interfaces
+from drslamd.host import interfaces
 from drslamd.machine import network as module
 from drslamd.machine.network import network
 

@@ -10,8 +10,8 @@ from host_trees import HostTree
 from setup_scenes import give_away, healthy, nobody
 
 from drslamd.cli.parser import load
+from drslamd.host.kernel import Host
 from drslamd.machine import storage
-from drslamd.machine.host import Host
 from drslamd.machine.storage import LEAST_BYTES, state_folder, status_folder
 
 

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from drslamd.config import CanWheelSection, Config
+from drslamd.host.kernel import Host
 from drslamd.machine.finding import Finding, Severity
-from drslamd.machine.host import Host
 
 PATIENCE_S = 5.0
 WIRING = "look at CAN-H and CAN-L, at both 120 ohm terminators and at the bit rate of all nodes"

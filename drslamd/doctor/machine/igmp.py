@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterator
 
 from drslamd.config import Config
-from drslamd.io.interfaces import interface_of
+from drslamd.host.interfaces import interface_of
+from drslamd.host.kernel import Host
 from drslamd.machine.finding import Finding, Severity
-from drslamd.machine.host import Host
 
 _LINK = re.compile(r"^\d+\s+(\S+)\s*:\s*\d+\s+(V\d)", re.MULTILINE)
 """A line of /proc/net/igmp that begins the groups of an interface."""

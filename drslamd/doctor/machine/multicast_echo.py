@@ -8,9 +8,9 @@ import time
 from collections.abc import Iterator
 
 from drslamd.config import Config
+from drslamd.host.kernel import Host
 from drslamd.io.multicast import open_group
 from drslamd.machine.finding import Finding, Severity
-from drslamd.machine.host import Host
 
 PATIENCE_S = 0.5
 TRIAL = b"drslamd doctor "

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from drslamd.config import Config
-from drslamd.io.interfaces import interface_of, interfaces
+from drslamd.host.interfaces import interface_of, interfaces
+from drslamd.host.kernel import Host
 from drslamd.machine.finding import Finding, Severity
-from drslamd.machine.host import Host
 
 STRICT = 1
 """RFC 3704 strict mode: Linux, Documentation/networking/ip-sysctl."""

@@ -10,7 +10,7 @@ from patients import configuration
 
 from drslamd.config import parse
 from drslamd.doctor.machine.can_state import can_state
-from drslamd.machine.host import Host
+from drslamd.host.kernel import Host
 
 TOML = """
 robot.id = 1

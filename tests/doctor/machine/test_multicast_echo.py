@@ -10,7 +10,7 @@ from patients import configuration
 from drslamd.config import Config, GossipSection
 from drslamd.doctor.machine import multicast_echo as module
 from drslamd.doctor.machine.multicast_echo import multicast_echo
-from drslamd.machine.host import Host
+from drslamd.host.kernel import Host
 
 
 def on(interface: str, **more: object) -> Config:

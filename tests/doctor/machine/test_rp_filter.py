@@ -9,7 +9,7 @@ from host_trees import HostTree
 from patients import configuration
 
 from drslamd.doctor.machine.rp_filter import rp_filter
-from drslamd.io import interfaces
+from drslamd.host import interfaces
 
 
 @pytest.fixture

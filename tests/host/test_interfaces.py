@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from drslamd.io import interfaces as module
-from drslamd.io.interfaces import CAN_TYPE, fault_of, interface_of, interfaces
+from drslamd.host import interfaces as module
+from drslamd.host.interfaces import CAN_TYPE, fault_of, interface_of, interfaces
 
 ETHERNET = 1
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from setup_scenes import NOBODY, give_away, healthy, nobody
 
-from drslamd.io.owners import barrier, denied, group_name, permissions, user_name
+from drslamd.host.owners import barrier, denied, group_name, permissions, user_name
 
 
 def test_owner_group_and_mode_are_named(tmp_path: Path) -> None:
