@@ -17,6 +17,7 @@ UP, MULTICAST = 0x1, 0x1000
 CAN_TYPE = 280
 """ARPHRD_CAN in <linux/if_arp.h>."""
 MAX_NAME = 15
+NO_ADDRESS = "the interface has no IPv4 address; give it one (DHCP, or systemd-networkd)"
 
 
 class Interface(NamedTuple):
@@ -58,7 +59,7 @@ def fault_of(name_or_address: str, sysfs: Path = SYSFS) -> str:
     if not found.is_up:
         return f"the interface is down; bring it up: ip link set {found.name} up"
     if not found.address:
-        return "the interface has no IPv4 address; give it one (DHCP, or systemd-networkd)"
+        return NO_ADDRESS
     if not found.carries_multicast and found.name != "lo":
         return f"the interface carries no multicast; ip link set {found.name} multicast on"
     return ""
@@ -78,10 +79,11 @@ def _interface(sysfs: Path, name: str) -> Interface | None:
         kind = int((sysfs / name / "type").read_text())
     except (OSError, ValueError):
         return None  # gone meanwhile, or no interface (bonding_masters)
-    return Interface(name, bool(flags & UP), bool(flags & MULTICAST), _address(name), kind)
+    return Interface(name, bool(flags & UP), bool(flags & MULTICAST), address_of(name), kind)
 
 
-def _address(name: str) -> str:
+def address_of(name: str) -> str:
+    """The first IPv4 address of an interface; empty when there is none."""
     request = struct.pack("256s", name.encode()[:MAX_NAME])
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
         try:

@@ -9,6 +9,7 @@ again when they stay away.
 from __future__ import annotations
 
 import asyncio
+import errno
 import ipaddress
 import itertools
 import socket
@@ -20,7 +21,7 @@ from pathlib import Path
 from drslamd.config import GossipSection
 from drslamd.events import Datagram, Event, NetworkState
 from drslamd.gossip import lc02
-from drslamd.host.interfaces import SYSFS, fault_of
+from drslamd.host.interfaces import NO_ADDRESS, SYSFS, address_of, fault_of
 from drslamd.io.backoff import Backoff
 from drslamd.io.clock import Clock
 
@@ -175,7 +176,7 @@ def open_group(section: GossipSection) -> socket.socket:
     """A non-blocking socket that is in the group, on the interface that is named.
 
     Raises:
-        OSError: no such interface, no route, port taken.
+        OSError: no such interface, none of its addresses, no route, port taken.
     """
     address, index = "0.0.0.0", 0
     if section.interface:
@@ -183,6 +184,9 @@ def open_group(section: GossipSection) -> socket.socket:
             address = str(ipaddress.IPv4Address(section.interface))
         except ValueError:
             index = socket.if_nametoindex(section.interface)
+            if not address_of(section.interface):
+                # the kernel would send under the address of another interface
+                raise OSError(errno.EADDRNOTAVAIL, NO_ADDRESS) from None
     member = struct.pack("4s4si", *map(socket.inet_aton, (section.group, address)), index)
     udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
     try:

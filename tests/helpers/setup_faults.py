@@ -28,6 +28,9 @@ COUNTS = (
 )
 AGILEX = '[wheels]\nsource = "agilex"\ntrack_m = 0.4\n'
 
+SOCKET = "@SOCKET@"
+"""Stands for a path in the folder of the set-up."""
+
 Make = Callable[[Setup, pytest.MonkeyPatch], object]
 
 
@@ -99,7 +102,6 @@ def _configuration() -> list[Fault]:
     def unreadable(setup: Setup, _: pytest.MonkeyPatch) -> None:
         setup.config.chmod(0)
 
-    both = "neither"
     return [
         Fault("no file", no_file, "No such file or directory", "copy etc/drslamd.toml there"),
         Fault("a folder", folder, "Is a directory", "name a file"),
@@ -116,7 +118,7 @@ def _configuration() -> list[Fault]:
         Fault("no source", changed('source = "kobuki"\n', ""), "wheels.source: missing", "allowed"),
         Fault("source misspelt", changed("source", "sorce"), "wheels.sorce", "mean source?"),
         Fault("no such base", changed('"kobuki"', '"kabuki"'), "'kabuki'", '"kobuki", "roboteq"'),
-        Fault("no key named", changed('key_file = "team.key"', ""), both, "drslamd keygen"),
+        Fault("no key named", changed('key_file = "team.key"', ""), "neither", "drslamd keygen"),
         Fault("key and none", changed("[team]", "[team]\ninsecure = true"), "both", "give either"),
         Fault("no group", changed("[gossip]", '[gossip]\ngroup = "10.0.0.1"'), "10.0.0.1", "224."),
         Fault(
@@ -265,9 +267,6 @@ def _folders() -> list[Fault]:
     ]
 
 
-SOCKET = "@SOCKET@"
-
-
 def _ports() -> list[Fault]:
     def dangling(setup: Setup, _: pytest.MonkeyPatch) -> None:
         name = setup.folder / "usb-LINKTRACK-if00"
@@ -314,7 +313,6 @@ def _ports() -> list[Fault]:
 
 def _buses_and_networks() -> list[Fault]:
     can = AGILEX + "can = "
-    at = changed
 
     def taken(setup: Setup, _: pytest.MonkeyPatch) -> None:
         setup.take_udp_port()
@@ -341,19 +339,19 @@ def _buses_and_networks() -> list[Fault]:
         ),
         _waits(
             "no interface",
-            at(interface, 'interface = "wlan9"'),
+            changed(interface, 'interface = "wlan9"'),
             "on wlan9: no interface has this",
             "there are ",
         ),
         _waits(
             "no address",
-            at(interface, 'interface = "192.0.2.99"'),
+            changed(interface, 'interface = "192.0.2.99"'),
             "no interface has this address",
             "there are ",
         ),
         _waits("port taken", taken, "Address already in use", "another gossip.port"),
         _waits(
-            "port of root", at("port = 47123", "port = 700"), "Permission denied", "gossip."
+            "port of root", changed("port = 47123", "port = 700"), "Permission denied", "gossip."
         )._replace(as_nobody=True),
     ]
 

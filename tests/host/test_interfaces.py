@@ -24,7 +24,7 @@ def tree(folder: Path, **links: tuple[int, int]) -> Path:
 @pytest.fixture
 def net(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     addresses = {"wlan0": "192.0.2.3", "eth1": "", "eth2": "192.0.2.4"}
-    monkeypatch.setattr(module, "_address", lambda name: addresses.get(name, ""))
+    monkeypatch.setattr(module, "address_of", lambda name: addresses.get(name, ""))
     (tmp_path / "bonding_masters").write_text("")
     return tree(
         tmp_path,

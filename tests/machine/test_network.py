@@ -17,7 +17,7 @@ from drslamd.machine.network import network
 def host(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> HostTree:
     """Joining works on every interface, and wlan0 has an address."""
     addresses = {"wlan0": "192.0.2.3"}
-    monkeypatch.setattr(interfaces, "_address", lambda name: addresses.get(name, ""))
+    monkeypatch.setattr(interfaces, "address_of", lambda name: addresses.get(name, ""))
 
     class Socket:
         def close(self) -> None: ...

@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
+import setup_scenes
+from namespace import hindrance
 from setup_faults import Fault, faults_that_are_waited_for
 from setup_scenes import give_away, healthy, nobody
 
@@ -31,3 +38,17 @@ def test_what_a_run_waits_for_is_a_warning_with_the_same_cause(
     assert fault.cause in checked.first
     assert fault.remedy in checked.first
     assert ran.first.startswith(checked.first.partition("; ")[0])
+
+
+def test_interfaces_that_are_down_or_without_address_or_cable_in_a_network_of_their_own() -> None:
+    if hindrance():
+        pytest.skip(hindrance())
+    script = Path(setup_scenes.__file__).with_name("setup_in_namespace.py")
+    done = subprocess.run(
+        ["unshare", "-rnm", sys.executable, str(script)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    assert done.returncode == 0, done.stdout + done.stderr

@@ -15,7 +15,7 @@ from drslamd.host import interfaces
 @pytest.fixture
 def host(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> HostTree:
     addresses = {"wlan0": "192.0.2.3", "eth0": "198.51.100.4"}
-    monkeypatch.setattr(interfaces, "_address", lambda name: addresses.get(name, ""))
+    monkeypatch.setattr(interfaces, "address_of", lambda name: addresses.get(name, ""))
     tree = HostTree(tmp_path)
     tree.link("wlan0")
     return tree
