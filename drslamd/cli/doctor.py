@@ -33,6 +33,13 @@ def add(verbs: Verbs) -> None:
 
 
 def _doctor(options: argparse.Namespace) -> int:
+    from drslamd.cli.service_user import as_user, user_of_service
+
+    user = user_of_service(options.config)
+    return as_user(user, lambda: _look(options)) if user else _look(options)
+
+
+def _look(options: argparse.Namespace) -> int:
     from drslamd.cli.ask import NoAnswer
     from drslamd.cli.verdict import exit_code
     from drslamd.doctor import rounds

@@ -6,10 +6,11 @@ import grp
 import os
 import pwd
 import sys
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 
-from drslamd.cli.exit_codes import USAGE
+from drslamd.cli.exit_codes import BUG, USAGE
 
 SERVICE_USER = "drslamd"
 """User= of systemd/drslamd@.service."""
@@ -47,12 +48,15 @@ def as_user(name: str, look: Callable[[], int]) -> int:
     child = os.fork()
     if child:
         return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    code = 70  # a bug, should anything below raise
+    code = BUG
     try:
         _become(user)
         code = look()
+    except BaseException:
+        traceback.print_exc()
     finally:
         sys.stdout.flush()
+        sys.stderr.flush()
         os._exit(code)
 
 

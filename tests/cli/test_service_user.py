@@ -11,7 +11,7 @@ from setup_scenes import healthy
 
 from drslamd import cli
 from drslamd.cli import service_user
-from drslamd.cli.exit_codes import BAD_CONFIG, OK, USAGE
+from drslamd.cli.exit_codes import BAD_CONFIG, BUG, OK, USAGE
 from drslamd.cli.service_user import as_user, user_of_service
 
 as_root = pytest.mark.skipif(os.getuid() != 0, reason="only root may look as another user")
@@ -57,6 +57,12 @@ def test_the_service_has_its_folders_and_its_groups(
     nobody = pwd.getpwnam("nobody")
     assert (state, home, int(uid)) == ("/var/lib/drslamd", nobody.pw_dir, nobody.pw_uid)
     assert str(nobody.pw_gid) in groups
+
+
+@as_root
+def test_a_bug_while_looking_is_not_swallowed(capfd: pytest.CaptureFixture[str]) -> None:
+    assert as_user("nobody", lambda: 1 // 0) == BUG
+    assert "ZeroDivisionError" in capfd.readouterr().err
 
 
 def test_a_user_that_there_is_not_is_wrong_usage(

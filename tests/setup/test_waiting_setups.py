@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 import setup_scenes
 from namespace import hindrance
-from setup_faults import Fault, faults_that_are_waited_for
+from setup_faults import Fault
 from setup_scenes import give_away, healthy, nobody
+from setup_waits import faults_that_are_waited_for
 
 FAULTS = faults_that_are_waited_for()
 
