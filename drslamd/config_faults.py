@@ -27,6 +27,10 @@ _KINDS: Final = {
 }
 _BOUNDS: Final = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
 
+_MISSPELT, _UNKNOWN, _WRONG, _MISSING, _RULE = range(5)
+"""Ranks of faults: each may be the cause of those behind it."""
+_RANKS: Final = {"missing": _MISSING, "union_tag_not_found": _MISSING, "value_error": _RULE}
+
 
 class _Place(NamedTuple):
     """A key as it stands in the file, the model that holds it, and its field if it is known."""
@@ -38,7 +42,33 @@ class _Place(NamedTuple):
 
 def sentences(error: ValidationError, root: type[BaseModel]) -> list[str]:
     """What is wrong with a file whose tables should have become a `root`."""
-    return [_sentence(fault, root) for fault in error.errors()]
+    said = [ranked for fault in error.errors() for ranked in _ranked(fault, root)]
+    return [sentence for _, sentence in sorted(said, key=lambda ranked: ranked[0])]
+
+
+def _ranked(fault: Any, root: type[BaseModel]) -> list[tuple[int, str]]:
+    """A fault's sentence with its rank: a misspelt key is why another one is missing, and comes
+    first, though pydantic tells it last.
+    """
+    kind, sentence = fault["type"], _sentence(fault, root)
+    if kind == "union_tag_not_found" and isinstance(fault["input"], dict):
+        return [*_misspelt_choice(fault, root), (_MISSING, sentence)]
+    if kind == "extra_forbidden":
+        _, model, _ = _place(fault["loc"], root)
+        return [(_MISSPELT if _close(fault["loc"][-1], model.model_fields) else _UNKNOWN, sentence)]
+    return [(_RANKS.get(kind, _WRONG), sentence)]
+
+
+def _misspelt_choice(fault: Any, root: type[BaseModel]) -> list[tuple[int, str]]:
+    """Where the key is missing that chooses a section: what was meant to be it."""
+    key, _, field = _place(fault["loc"], root)
+    assert field is not None
+    chooser = str(field.discriminator)
+    hint = f"unknown key; did you mean {chooser}?"
+    return [
+        (_MISSPELT, f"{key}.{_shown_key(name)} = {_shown(fault['input'][name])}: {hint}")
+        for name in _close(chooser, fault["input"])
+    ]
 
 
 def one_line(text: str) -> str:
@@ -132,8 +162,12 @@ def _tags(field: FieldInfo) -> str:
 
 def _nearest(name: object, model: type[BaseModel]) -> str:
     allowed = list(model.model_fields)
-    close = difflib.get_close_matches(str(name)[:SHOWN], allowed, n=1)
+    close = _close(name, allowed)
     return f"; did you mean {close[0]}?" if close else f"; allowed are {', '.join(allowed)}"
+
+
+def _close(name: object, allowed: Iterable[str]) -> list[str]:
+    return difflib.get_close_matches(str(name)[:SHOWN], list(allowed), n=1)
 
 
 def _listed(names: Iterable[str]) -> str:

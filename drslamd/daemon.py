@@ -8,11 +8,9 @@ while a solve runs; their results come back as events.
 from __future__ import annotations
 
 import asyncio
-import os
 import signal
 from collections.abc import Callable, Coroutine
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import structlog
@@ -35,13 +33,14 @@ from drslamd.events import (
     Write,
 )
 from drslamd.gossip.seal import team_key
-from drslamd.io.clock import Clock, MonotonicClock
+from drslamd.io.clock import Clock, MonotonicClock, cpu_s
 from drslamd.io.pace import Pace
 from drslamd.io.serial_port import SerialPort
 from drslamd.io.state_store import StateStore, read_key
 from drslamd.io.status_socket import StatusSocket
 from drslamd.io.systemd import Notifier
 from drslamd.io.worker import Finished, Worker
+from drslamd.machine.folders import socket_path, state_dir
 from drslamd.parts import dbc_text, make_transport, make_wheels
 from drslamd.robot import Robot
 from drslamd.slam.calibration.sensor_calibration import SensorCalibration
@@ -51,8 +50,6 @@ JOB_STUCK_US = 20 * SECOND_US
 RESTARTS_APART_US = 30 * SECOND_US
 """Between two restarts in one process, twice as long after each: a robot that is lied to about its
 own past still has a present."""
-SERVICE_RUNTIME = Path("/run/drslamd")
-"""RuntimeDirectory= of systemd/drslamd@.service."""
 
 log = structlog.get_logger()
 
@@ -266,6 +263,7 @@ class Daemon:
         """The robot's own picture, and what only the process knows."""
         picture = report.status(self.robot, self._clock.now())
         picture["network"]["dropped"] = self._transport.dropped
+        picture["cpu_s"] = round(cpu_s(), 3)
         return {**picture, "ms": self._pace.milliseconds(), "loop_lag_ms": self._pace.lag()}
 
     def _one_line(self) -> str:
@@ -297,35 +295,3 @@ def _note(note: Note) -> None:
 
 
 _LEVELS = {"info": 20, "warning": 30}
-
-
-def state_dir(config: Config) -> Path:
-    """Where this robot keeps its state: as configured, as systemd says, or in the home."""
-    named = config.daemon.state_dir or os.environ.get("STATE_DIRECTORY", "").split(":")[0]
-    return Path(named) if named else Path.home() / ".local" / "state" / "drslamd"
-
-
-def socket_path(config: Config) -> Path:
-    """Where this robot answers questions."""
-    if config.daemon.status_socket:
-        return Path(config.daemon.status_socket)
-    runtime = os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
-    return (Path(runtime) if runtime else state_dir(config)) / _socket_name(config)
-
-
-def socket_to_ask(config: Config) -> Path:
-    """Where a running daemon of this robot answers: the service's, if there is one."""
-    service = SERVICE_RUNTIME / _socket_name(config)
-    if config.daemon.status_socket or "RUNTIME_DIRECTORY" in os.environ:
-        return socket_path(config)
-    try:
-        service.stat()
-    except FileNotFoundError:
-        return socket_path(config)
-    except OSError:
-        pass  # there, but not for this user: to ask will say so
-    return service
-
-
-def _socket_name(config: Config) -> str:
-    return f"drslamd-{config.robot.id}.sock"

@@ -22,6 +22,7 @@ class PortCondition(Enum):
     MISSING = "missing"
     DENIED = "no permission"
     BUSY = "in use by another program"
+    UNFIT = "unfit"
     LOST = "lost"
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from drslamd.config import Config, ConfigError, DbcSection, SerialWheelSection
+from drslamd.host.owners import denied
 from drslamd.io.can_bus import CanBus, require_python_can
 from drslamd.io.clock import Clock
 from drslamd.io.liblcm import Liblcm, require_lcm
@@ -55,4 +56,5 @@ def dbc_text(config: Config) -> str:
         return path.read_text()
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
-        raise ConfigError([f"wheels.dbc_file = {str(path)!r}: {reason}"]) from None
+        remedy = denied(path) if isinstance(error, PermissionError) else "correct the path"
+        raise ConfigError([f"wheels.dbc_file = {str(path)!r}: {reason}; {remedy}"]) from None

@@ -30,6 +30,7 @@ def status(robot: Robot, utime: int) -> dict[str, Any]:
         "epoch": robot.own.epoch,
         "insecure": robot.config.team.insecure,
         "problems": list(robot.health.sentences().values()),
+        "conditions": _conditions(robot, utime),
         "pose": _pose(robot, utime),
         "uwb": _uwb(robot, utime),
         "wheels": _wheels(robot, utime),
@@ -38,6 +39,15 @@ def status(robot: Robot, utime: int) -> dict[str, Any]:
         "pairs": {str(k): _pair(pair) for k, pair in sorted(robot.front.pairs.items())},
         "graph": _graph(robot),
     }
+
+
+def _conditions(robot: Robot, utime: int) -> list[dict[str, Any]]:
+    """The problems again, with their keys and since when they hold; causes first."""
+    ages = robot.health.ages_us(utime)
+    return [
+        {"key": key, "what": sentence, "since_s": ages[key] // SECOND_US}
+        for key, sentence in robot.health.sentences().items()
+    ]
 
 
 def _pose(robot: Robot, utime: int) -> dict[str, Any]:

@@ -153,3 +153,31 @@ def test_every_kind_of_value_is_tried() -> None:
     example = tomli.loads(EXAMPLE.read_text())
     assert len(tried) == 9
     assert {type(v) for section in example.values() for v in section.values()} <= tried
+
+
+def test_a_misspelt_key_stands_before_the_one_that_is_missing_for_it() -> None:
+    text = """
+    robt.id = 1
+    team.keyfile = "x"
+    wheels.sorce = "kobuki"
+    [uwb]
+    port = 3
+    qzx = 1
+    """
+    assert [sentence.split(":")[0] for sentence in faults(text)] == [
+        "team.keyfile = 'x'",
+        "wheels.sorce = 'kobuki'",
+        "robt = {...}",
+        "uwb.qzx = 1",
+        "uwb.port = 3",
+        "robot",
+        "wheels.source",
+    ]
+    assert faults(file_with("wheels", "sorce = 3"))[0] == (
+        "wheels.sorce = 3: unknown key; did you mean source?"
+    )
+
+
+def test_a_rule_of_a_whole_section_stands_behind_what_may_be_its_cause() -> None:
+    said = faults(file_with("team", "").replace("id = 3", "id = 999"))
+    assert [sentence.split(":")[0] for sentence in said] == ["robot.id = 999", "team"]

@@ -32,9 +32,10 @@ RINGS = {
         "robot",
         "report",
         "status_text",
+        "status_table",
     ],
-    "shell": ["io"],
-    "entry": ["parts", "daemon", "cli", "__main__"],
+    "shell": ["host", "io"],
+    "entry": ["parts", "machine", "doctor", "daemon", "cli", "__main__"],
 }
 """From the inside out; a module imports only from its own ring and those before it."""
 
@@ -99,6 +100,7 @@ NOUNS = {
     "events",
     "gossip.message_types",
     "io.transport",
+    "machine.finding",
     "sensors.samples",
     "slam.graph.measurements",
     "slam.optimizer.banded.solution",

@@ -117,4 +117,4 @@ def test_a_dbc_file_that_cannot_be_read_is_one_sentence(
         path.write_bytes(content)
     with pytest.raises(ConfigError) as caught:
         dbc_text(configured(DBC.format(path)))
-    assert caught.value.faults == [f"wheels.dbc_file = '{path}': {sentence}"]
+    assert caught.value.faults == [f"wheels.dbc_file = '{path}': {sentence}; correct the path"]

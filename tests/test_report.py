@@ -37,6 +37,7 @@ def test_the_whole_picture_begins_with_who_it_is_and_what_is_wrong() -> None:
         "epoch",
         "insecure",
         "problems",
+        "conditions",
         "pose",
         "uwb",
         "wheels",

@@ -10,6 +10,7 @@ from typing import Any, NoReturn, TypeAlias
 
 from drslamd.cli.exit_codes import USAGE
 from drslamd.config import Config, ConfigError, parse
+from drslamd.host.owners import denied
 
 Verbs: TypeAlias = "argparse._SubParsersAction[Any]"
 """What the parser of a verb is added to."""
@@ -55,6 +56,17 @@ def load(path: str) -> Config:
     try:
         text = Path(path).read_text()
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not a text file"
-        raise ConfigError([reason]) from None
+        raise ConfigError([_unreadable(path, error)]) from None
     return parse(text, str(Path(path).resolve().parent))
+
+
+def _unreadable(path: str, error: OSError | UnicodeDecodeError) -> str:
+    """Why there is no configuration in a file, and what to do."""
+    if isinstance(error, FileNotFoundError):
+        return f"{error.strerror}; copy etc/drslamd.toml there and edit it"
+    if isinstance(error, PermissionError):
+        return f"{error.strerror}; {denied(Path(path))}"
+    if isinstance(error, IsADirectoryError):
+        return f"{error.strerror}; name a file in it"
+    reason = getattr(error, "strerror", None) or "not a text file"
+    return f"{reason}; name a TOML file"

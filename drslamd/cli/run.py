@@ -7,9 +7,11 @@ import asyncio
 import os
 import signal
 import sys
+from typing import NoReturn
 
 from drslamd.cli.exit_codes import BUG, OK
 from drslamd.cli.parser import Verbs, configured_verb, load
+from drslamd.config import Config
 
 
 def add(verbs: Verbs) -> None:
@@ -28,9 +30,31 @@ def _run(options: argparse.Namespace) -> int:
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     config = load(options.config)  # before the modules that take their time
+    _heed_signals()
+    from drslamd.cli.verdict import exit_code, lines
+    from drslamd.io.claim import Claim, holder
+    from drslamd.machine.folders import socket_path
+    from drslamd.machine.refusals import already_runs, refusals
+
+    found = refusals(config)
+    if not found:
+        path = socket_path(config)
+        with Claim(path) as is_ours:
+            if is_ours:
+                return _serve(config)
+        found = [already_runs(config, holder(path))]
+    print("\n".join(lines(options.config, found)), file=sys.stderr)
+    return exit_code(found)
+
+
+def _heed_signals() -> None:
+    """Until the daemon listens itself: the modules take half a second to load."""
     for number in (signal.SIGTERM, signal.SIGINT):
-        # until the daemon listens itself: the modules take half a second to load
         signal.signal(number, lambda *_: os._exit(OK))
+
+
+def _serve(config: Config) -> NoReturn:
+    """Until it is stopped; the process ends here."""
     import structlog
 
     from drslamd.daemon import Daemon

@@ -7,6 +7,7 @@ import json
 import sys
 from pathlib import Path
 
+from drslamd.cli.ask import ask_daemon
 from drslamd.cli.exit_codes import CANNOT_CREATE, OK, UNAVAILABLE
 from drslamd.cli.parser import Verbs, configured_verb
 
@@ -24,8 +25,6 @@ def add(verbs: Verbs) -> None:
 
 
 def _trajectory(options: argparse.Namespace) -> int:
-    from drslamd.cli.ask import ask_daemon  # what needs the daemon takes its time to load
-
     answer = ask_daemon(options.config, "trajectory")
     if answer is None:
         return UNAVAILABLE

@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol
 
 from drslamd.conditions import contradictions
-from drslamd.config import Config
+from drslamd.conditions.ports import port_cause, port_remedy
+from drslamd.config import Config, SerialWheelSection
 from drslamd.conventions import SECOND_US
-from drslamd.events import NetworkState, PortCondition, PortState
+from drslamd.events import NetworkState, Port, PortCondition, PortState
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.team import Team
 from drslamd.jobs import OPTIMIZER, RELATIVE_POSE, DutyCycle, Jobs
@@ -75,14 +76,16 @@ def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
 
 
 def _sensor(
-    robot: Stages, name: str, advice: Callable[[int], str | None], utime: int
+    robot: Stages, name: Port, advice: Callable[[int], str | None], utime: int
 ) -> str | None:
     """The fault of its port, or what its codec says once the port has been open for a while."""
     state = robot.ports.get(name)
     if state is None:
         return advice(utime)
     if state.condition is not PortCondition.OPEN:
-        return f"{name}: {state.condition.value}: {state.detail}"
+        cause = port_cause(name, state.condition, state.detail)
+        is_serial = name == "uwb" or isinstance(robot.config.wheels, SerialWheelSection)
+        return f"{cause}; {port_remedy(name, state.condition, is_serial)}"
     return advice(utime) if utime - state.utime > PATIENCE_US else None
 
 

@@ -16,6 +16,27 @@ MAX_CONDITIONS = 512
 """Keys name our own ports and stages and the at most 255 ids of a team."""
 
 
+CAUSES_FIRST = (
+    "team.own_id_used",
+    "uwb",
+    "wheels",
+    "network",
+    "team.wrong_tag",
+    "team.wrong_version",
+    "team.uwb_id",
+    "team.beyond_clocks",
+    "mounting",
+    "budget",
+    "load",
+    "doubt",
+    "partners",
+    "pose",
+    "state",
+)
+"""Each may be why those behind it hold: a robot without a port is not localised either."""
+_RANKS = {key: rank for rank, key in enumerate(CAUSES_FIRST)}
+
+
 @dataclass
 class _Condition:
     sentence: str
@@ -58,5 +79,12 @@ class Health:
         ]
 
     def sentences(self) -> dict[str, str]:
-        """What holds now, by key."""
-        return {key: c.sentence for key, c in sorted(self._conditions.items())}
+        """What holds now, by key, causes first."""
+        return {key: self._conditions[key].sentence for key in self._ranked()}
+
+    def ages_us(self, utime: int) -> dict[str, int]:
+        """For how long each has held, in the same order."""
+        return {key: utime - self._conditions[key].since for key in self._ranked()}
+
+    def _ranked(self) -> list[str]:
+        return sorted(self._conditions, key=lambda key: (_RANKS.get(key, len(_RANKS)), key))

@@ -45,7 +45,7 @@ class CanBus:
 
     @property
     def name(self) -> str:
-        return f"{self._section.interface} {self._section.channel}"
+        return _name(self._section)
 
     async def run(self) -> None:
         """Open, read until it fails, wait, again; ends only by cancellation."""
@@ -58,20 +58,10 @@ class CanBus:
             await backoff.wait()
 
     async def _open(self) -> can.BusABC | None:
-        import can
-
-        extra: dict[str, Any] = {}
-        if self._section.bitrate is not None:
-            extra["bitrate"] = self._section.bitrate
-        if self._section.interface == "udp_multicast":
-            extra["hop_limit"] = 0
-        try:
-            # some adapters sleep while they are set up
-            bus = await asyncio.to_thread(
-                can.Bus, self._section.channel, interface=self._section.interface, **extra
-            )
-        except (can.CanError, OSError, ValueError) as error:
-            self._state(PortCondition.MISSING, f"{self.name}: {error}")
+        # some adapters sleep while they are set up
+        bus = await asyncio.to_thread(opened, self._section)
+        if isinstance(bus, str):
+            self._state(PortCondition.MISSING, bus)
             return None
         self._state(PortCondition.OPEN, self.name)
         return bus
@@ -125,6 +115,25 @@ class CanBus:
         if (condition, detail) != self._last_state:
             self._last_state = (condition, detail)
             self._deliver(PortState(self._clock.now(), "wheels", condition, detail))
+
+
+def opened(section: CanSection) -> can.BusABC | str:
+    """The bus, or why there is none."""
+    import can
+
+    extra: dict[str, Any] = {}
+    if section.bitrate is not None:
+        extra["bitrate"] = section.bitrate
+    if section.interface == "udp_multicast":
+        extra["hop_limit"] = 0
+    try:
+        return can.Bus(section.channel, interface=section.interface, **extra)
+    except (can.CanError, OSError, ValueError) as error:
+        return f"{_name(section)}: {error}"
+
+
+def _name(section: CanSection) -> str:
+    return f"{section.interface} {section.channel}"
 
 
 def _receive(bus: can.BusABC, patience_s: float) -> can.Message | Exception | None:

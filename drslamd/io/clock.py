@@ -27,3 +27,8 @@ def wall_s() -> int:
 def uptime_s() -> int:
     """Since the computer began, sleep and all."""
     return int(time.clock_gettime(time.CLOCK_BOOTTIME))
+
+
+def cpu_s() -> float:
+    """What this process has taken of the processor, s."""
+    return time.process_time()

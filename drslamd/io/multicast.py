@@ -9,16 +9,19 @@ again when they stay away.
 from __future__ import annotations
 
 import asyncio
+import errno
 import ipaddress
 import itertools
 import socket
 import struct
 from collections import deque
 from collections.abc import Callable
+from pathlib import Path
 
 from drslamd.config import GossipSection
 from drslamd.events import Datagram, Event, NetworkState
 from drslamd.gossip import lc02
+from drslamd.host.interfaces import NO_ADDRESS, SYSFS, address_of, fault_of
 from drslamd.io.backoff import Backoff
 from drslamd.io.clock import Clock
 
@@ -79,7 +82,7 @@ class Multicast:
         except OSError as error:
             self.dropped += 1
             if not isinstance(error, BlockingIOError):
-                self._fail(f"cannot send on {self._where}: {_reason(error)}")
+                self._fail(send_fault(self._section, error))
             return
         self._recent.append(datagram)
         if self._unheard_since is None:
@@ -87,15 +90,13 @@ class Multicast:
 
     @property
     def _where(self) -> str:
-        return self._section.interface or "the default interface"
+        return _where(self._section)
 
     def _open(self) -> bool:
         try:
             self._socket = open_group(self._section)
         except OSError as error:
-            hint = "" if self._section.interface else "; name one as gossip.interface"
-            why = f"cannot join {self._section.group} on {self._where}: {_reason(error)}{hint}"
-            self._state(False, why)
+            self._state(False, join_fault(self._section, error))
             return False
         self._failed.clear()
         self._unheard_since = None
@@ -122,7 +123,7 @@ class Multicast:
             except BlockingIOError:
                 return
             except OSError as error:
-                self._fail(f"cannot receive on {self._where}: {_reason(error)}")
+                self._fail(f"cannot receive on {self._where}: {error.strerror or error}")
                 return
             if data in self._recent:
                 self._heard_ourselves()
@@ -150,15 +151,32 @@ class Multicast:
             self._deliver(NetworkState(self._clock.now(), up, detail))
 
 
-def _reason(error: OSError) -> str:
-    return error.strerror or str(error)
+def join_fault(section: GossipSection, error: OSError) -> str:
+    """Why the group cannot be joined."""
+    return f"cannot join {section.group} on {_where(section)}: {_reason(section, error)}"
+
+
+def send_fault(section: GossipSection, error: OSError, sysfs: Path = SYSFS) -> str:
+    """Why nothing can be sent to the group."""
+    return f"cannot send on {_where(section)}: {_reason(section, error, sysfs)}"
+
+
+def _where(section: GossipSection) -> str:
+    return section.interface or "the default interface"
+
+
+def _reason(section: GossipSection, error: OSError, sysfs: Path = SYSFS) -> str:
+    """What the kernel says, and what it does not say of the interface."""
+    if not section.interface:
+        return f"{error.strerror or error}; name one as gossip.interface"
+    return fault_of(section.interface, sysfs) or error.strerror or str(error)
 
 
 def open_group(section: GossipSection) -> socket.socket:
     """A non-blocking socket that is in the group, on the interface that is named.
 
     Raises:
-        OSError: no such interface, no route, port taken.
+        OSError: no such interface, none of its addresses, no route, port taken.
     """
     address, index = "0.0.0.0", 0
     if section.interface:
@@ -166,6 +184,9 @@ def open_group(section: GossipSection) -> socket.socket:
             address = str(ipaddress.IPv4Address(section.interface))
         except ValueError:
             index = socket.if_nametoindex(section.interface)
+            if not address_of(section.interface):
+                # the kernel would send under the address of another interface
+                raise OSError(errno.EADDRNOTAVAIL, NO_ADDRESS) from None
     member = struct.pack("4s4si", *map(socket.inet_aton, (section.group, address)), index)
     udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
     try:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import errno
 import os
+import termios
 from collections.abc import Callable
+from typing import NamedTuple
 
 import serial
 
@@ -23,7 +25,34 @@ _CONDITIONS = {
     errno.EPERM: PortCondition.DENIED,
     errno.EBUSY: PortCondition.BUSY,
     errno.EAGAIN: PortCondition.BUSY,
+    errno.ENOTTY: PortCondition.UNFIT,
+    errno.EISDIR: PortCondition.UNFIT,
 }
+
+
+class PortFault(NamedTuple):
+    """Why a port cannot be opened."""
+
+    condition: PortCondition
+    detail: str
+
+
+def opened(path: str, baud: int) -> serial.Serial | PortFault:
+    """A port of our own: nobody else who asks gets it meanwhile."""
+    try:
+        return serial.Serial(path, baud, timeout=0, write_timeout=0, exclusive=True)
+    except OSError as error:
+        # pyserial says only in words that a device takes no terminal's settings
+        code = error.errno or (errno.ENOTTY if _is_of_terminals(error) else errno.EIO)
+        condition = _CONDITIONS.get(code, PortCondition.LOST)
+        detail = "not a serial port" if condition is PortCondition.UNFIT else os.strerror(code)
+        return PortFault(condition, f"{path}: {detail}")
+    except ValueError as error:
+        return PortFault(PortCondition.UNFIT, f"{path}: {error}")
+
+
+def _is_of_terminals(error: OSError) -> bool:
+    return isinstance(error.__context__, termios.error)
 
 
 class SerialPort:
@@ -66,21 +95,14 @@ class SerialPort:
             self._lose(error)
 
     def _open(self) -> bool:
-        try:
-            self._line = serial.Serial(
-                self._path, self._baud, timeout=0, write_timeout=0, exclusive=True
-            )
-        except (serial.SerialException, OSError) as error:
-            code = error.errno or errno.EIO
-            condition = _CONDITIONS.get(code, PortCondition.LOST)
-            self._state(condition, f"{self._path}: {os.strerror(code)}")
+        line = opened(self._path, self._baud)
+        if isinstance(line, PortFault):
+            self._state(*line)
             return False
-        except ValueError as error:
-            self._state(PortCondition.LOST, f"{self._path}: {error}")
-            return False
+        self._line = line
         self._lost.clear()
         self._state(PortCondition.OPEN, self._path)
-        asyncio.get_running_loop().add_reader(self._line.fileno(), self._read)
+        asyncio.get_running_loop().add_reader(line.fileno(), self._read)
         return True
 
     def _read(self) -> None:

@@ -20,6 +20,7 @@ from drslamd.config import ConfigError
 from drslamd.conventions import ROBOT_NAMES, SECOND_US
 from drslamd.gossip.epochs import is_kept_epoch, next_epoch
 from drslamd.gossip.seal import KEY_BYTES
+from drslamd.host.owners import denied
 from drslamd.io.clock import uptime_s, wall_s
 from drslamd.slam.calibration import sensor_calibration
 
@@ -96,9 +97,14 @@ class StateStore:
                 os.close(folder)
             self.fault = ""
         except OSError as error:
-            self.fault = f"cannot write {self.path}: {error.strerror}"
+            self.fault = cannot_write(self.path, str(error.strerror))
             with suppress(OSError):
                 fresh.unlink()
+
+
+def cannot_write(path: Path, reason: str) -> str:
+    """What is said of a state that cannot be kept."""
+    return f"cannot write {path}: {reason}"
 
 
 def _read_bounded(path: Path) -> str:
@@ -140,11 +146,13 @@ def read_key(path: str) -> bytes:
         ConfigError: missing, readable by others, or not a key.
     """
     try:
-        mode = stat.S_IMODE(os.stat(path).st_mode)
+        mode = os.stat(path).st_mode
+        if not stat.S_ISREG(mode):
+            raise ConfigError([f"team.key_file = {path!r}: not a plain file; name a file"])
         text = Path(path).read_text().strip()
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not a text file"
-        raise ConfigError([f"team.key_file = {path!r}: {reason}"]) from None
+        raise ConfigError([f"team.key_file = {path!r}: {_unreadable(path, error)}"]) from None
+    mode = stat.S_IMODE(mode)
     if mode & 0o077:
         raise ConfigError(
             [f"team.key_file = {path!r}: mode {mode:04o} lets others read it; chmod 600 {path}"]
@@ -158,6 +166,17 @@ def read_key(path: str) -> bytes:
             [f"team.key_file = {path!r}: not a team key; make one with: drslamd keygen {path}"]
         )
     return secret
+
+
+def _unreadable(path: str, error: OSError | UnicodeDecodeError) -> str:
+    """Why a key cannot be read, and what to do."""
+    if isinstance(error, UnicodeDecodeError):
+        return f"not a text file; make a key with: drslamd keygen {path}"
+    if isinstance(error, FileNotFoundError):
+        return f"{error.strerror}; copy the team's key there, or make one: drslamd keygen {path}"
+    if isinstance(error, PermissionError):
+        return f"{error.strerror}; {denied(Path(path))}"
+    return f"{error.strerror}; correct the path"
 
 
 def write_key(path: Path) -> None:

@@ -11,6 +11,15 @@ from typing import Any
 
 LONGEST_QUESTION = 256
 PATIENCE_S = 5.0
+MAX_PATH_BYTES = 107
+"""Of a socket, without its final NUL; unix(7)."""
+PATH_TOO_LONG = "AF_UNIX path too long"
+"""What Python says of a longer one."""
+
+
+def cannot_listen(path: Path, reason: str) -> str:
+    """What is said of questions that cannot come."""
+    return f"cannot listen at {path}: {reason}"
 
 
 class StatusSocket:
@@ -31,7 +40,7 @@ class StatusSocket:
             )
             os.chmod(self._path, 0o660)
         except OSError as error:
-            return f"cannot listen at {self._path}: {error.strerror}"
+            return cannot_listen(self._path, error.strerror or str(error))
         return ""
 
     async def close(self) -> None:

@@ -85,6 +85,17 @@ def test_conditions_do_not_know_of_each_other_and_are_told_in_order() -> None:
     assert health.sentences() == {"uwb": "no bytes"}
 
 
+def test_causes_stand_before_what_follows_from_them_and_each_says_since_when() -> None:
+    health = Health()
+    for second, key in enumerate(("pose", "another", "wheels", "team.own_id_used")):
+        health.set(key, key, T0 + second * SECOND_US)
+    assert list(health.sentences()) == ["team.own_id_used", "wheels", "pose", "another"]
+    ages = health.ages_us(T0 + 10 * SECOND_US)
+    assert list(ages) == list(health.sentences())
+    assert ages["pose"] == 10 * SECOND_US
+    assert ages["team.own_id_used"] == 7 * SECOND_US
+
+
 def test_there_is_an_end_to_how_many_are_held() -> None:
     health = Health()
     for k in range(MAX_CONDITIONS):

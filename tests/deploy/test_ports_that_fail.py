@@ -82,8 +82,8 @@ def test_a_port_that_is_no_serial_line(tmp_path: Path) -> None:
     name = tmp_path / "file"
     name.touch()
     with running(tmp_path, name) as daemon:
-        assert uwb_port(daemon)["port"] == "lost"
-        assert f"lost: {name}: " in daemon.ask()
+        assert uwb_port(daemon)["port"] == "unfit"
+        assert f"unfit: {name}: not a serial port" in daemon.ask()
 
 
 def test_a_robot_does_not_open_its_own_module_twice(tmp_path: Path) -> None:

@@ -83,7 +83,7 @@ def test_the_spy_sees_what_a_good_configuration_opens(tmp_path: Path) -> None:
     ("old", "new", "sentence"),
     [
         ("id = 1 ", "id = 256 ", "robot.id = 256: "),
-        ("source =", "sauce =", "wheels.source: missing; allowed are"),
+        ("source =", "sauce =", "wheels.sauce = 'kobuki': unknown key; did you mean source?"),
         ('source = "kobuki"', 'source = "kabuki"', "wheels.source = 'kabuki': allowed are"),
         ("#baud = 921600", "baudrate = 921600", "uwb.baudrate = 921600: unknown key; did you"),
         ("insecure = true", "", "team: give either key_file"),
@@ -157,7 +157,7 @@ def test_a_configuration_file_that_cannot_be_read_is_named(
 ) -> None:
     path = tmp_path / "robot.toml"
     make(path)
-    assert refusal(path) == f"{path}: {sentence}\n"
+    assert refusal(path).startswith(f"{path}: {sentence}; ")
 
 
 def test_wrong_usage_ends_with_64_and_shows_the_usage(tmp_path: Path) -> None:

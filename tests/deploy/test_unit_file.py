@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from deploy_helpers import EXAMPLE, LONGEST_STOP_S, REPOSITORY
 
-from drslamd import daemon
 from drslamd.cli import exit_codes
 from drslamd.config import parse
+from drslamd.machine import folders
 
 UNIT = REPOSITORY / "systemd" / "drslamd@.service"
 SYSUSERS = REPOSITORY / "systemd" / "drslamd.sysusers"
@@ -86,11 +86,11 @@ def test_robots_on_one_host_share_folders_but_no_file(monkeypatch: pytest.Monkey
     monkeypatch.setenv("RUNTIME_DIRECTORY", "/run/drslamd")
     text = EXAMPLE.read_text()
     robots = [parse(text.replace("\nid = 1 ", f"\nid = {number} ")) for number in (3, 4)]
-    assert [str(daemon.socket_path(robot)) for robot in robots] == [
+    assert [str(folders.socket_path(robot)) for robot in robots] == [
         "/run/drslamd/drslamd-3.sock",
         "/run/drslamd/drslamd-4.sock",
     ]
-    assert {str(daemon.state_dir(robot)) for robot in robots} == {"/var/lib/drslamd"}
+    assert {str(folders.state_dir(robot)) for robot in robots} == {"/var/lib/drslamd"}
 
 
 def test_the_user_of_the_service_is_the_one_that_sysusers_makes() -> None:

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from drslamd.io.clock import MonotonicClock, uptime_s, wall_s
+from drslamd.io.clock import MonotonicClock, cpu_s, uptime_s, wall_s
 
 
 def test_the_clock_is_the_kernels_monotonic_one() -> None:
@@ -49,3 +49,14 @@ def test_the_time_since_the_computer_began_is_that_of_the_kernel() -> None:
     with open("/proc/uptime") as file:
         seconds = float(file.read().split()[0])
     assert abs(uptime_s() - seconds) < 5
+
+
+def test_the_time_of_the_processor_grows_with_work_and_not_with_waiting() -> None:
+    before = cpu_s()
+    time.sleep(0.05)
+    waited = cpu_s()
+    end = time.process_time() + 0.02
+    while time.process_time() < end:
+        pass
+    assert waited - before < 0.04
+    assert cpu_s() - waited >= 0.02

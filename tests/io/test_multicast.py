@@ -278,20 +278,20 @@ async def test_a_team_that_says_nothing_is_no_reason_to_join_again(
 
 @pytest.mark.parametrize(
     ("where", "why"),
-    [("wlan9", ("no interface with this name", "No such device")), ("192.0.2.1", "")],
+    [
+        ("wlan9", "no interface has this name; there are "),
+        ("192.0.2.99", "no interface has this address; there are "),
+    ],
     ids=["no such interface", "an address that no interface has"],
 )
 @in_a_loop
-async def test_where_it_cannot_join_is_named_in_one_sentence(
-    where: str, why: str | tuple[str, ...]
-) -> None:
+async def test_where_it_cannot_join_is_named_in_one_sentence(where: str, why: str) -> None:
     transport, ear = native(section(where))
     async with running(transport):
         await until(ear.is_down)
         await asyncio.sleep(1.0)
     (state,) = ear.states
-    assert state.detail.startswith(f"cannot join {GROUP} on {where}: ")
-    assert state.detail.endswith(why)
+    assert state.detail.startswith(f"cannot join {GROUP} on {where}: {why}")
 
 
 @in_a_loop

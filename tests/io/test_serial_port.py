@@ -12,7 +12,7 @@ from lab.play.real_team import PseudoPort
 
 from drslamd.events import Event, PortCondition, PortState, SerialData
 from drslamd.io.clock import MonotonicClock
-from drslamd.io.serial_port import SerialPort
+from drslamd.io.serial_port import SerialPort, opened
 
 Script = Callable[[PseudoPort, SerialPort, "list[Event]"], Awaitable[None]]
 
@@ -141,9 +141,13 @@ def test_a_file_that_is_no_terminal_is_refused_with_its_name(tmp_path: Path) -> 
     plain = tmp_path / "plain"
     plain.write_text("not a tty")
     events = first_events(plain)
-    assert conditions(events) == [PortCondition.LOST]
+    assert conditions(events) == [PortCondition.UNFIT]
     assert isinstance(events[0], PortState)
-    assert str(plain) in events[0].detail
+    assert events[0].detail == f"{plain}: not a serial port"
+
+
+def test_a_device_that_is_no_terminal_is_none_either() -> None:
+    assert opened("/dev/zero", 9600) == (PortCondition.UNFIT, "/dev/zero: not a serial port")
 
 
 def first_events(path: Path) -> list[Event]:

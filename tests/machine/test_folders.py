@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from drslamd import daemon as daemon_module
-from drslamd.config import Config, parse
-from drslamd.daemon import socket_path, socket_to_ask, state_dir
+from drslamd.config import Config, ConfigError, parse
+from drslamd.machine import folders
+from drslamd.machine.folders import socket_path, socket_to_ask, state_dir
 
 CONFIG = """
 robot.id = 1
@@ -27,7 +27,7 @@ def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("STATE_DIRECTORY", "RUNTIME_DIRECTORY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    monkeypatch.setattr(daemon_module, "SERVICE_RUNTIME", tmp_path / "run")
+    monkeypatch.setattr(folders, "SERVICE_RUNTIME", tmp_path / "run")
     return tmp_path
 
 
@@ -84,3 +84,24 @@ def test_a_service_that_this_user_may_not_see_is_asked_all_the_same(
 
     monkeypatch.setattr(Path, "stat", denied)
     assert socket_to_ask(at()) == places / "run" / "drslamd-1.sock"
+
+
+@pytest.mark.parametrize("home", ["", None])
+def test_without_a_home_there_is_no_folder_and_a_sentence_says_which_key_to_set(
+    places: Path, monkeypatch: pytest.MonkeyPatch, home: str | None
+) -> None:
+    if home is None:
+        monkeypatch.delenv("HOME")
+        monkeypatch.setattr(Path, "home", no_home)
+    else:
+        monkeypatch.setenv("HOME", home)
+    for place in (state_dir, socket_path, socket_to_ask):
+        with pytest.raises(
+            ConfigError, match=r"daemon\.state_dir: not given, .* \(HOME is not set"
+        ):
+            place(at())
+    assert state_dir(at(state_dir="/data")) == Path("/data")
+
+
+def no_home() -> Path:
+    raise RuntimeError("Could not determine home directory.")

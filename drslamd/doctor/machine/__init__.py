@@ -1,0 +1,1 @@
+"""Checks of the machine, beside those of `drslamd.machine` that a start needs."""

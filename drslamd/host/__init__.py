@@ -1,0 +1,1 @@
+"""What the kernel shows of this host: users, network interfaces, devices."""

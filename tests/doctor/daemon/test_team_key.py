@@ -1,0 +1,15 @@
+"""Messages that are not taken."""
+
+from __future__ import annotations
+
+from patients import Case, found
+
+from drslamd.doctor.daemon.team_key import team_key
+
+
+def test_each_reason_is_told() -> None:
+    case = Case()
+    assert found(team_key, case) == []
+    for key in ("team.wrong_tag", "team.wrong_version", "team.beyond_clocks"):
+        case.say(key, key)
+    assert found(team_key, case) == ["team.wrong_tag", "team.wrong_version", "team.beyond_clocks"]
