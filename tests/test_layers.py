@@ -34,7 +34,7 @@ RINGS = {
         "status_text",
     ],
     "shell": ["io"],
-    "entry": ["parts", "daemon", "cli", "__main__"],
+    "entry": ["parts", "daemon", "view", "cli", "__main__"],
 }
 """From the inside out; a module imports only from its own ring and those before it."""
 

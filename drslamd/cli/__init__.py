@@ -1,7 +1,7 @@
 """The command ``drslamd``: one file for each verb.
 
-Exit codes: 0 done, 64 wrong usage, 69 no daemon answers, 70 a bug of ours, 73 a file that cannot
-be made, 78 a configuration that cannot be used.
+Exit codes: 0 done, 64 wrong usage, 69 no daemon answers (view: no aiohttp, or the port is taken),
+70 a bug of ours, 73 a file that cannot be made, 78 a configuration that cannot be used.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import argparse
 import sys
 
 from drslamd import __version__
-from drslamd.cli import check, keygen, run, status, trajectory
+from drslamd.cli import check, keygen, run, status, trajectory, view
 from drslamd.cli.exit_codes import BAD_CONFIG
 from drslamd.cli.parser import Parser
 from drslamd.config import ConfigError
@@ -21,13 +21,14 @@ examples:
   drslamd check -c /etc/drslamd/3.toml       is the configuration right?
   drslamd run -c /etc/drslamd/3.toml         the daemon (systemd: drslamd@3)
   drslamd status -c /etc/drslamd/3.toml      what it hears, and why it is not localised
+  drslamd view --interface wlan0             the team on a live map, in a browser
   drslamd trajectory -c /etc/drslamd/3.toml --tum out/
 
-exit codes: 0 done, 64 wrong usage, 69 no daemon answers, 70 a bug, 73 a file cannot be made,
-78 the configuration cannot be used
+exit codes: 0 done, 64 wrong usage, 69 no daemon answers (view: no aiohttp, or its port is taken),
+70 a bug, 73 a file cannot be made, 78 the configuration cannot be used
 """
 
-VERBS = (run, check, status, trajectory, keygen)
+VERBS = (run, check, status, view, trajectory, keygen)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -1,0 +1,114 @@
+"""The live map as one program: ears, what is known, and a window to it."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from drslamd import __version__
+from drslamd.conventions import SECOND_US
+from drslamd.events import ChannelMessage, Datagram, Event, NetworkState
+from drslamd.io.clock import Clock, MonotonicClock
+from drslamd.view.door import Door, files
+from drslamd.view.scene.hearing import Hearing
+from drslamd.view.scene.scene import Scene
+from drslamd.view.server import Piece, Server
+
+UPDATE_S = 0.1
+"""Between two updates of the poses; faster than any robot says one."""
+ALL_EVERY = 10
+"""Updates between two that say how everybody is."""
+
+Listening = Callable[[Clock, Callable[[Event], None]], Any]
+"""Makes what hears the network: an object with a coroutine `run`."""
+
+
+class LiveMap:
+    """Runs until it is stopped.
+
+    Attributes:
+        network: what is listened to, or why nothing is; up: whether something is.
+    """
+
+    def __init__(self, hearing: Hearing, listening: Listening) -> None:
+        self._clock = MonotonicClock()
+        self._began = self._clock.now()
+        self._hearing, self._scene = hearing, Scene()
+        self._listener = listening(self._clock, self.handle)
+        self.network, self.up = "not tried yet", False
+        self._stop = asyncio.Event()
+
+    async def run(self, listen: str, port: int, ready: Callable[[int], None]) -> None:
+        """Until SIGTERM, SIGINT or `stop`.
+
+        Args:
+            ready: is told the port once pages can be asked for.
+
+        Raises:
+            OSError: the address cannot be listened on.
+        """
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.add_signal_handler(number, self.stop)
+        server = Server(Door(listen, port, files()), self._everything)
+        opened = await server.open(listen, port)
+        tasks = [asyncio.ensure_future(t) for t in (self._listener.run(), self._tell(server))]
+        stopped = asyncio.ensure_future(self._stop.wait())
+        try:
+            ready(opened)
+            done, _ = await asyncio.wait([*tasks, stopped], return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()  # a bug of ours is raised
+        finally:
+            for task in (*tasks, stopped):
+                task.cancel()
+            await asyncio.gather(*tasks, stopped, return_exceptions=True)
+            await server.close()
+
+    def stop(self) -> None:
+        """End `run`."""
+        self._stop.set()
+
+    def handle(self, event: Event) -> None:
+        """What comes from the network."""
+        if isinstance(event, NetworkState):
+            self.network, self.up = event.detail, event.up
+        elif isinstance(event, (Datagram, ChannelMessage)):
+            said = self._hearing.receive(event)
+            if said is not None:
+                self._scene.take(said, self._since(event.utime))
+
+    def _since(self, utime: int) -> float:
+        return (utime - self._began) / SECOND_US
+
+    async def _tell(self, server: Server) -> None:
+        number = 0
+        while True:
+            await asyncio.sleep(UPDATE_S)
+            number += 1
+            of_all = number % ALL_EVERY == 0
+            piece = self._scene.changes(self._since(self._clock.now()), of_all)
+            if of_all:
+                piece["team"] = self._team()
+            if len(piece) > 1:
+                server.tell(piece)
+
+    def _everything(self) -> Iterator[Piece]:
+        yield {"hello": __version__, "team": self._team()}
+        yield from self._scene.everything(self._since(self._clock.now()))
+        yield {"complete": True}
+
+    def _team(self) -> Piece:
+        hearing = self._hearing
+        return {
+            "network": self.network,
+            "up": self.up,
+            "verified": hearing.verifies,
+            "trust": hearing.trust(),
+            "problems": hearing.problems(self._clock.now()),
+            "messages": hearing.accepted,
+            "octets": hearing.octets,
+            "refused": dict(hearing.refused),
+        }
