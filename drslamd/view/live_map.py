@@ -32,8 +32,8 @@ class LiveMap:
         network: what is listened to, or why nothing is; up: whether something is.
     """
 
-    def __init__(self, hearing: Hearing, listening: Listening) -> None:
-        self._clock = MonotonicClock()
+    def __init__(self, hearing: Hearing, listening: Listening, clock: Clock | None = None) -> None:
+        self._clock = clock or MonotonicClock()
         self._began = self._clock.now()
         self._hearing, self._scene = hearing, Scene()
         self._listener = listening(self._clock, self.handle)

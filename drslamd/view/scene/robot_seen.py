@@ -124,7 +124,7 @@ def _speech(seen: RobotSeen, team: Mapping[int, RobotSeen], t: float) -> list[st
 
 def _state(seen: RobotSeen) -> list[str]:
     if seen.state is PoseState.NOT_LOCALISED:
-        return ["is not localised yet: it has to meet and drive curves; `drslamd status` says more"]
+        return ["is not localised yet: it has to meet and drive curves; drslamd status says more"]
     if seen.state is PoseState.DOUBTFUL:
         return ["is in doubt: measurements contradict its pose; look at its wheels and antenna"]
     if seen.state is PoseState.STALE:

@@ -38,12 +38,18 @@ export class Panel {
     if (!isConnected) problems.unshift("drslamd view does not answer: what is shown is its last picture");
     byId("problems").hidden = !problems.length;
     set(byId("problems"), problems.join("\n"));
-    const nobody = byId("nobody");
-    nobody.hidden = robots.length > 0 || !team.isComplete;
-    if (about) {
-      set(nobody, `Nobody is heard yet on ${about.network}.\nAre the robots on? Is this the network `
-        + "interface of the team (--interface), and do group and port fit?");
-    }
+    this.nobody(team, robots, about);
+  }
+
+  nobody(team, robots, about) {
+    const card = byId("nobody"), isPlaced = team.frames().length > 0;
+    card.hidden = isPlaced || !team.isComplete || !about;
+    if (card.hidden) return;
+    set(card, robots.length
+      ? `${robots.length === 1 ? "One robot is" : `${robots.length} robots are`} heard, nobody is localised yet.\n`
+        + "They have to drive some metres of curves within UWB range of each other."
+      : `Nobody is heard yet on ${about.network}.\nAre the robots on? Is this the network interface of `
+        + "the team (--interface), and do group and port fit?");
   }
 
   frames({ team, frame }) {

@@ -1,11 +1,13 @@
 // The paths and closures: drawn once onto a layer of their own, then only what is new.
 
 import { PAGE, ofRobot } from "./colours.js";
-import { BY_ODOMETRY } from "./team.js";
+import { BY_ODOMETRY, turn } from "./team.js";
 
 const APART_PX = 2; // points nearer than this are one
+const CURVED_PX = 12; // shorter steps are straight
 const RECENT_S = 40; // so much of a path is drawn stronger, in steps that fade
 const STEPS = 8;
+const FRESH_S = 30; // closures are drawn stronger for so long, about
 
 export class PathLayer {
   constructor() {
@@ -71,14 +73,15 @@ export class PathLayer {
   }
 
   closures({ team, ids, until, selected }, camera) {
-    const { context } = this, shown = new Set(ids);
+    const { context } = this, shown = new Set(ids), { now } = team;
     for (const pair of team.pairs.values()) {
       if (!shown.has(pair.a) || !shown.has(pair.b)) continue;
       const isDim = selected !== null && selected !== pair.a && selected !== pair.b;
       for (const closure of pair.closures.values()) {
         if (until !== null && closure.t > until) continue;
         const ends = [camera.toX(closure.xa), camera.toY(closure.ya), camera.toX(closure.xb), camera.toY(closure.yb)];
-        context.globalAlpha = (closure.kept ? 0.5 : 0.8) * (isDim ? 0.25 : 1);
+        const isOld = (until ?? now) - closure.t > FRESH_S;
+        context.globalAlpha = (closure.kept ? isOld ? 0.22 : 0.6 : 0.8) * (isDim ? 0.25 : 1);
         context.strokeStyle = context.fillStyle = closure.kept ? PAGE.closure : PAGE.bad;
         context.lineWidth = 1.2;
         context.setLineDash(closure.kept ? [] : [4, 4]);
@@ -112,6 +115,7 @@ export function recent(context, path, until, head, id, isDim, camera) {
     context.beginPath();
     while (k < end) k = trace(context, path, k, end + 1, camera, (row) => path.state[row] !== BY_ODOMETRY);
     context.stroke();
+    k = end;
   }
   if (head && last >= 0 && head.age < 4) {
     context.globalAlpha = isDim ? 0.2 : 0.95;
@@ -133,12 +137,22 @@ function trace(context, path, k, end, camera, isAlike) {
     if (!path.isJoined(k)) return k;
     if (!isAlike(k)) return Math.max(k - 1, first + 1);
     const x = camera.toX(path.x[k]), y = camera.toY(path.y[k]);
-    if (Math.abs(x - px) + Math.abs(y - py) >= APART_PX || k === end - 1) {
-      context.lineTo(x, y);
+    const way = Math.abs(x - px) + Math.abs(y - py);
+    if (way >= APART_PX || k === end - 1) {
+      if (way > CURVED_PX) curve(context, path, k, px, py, x, y); else context.lineTo(x, y);
       px = x; py = y;
     }
   }
   return k;
+}
+
+// From row k - 1 to row k as a robot drives: it leaves and arrives the way that it looks.
+function curve(context, path, k, px, py, x, y) {
+  const arm = Math.hypot(x - px, y - py) / 3, from = path.theta[k - 1], to = path.theta[k];
+  const along = Math.cos(from) * (x - px) - Math.sin(from) * (y - py) > 0 ? arm : -arm; // or backwards
+  if (Math.abs(turn(from, to)) > 2) { context.lineTo(x, y); return; }
+  context.bezierCurveTo(px + along * Math.cos(from), py - along * Math.sin(from),
+    x - along * Math.cos(to), y + along * Math.sin(to), x, y);
 }
 
 function cross(context, x, y) {
