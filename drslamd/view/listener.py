@@ -15,6 +15,8 @@ from drslamd.io.multicast import open_group
 SILENCE_S = 10.0
 """Who sends nothing has no echo by which to know that the group works: after such a silence it is
 joined anew, which costs nothing when there was nobody to hear."""
+LOOK_S = 1.0
+"""How often that is looked at."""
 LARGEST = 65_536
 AT_ONCE = 64
 """Datagrams read in one go; then the pages have their turn."""
@@ -62,8 +64,10 @@ class Listener:
 
     async def _until_silent(self) -> None:
         loop = asyncio.get_running_loop()
-        while self._socket is not None and loop.time() - self._heard_at < SILENCE_S:
-            await asyncio.sleep(1.0)
+        while True:
+            await asyncio.sleep(LOOK_S)
+            if self._socket is None or loop.time() - self._heard_at >= SILENCE_S:
+                return
 
     def _read(self) -> None:
         for _ in range(AT_ONCE):

@@ -51,7 +51,11 @@ class Server:
             OSError: it is taken, or no such address is here.
         """
         server = web.Server(
-            self._answer, access_log=None, keepalive_timeout=IDLE_S, lingering_time=0.0
+            self._answer,
+            access_log=None,
+            keepalive_timeout=IDLE_S,
+            lingering_time=0.0,
+            handler_cancellation=True,  # a page that was closed frees its place at once
         )
 
         def connection() -> asyncio.BaseProtocol:

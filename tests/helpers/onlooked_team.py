@@ -23,6 +23,7 @@ from drslamd.slam.se2 import Array
 from drslamd.view.scene.hearing import Said
 
 STEP = 1e-4
+OF_THE_FIRST = Chain(0, 5)
 COVARIANCE = (0.04, 0.01, 0.0, 0.01, 0.0, 0.001)
 
 
@@ -41,7 +42,7 @@ class Actor:
     phase: float = 0.0
     ahead_s: float = 1000.0
     secret: bytes | None = None
-    frame: Chain = Chain(0, 5)
+    frame: Chain = OF_THE_FIRST
     state: PoseState = PoseState.LOCALISED
     covariance: tuple[float, ...] = COVARIANCE
     peers: tuple[int, ...] = ()
@@ -93,9 +94,7 @@ class Actor:
         """Of their middles, longer by `off_m` than the truth."""
         distance = math.dist(self.truth(t)[:2], other.truth(t)[:2]) + off_m
         zero = (0.0, 0.0)
-        return RangeMeasurement(
-            self.n(t), other.chain, other.n(t), zero, zero, distance, 0.1
-        )
+        return RangeMeasurement(self.n(t), other.chain, other.n(t), zero, zero, distance, 0.1)
 
     def closure_to(
         self, other: Actor, t: float, number: int, kept: bool = True, off_m: float = 0.0

@@ -32,6 +32,8 @@ CARRY_S = 6.0
 """A change of frame later than this after the last pose begins a new path."""
 ON_LATER_S = 12.0
 """How far a pose is carried on by odometry to a later keyframe."""
+DUE_S = 1.5
+"""A robot that moves has made another keyframe after this time."""
 BY_ODOMETRY = 9
 """In the place of a pose's state: before the robot was localised."""
 NO_CLOCK = -1e9
@@ -146,14 +148,17 @@ class RobotPath:
     def _odometry(self, own: float) -> tuple[float, Array] | None:
         """Segment and odometry pose at a time of the robot's clock.
 
-        A robot that stands makes no keyframes, so the last one holds on.
+        After the last keyframe it drives on as before until the next one is due. A robot that
+        stands makes none, so then the last one holds on.
         """
         keyframes = self._keyframes.values
         at = int(np.searchsorted(keyframes[:, 0], own, side="right")) - 1
         if at < 0:
             return None
         before = keyframes[at]
-        if at + 1 == len(keyframes) or keyframes[at + 1, 1] != before[1]:
+        if at + 1 == len(keyframes):
+            return before[1], self._driven_on(own)
+        if keyframes[at + 1, 1] != before[1]:
             return before[1], before[2:]
         after = keyframes[at + 1]
         if after[0] - before[0] > GAP_S:
@@ -163,6 +168,18 @@ class RobotPath:
         else:
             share = (own - before[0]) / (after[0] - before[0])
         return before[1], arc(before[2:], after[2:], share)
+
+    def _driven_on(self, own: float) -> Array:
+        """The odometry pose at a time after the last keyframe."""
+        keyframes = self._keyframes.values
+        last = keyframes[-1]
+        if len(keyframes) < 2 or keyframes[-2, 1] != last[1] or own - last[0] > DUE_S:
+            return np.asarray(last[2:])
+        before = keyframes[-2]
+        step = last[0] - before[0]
+        if step > GAP_S:
+            return np.asarray(last[2:])
+        return arc(before[2:], last[2:], 1 + (own - last[0]) / step)
 
     # the past
 
@@ -183,7 +200,8 @@ class RobotPath:
             return arc(here[POSE], there[POSE], (own - here[OWN]) / (there[OWN] - here[OWN]))
         if own == here[OWN]:
             return np.asarray(here[POSE])
-        if own - here[OWN] > ON_LATER_S:
+        keyframes = self._keyframes.values
+        if own - here[OWN] > ON_LATER_S or not len(keyframes) or keyframes[-1, 0] < own:
             return None
         motion = self._motion(here[OWN], own)
         return None if motion is None else np.asarray(se2.compose(here[POSE], motion))
