@@ -29,13 +29,14 @@ class LiveMap:
     """Runs until it is stopped.
 
     Attributes:
+        scene: what is known of the team.
         network: what is listened to, or why nothing is; up: whether something is.
     """
 
     def __init__(self, hearing: Hearing, listening: Listening, clock: Clock | None = None) -> None:
         self._clock = clock or MonotonicClock()
         self._began = self._clock.now()
-        self._hearing, self._scene = hearing, Scene()
+        self._hearing, self.scene = hearing, Scene()
         self._listener = listening(self._clock, self.handle)
         self.network, self.up = "not tried yet", False
         self._stop = asyncio.Event()
@@ -78,7 +79,7 @@ class LiveMap:
         elif isinstance(event, (Datagram, ChannelMessage)):
             said = self._hearing.receive(event)
             if said is not None:
-                self._scene.take(said, self._since(event.utime))
+                self.scene.take(said, self._since(event.utime))
 
     def _since(self, utime: int) -> float:
         return (utime - self._began) / SECOND_US
@@ -89,7 +90,7 @@ class LiveMap:
             await asyncio.sleep(UPDATE_S)
             number += 1
             of_all = number % ALL_EVERY == 0
-            piece = self._scene.changes(self._since(self._clock.now()), of_all)
+            piece = self.scene.changes(self._since(self._clock.now()), of_all)
             if of_all:
                 piece["team"] = self._team()
             if len(piece) > 1:
@@ -97,7 +98,7 @@ class LiveMap:
 
     def _everything(self) -> Iterator[Piece]:
         yield {"hello": __version__, "team": self._team()}
-        yield from self._scene.everything(self._since(self._clock.now()))
+        yield from self.scene.everything(self._since(self._clock.now()))
         yield {"complete": True}
 
     def _team(self) -> Piece:

@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Iterator
 from typing import Any
 
 import pytest
+from stage_ports import free_port
 from transport_helpers import in_a_loop, until
 
 aiohttp = pytest.importorskip("aiohttp", reason="aiohttp is not installed")
@@ -34,14 +35,6 @@ async def serving() -> AsyncIterator[tuple[Server, int]]:
     finally:
         await server.close()
         await asyncio.sleep(0.05)
-
-
-async def free_port() -> int:
-    probe = await asyncio.start_server(lambda r, w: None, "127.0.0.1", 0)
-    port = int(probe.sockets[0].getsockname()[1])
-    probe.close()
-    await probe.wait_closed()
-    return port
 
 
 class Visitor:
