@@ -1,7 +1,7 @@
 // Which part of the plane is seen: fits everybody until somebody moves it by hand.
 
 const LEAST_SPAN_M = 4;
-const MARGIN = 0.14; // of each side, free when everybody was just fitted
+const FILLED = 0.84; // of what is free, when everybody was just fitted
 const GLIDE_S = 0.25;
 const LARGEST = 4000, SMALLEST = 0.02; // pixels of a metre
 
@@ -40,21 +40,26 @@ export class Camera {
     if (isThere) { Object.assign(this, this.target); this.target = null; }
   }
 
-  fitted([left, bottom, right, top]) {
-    const width = Math.max(right - left, LEAST_SPAN_M), height = Math.max(top - bottom, LEAST_SPAN_M);
-    const free = 1 - 2 * MARGIN;
-    const scale = Math.min(this.width * free / width, this.height * free / height);
-    return { x: (left + right) / 2, y: (bottom + top) / 2, scale: bounded(scale) };
+  // what of the canvas is free of buttons and the legend
+  get free() {
+    const low = this.width < 760 ? 78 : 62;
+    return { left: 22, top: 22, right: this.width - 22, bottom: this.height - low };
   }
 
-  // does anybody touch the edge, or is everybody small in the middle?
+  fitted([left, bottom, right, top]) {
+    const { free } = this, width = Math.max(right - left, LEAST_SPAN_M), height = Math.max(top - bottom, LEAST_SPAN_M);
+    const wide = Math.max(40, free.right - free.left), high = Math.max(40, free.bottom - free.top);
+    const scale = bounded(Math.min(wide / width, high / height) * FILLED);
+    const above = (this.height / 2 - (free.top + free.bottom) / 2) / scale;
+    return { x: (left + right) / 2, y: (bottom + top) / 2 - above, scale };
+  }
+
+  // does anybody leave the free part, or is everybody small in the middle?
   isUnfit(box) {
-    const { x, y, scale } = this.target ?? this;
-    const best = this.fitted(box);
-    const rim = 0.04;
-    const halfWidth = this.width / 2 / scale * (1 - 2 * rim), halfHeight = this.height / 2 / scale * (1 - 2 * rim);
-    return box[0] < x - halfWidth || box[2] > x + halfWidth || box[1] < y - halfHeight
-      || box[3] > y + halfHeight || best.scale / scale > 1.6 || this.isFirst !== false;
+    const { x, y, scale } = this.target ?? this, { free } = this;
+    const toX = (at) => this.width / 2 + (at - x) * scale, toY = (at) => this.height / 2 - (at - y) * scale;
+    return this.isFirst !== false || toX(box[0]) < free.left || toX(box[2]) > free.right || toY(box[3]) < free.top
+      || toY(box[1]) > free.bottom || this.fitted(box).scale / scale > 1.6;
   }
 
   zoom(factor, px, py) {

@@ -1,7 +1,7 @@
 // One picture of the team: grid, paths, links, ellipses, robots.
 
 import { PAGE, ofRobot, ofScatter } from "./colours.js";
-import { PathLayer, recent } from "./paths.js";
+import { PathLayers, closures, recent } from "./paths.js";
 import { turn } from "./team.js";
 
 const CHI_95 = Math.sqrt(5.991); // of two degrees of freedom
@@ -15,7 +15,7 @@ export class MapView {
     this.canvas = canvas;
     this.context = canvas.getContext("2d");
     this.camera = camera;
-    this.layer = new PathLayer();
+    this.paths = new PathLayers();
     this.spots = []; // where robots and links were drawn, for a tap
   }
 
@@ -33,12 +33,10 @@ export class MapView {
     context.fillRect(0, 0, width, height);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     this.grid();
-    const layer = this.layer.render(scene, camera, ratio);
-    context.setTransform(1, 0, 0, 1, 0, 0);
-    context.drawImage(layer, 0, 0);
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
     this.spots = [];
+    if (scene.layers.closures) closures(context, scene, camera);
     if (scene.layers.paths) {
+      this.paths.draw(context, scene, camera, ratio, seconds);
       for (const place of here) {
         const isDim = isDimmed(scene, place.id);
         recent(context, scene.team.robot(place.id).path, scene.t, place.row, place.id, isDim, camera);

@@ -3,6 +3,7 @@
 import { WORST_M, ofRobot } from "./colours.js";
 
 const STATES = { localised: "localised", doubtful: "in doubt", stale: "no odometry", lost: "lost", away: "not localised" };
+const QUIET_S = 4; // the slowest heartbeat comes every three
 const byId = (id) => document.getElementById(id);
 
 export class Panel {
@@ -89,6 +90,7 @@ export class Panel {
       button.append(parts[name]);
     }
     parts.disk.textContent = String(id);
+    parts.sigma.title = "one sigma of its position, in the direction that is known least";
     button.onclick = () => this.onSelect(id);
     item.append(button);
     return { item, button, parts };
@@ -124,9 +126,8 @@ function facts(team, { info, path }, t) {
   if (!info) return "";
   const heard = Math.max(info.heard, path.t.at(-1) ?? -Infinity);
   const age = t - heard;
-  const parts = [`hears ${info.hears.length}`, `ranges to ${info.ranges.length}`];
-  parts.push(age < 3.5 ? "speaks" : `silent for ${minutes(age)}`);
-  return parts.join(" · ");
+  if (age > QUIET_S) return `silent for ${minutes(age)}`;
+  return `hears ${info.hears.length} · ranges to ${info.ranges.length}`;
 }
 
 function sigma(row) {

@@ -1,104 +1,141 @@
-// The paths and closures: drawn once onto a layer of their own, then only what is new.
+// The paths, drawn onto a layer of their own and kept; and closures, which come and go.
+//
+// Strokes are what takes time. The layer that is seen is moved and scaled with the camera while
+// the next one is drawn behind it, so many strokes in each picture as the computer can bear.
 
 import { PAGE, ofRobot } from "./colours.js";
 import { BY_ODOMETRY, turn } from "./team.js";
 
 const APART_PX = 2; // points nearer than this are one
 const CURVED_PX = 12; // shorter steps are straight
+const STROKE_ROWS = 64; // rows of one stroke: long ones take more than their share
+const LEAST_ROWS = 384, MOST_ROWS = 8000; // rows of one picture
+const SLOW_S = 0.028, FAST_S = 0.02;
 const RECENT_S = 40; // so much of a path is drawn stronger, in steps that fade
 const STEPS = 8;
-const FRESH_S = 30; // closures are drawn stronger for so long, about
+const FRESH_S = 30, OLD_S = 120, REFUSED_S = 600; // how long closures are seen, strongly and at all
 
-export class PathLayer {
+class Layer {
   constructor() {
     this.canvas = document.createElement("canvas");
     this.context = this.canvas.getContext("2d");
-    this.key = "";
-    this.drawn = new Map(); // by robot: its path's version, and how many rows are drawn
+    this.key = null;
+    this.drawn = new Map(); // by robot: how many rows are drawn
+    this.isDone = false;
   }
 
-  // the layer, up to date; `until` ends all paths in the past, null shows all
-  render(scene, camera, ratio) {
-    const { team, ids, until, layers, selected } = scene;
-    const key = [camera.x, camera.y, camera.scale, camera.width, camera.height, ratio, until, layers.paths,
-      layers.closures, selected, scene.scheme, layers.closures ? team.closuresVersion : 0, ids.join()].join("|");
-    if (key !== this.key || this.isReplaced(team, ids)) this.begin(scene, camera, ratio, key);
-    if (!layers.paths) return this.canvas;
+  begin(key, camera, ratio) {
+    const { canvas, context } = this, { x, y, scale, width, height } = camera;
+    Object.assign(this, { key, ratio, x, y, scale, width, height, isDone: false });
+    this.drawn.clear();
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.lineJoin = "round";
+  }
+
+  toX(x) { return this.width / 2 + (x - this.x) * this.scale; }
+  toY(y) { return this.height / 2 - (y - this.y) * this.scale; }
+
+  // draws up to `rows` more of all paths; how many were left over
+  work({ team, ids, until, selected }, rows) {
     for (const id of ids) {
       const { path } = team.robot(id);
-      // the newest row still changes: it is drawn by `recent`
+      // the newest row still changes: `recent` draws it
       const end = until === null ? path.length - 1 : path.index(until) + 1;
-      const from = this.drawn.get(id)?.rows ?? 0;
-      if (end > from + (from ? 0 : 1)) {
-        this.stroke(path, Math.max(0, from - 1), end, id, selected, camera);
-        this.drawn.set(id, { version: path.version, rows: end });
+      let from = this.drawn.get(id) ?? 0;
+      while (from < end && rows > 0) {
+        const to = Math.min(end, from + STROKE_ROWS, from + rows);
+        this.stroke(path, Math.max(0, from - 1), to, id, selected);
+        rows -= to - from;
+        from = to;
       }
+      this.drawn.set(id, from);
+      if (rows <= 0) return 0;
     }
-    return this.canvas;
+    this.isDone = true;
+    return rows;
   }
 
-  isReplaced(team, ids) {
-    return ids.some((id) => this.drawn.has(id) && this.drawn.get(id).version !== team.robot(id).path.version);
-  }
-
-  begin(scene, camera, ratio, key) {
-    this.key = key;
-    this.drawn.clear();
-    const { canvas, context } = this;
-    const width = Math.round(camera.width * ratio), height = Math.round(camera.height * ratio);
-    if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
-    context.setTransform(1, 0, 0, 1, 0, 0);
-    context.clearRect(0, 0, width, height);
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.lineJoin = context.lineCap = "round";
-    if (scene.layers.closures) this.closures(scene, camera);
-  }
-
-  stroke(path, from, end, id, selected, camera) {
-    const { context } = this;
+  stroke(path, from, end, id, selected) {
+    const { context } = this, alpha = selected === null || selected === id ? 0.42 : 0.12;
     context.strokeStyle = ofRobot(id);
-    const alpha = selected === null || selected === id ? 0.42 : 0.12;
-    let k = from;
-    while (k < end - 1) {
+    for (let k = from; k < end - 1;) {
       const isOdometry = path.state[k + 1] === BY_ODOMETRY;
       context.beginPath();
       context.globalAlpha = isOdometry ? alpha * 0.8 : alpha;
       context.lineWidth = isOdometry ? 1.2 : 1.8;
       context.setLineDash(isOdometry ? [2, 4] : []);
-      k = trace(context, path, k, end, camera, (row) => (path.state[row] === BY_ODOMETRY) === isOdometry);
+      k = trace(context, path, k, end, this, (row) => (path.state[row] === BY_ODOMETRY) === isOdometry);
       context.stroke();
     }
-    context.globalAlpha = 1;
-    context.setLineDash([]);
   }
+}
 
-  closures({ team, ids, until, selected }, camera) {
-    const { context } = this, shown = new Set(ids), { now } = team;
-    for (const pair of team.pairs.values()) {
-      if (!shown.has(pair.a) || !shown.has(pair.b)) continue;
-      const isDim = selected !== null && selected !== pair.a && selected !== pair.b;
-      for (const closure of pair.closures.values()) {
-        if (until !== null && closure.t > until) continue;
-        const ends = [camera.toX(closure.xa), camera.toY(closure.ya), camera.toX(closure.xb), camera.toY(closure.yb)];
-        const isOld = (until ?? now) - closure.t > FRESH_S;
-        context.globalAlpha = (closure.kept ? isOld ? 0.22 : 0.6 : 0.8) * (isDim ? 0.25 : 1);
-        context.strokeStyle = context.fillStyle = closure.kept ? PAGE.closure : PAGE.bad;
-        context.lineWidth = 1.2;
-        context.setLineDash(closure.kept ? [] : [4, 4]);
-        context.beginPath();
-        context.moveTo(ends[0], ends[1]);
-        context.lineTo(ends[2], ends[3]);
-        context.stroke();
-        context.setLineDash([]);
-        context.beginPath();
-        context.arc(ends[0], ends[1], 2, 0, 7);
-        context.arc(ends[2], ends[3], 2, 0, 7);
-        context.fill();
-        if (!closure.kept) cross(context, (ends[0] + ends[2]) / 2, (ends[1] + ends[3]) / 2);
-      }
+export class PathLayers {
+  constructor() { this.front = new Layer(); this.back = new Layer(); this.rows = 2000; }
+
+  // draws the paths of a scene: those up to `until`, null shows all
+  draw(context, scene, camera, ratio, seconds) {
+    const { team, ids, until, selected, scheme } = scene;
+    const versions = ids.map((id) => `${id}:${team.robot(id).path.version}`).join();
+    const key = [camera.x, camera.y, camera.scale, camera.width, camera.height, ratio, until, selected, scheme, versions].join("|");
+    if (seconds > SLOW_S) this.rows = Math.max(LEAST_ROWS, this.rows * 0.6);
+    else if (seconds < FAST_S) this.rows = Math.min(MOST_ROWS, this.rows * 1.2);
+    if (this.front.key === key) this.front.work(scene, Math.round(this.rows));
+    else {
+      // what was begun is ended first, or a camera that moves would never be shown anything
+      if (this.back.key === null || this.back.isDone) this.back.begin(key, camera, ratio);
+      this.back.work(scene, Math.round(this.rows));
+      if (this.back.isDone) [this.front, this.back] = [this.back, this.front];
     }
-    context.globalAlpha = 1;
+    const { front } = this;
+    if (front.key === null) return;
+    const by = camera.scale / front.scale;
+    const left = camera.toX(front.x) - (front.width / 2) * by, top = camera.toY(front.y) - (front.height / 2) * by;
+    context.drawImage(front.canvas, left, top, front.width * by, front.height * by);
   }
+}
+
+// lines between the places where two robots were when a closure was found
+export function closures(context, { team, ids, t, selected }, camera) {
+  const shown = new Set(ids), lines = { fresh: [], old: [], refused: [] };
+  for (const pair of team.pairs.values()) {
+    if (!shown.has(pair.a) || !shown.has(pair.b)) continue;
+    const isChosen = selected === pair.a || selected === pair.b;
+    if (selected !== null && !isChosen) continue;
+    for (const closure of pair.closures.values()) {
+      const age = t - closure.t;
+      if (age < 0) continue;
+      if (!closure.kept) { if (age < REFUSED_S || isChosen) lines.refused.push(closure); }
+      else if (age < FRESH_S) lines.fresh.push(closure);
+      else if (age < OLD_S || isChosen) lines.old.push(closure);
+    }
+  }
+  const styles = { old: [0.2, PAGE.closure, []], fresh: [0.6, PAGE.closure, []], refused: [0.85, PAGE.bad, [4, 4]] };
+  for (const [name, [alpha, colour, dash]] of Object.entries(styles)) {
+    context.globalAlpha = alpha;
+    context.strokeStyle = context.fillStyle = colour;
+    context.lineWidth = 1.2;
+    context.setLineDash(dash);
+    context.beginPath();
+    for (const { xa, ya, xb, yb } of lines[name]) {
+      context.moveTo(camera.toX(xa), camera.toY(ya));
+      context.lineTo(camera.toX(xb), camera.toY(yb));
+    }
+    context.stroke();
+    context.setLineDash([]);
+    if (name === "old") continue;
+    context.beginPath();
+    for (const { xa, ya, xb, yb } of lines[name]) {
+      context.rect(camera.toX(xa) - 2, camera.toY(ya) - 2, 4, 4);
+      context.rect(camera.toX(xb) - 2, camera.toY(yb) - 2, 4, 4);
+    }
+    context.fill();
+    if (name !== "refused") continue;
+    for (const { xa, ya, xb, yb } of lines.refused) cross(context, camera.toX((xa + xb) / 2), camera.toY((ya + yb) / 2));
+  }
+  context.globalAlpha = 1;
 }
 
 // the last part of a path up to the robot itself, fading backwards

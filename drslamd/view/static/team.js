@@ -91,7 +91,6 @@ export class Team {
   reset() {
     this.robots = new Map(); this.pairs = new Map();
     this.about = null; this.notShown = 0; this.version = ""; this.isComplete = false;
-    this.closuresVersion = (this.closuresVersion ?? 0) + 1;
     this.lead = null; this.heardAt = 0;
   }
 
@@ -150,7 +149,6 @@ export class Team {
       if (key.length === 1 && key.some((id) => id === pair.a || id === pair.b)) this.pairs.delete(name);
       else if (key.length === 2 && pair.a === key[0] && pair.b === key[1]) pair.closures.clear();
     }
-    this.closuresVersion += 1;
   }
 
   takeScatter(pair, row) {
@@ -165,7 +163,6 @@ export class Team {
     closures.delete(`${a}:${number}`);
     closures.set(`${a}:${number}`, { t, kept, xa, ya, xb, yb, off });
     if (closures.size > MOST_CLOSURES) closures.delete(closures.keys().next().value);
-    this.closuresVersion += 1;
   }
 
   // what a robot is worth at a time: "localised", "doubtful", "stale", "lost" or "away"
