@@ -38,7 +38,7 @@ HEADERS = {
 """Of every answer: nothing from elsewhere, nothing to elsewhere, in nobody's frame."""
 
 
-class Refusal(Enum):
+class TurnedAway(Enum):
     """Why somebody is turned away: the code of HTTP and what is said."""
 
     METHOD = 405, "the map can only be looked at: GET"
@@ -72,21 +72,21 @@ class Door:
 
     def judge(
         self, method: str, hosts: Sequence[str], site: str, path: str
-    ) -> Refusal | File | None:
+    ) -> TurnedAway | File | None:
         """A file, or None for the stream of updates, or why neither.
 
         Args:
             hosts: all Host headers; site: what the browser says of the page that asks.
         """
         if method != "GET":
-            return Refusal.METHOD
+            return TurnedAway.METHOD
         if len(hosts) != 1 or not self._goes_by(hosts[0].lower()):
-            return Refusal.HOST
+            return TurnedAway.HOST
         if site not in ("", "none", "same-origin") and (site != "cross-site" or path != "/"):
-            return Refusal.ELSEWHERE
+            return TurnedAway.ELSEWHERE
         if path == STREAM:
             return None
-        return self._files.get(path, Refusal.PATH)
+        return self._files.get(path, TurnedAway.PATH)
 
     def _goes_by(self, host: str) -> bool:
         name, _, port = host.rpartition(":")

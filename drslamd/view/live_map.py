@@ -11,7 +11,7 @@ from drslamd import __version__
 from drslamd.conventions import SECOND_US
 from drslamd.events import ChannelMessage, Datagram, Event, NetworkState
 from drslamd.io.clock import Clock, MonotonicClock
-from drslamd.view.door import Door, files
+from drslamd.view.door import files
 from drslamd.view.scene.hearing import Hearing
 from drslamd.view.scene.scene import Scene
 from drslamd.view.server import Piece, Server
@@ -53,7 +53,7 @@ class LiveMap:
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, self.stop)
-        server = Server(Door(listen, port, files()), self._everything)
+        server = Server(files(), self._everything)
         opened = await server.open(listen, port)
         tasks = [asyncio.ensure_future(t) for t in (self._listener.run(), self._tell(server))]
         stopped = asyncio.ensure_future(self._stop.wait())

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from aiohttp import web
 
-from drslamd.view.door import HEADERS, Door, File, Refusal
+from drslamd.view.door import HEADERS, Door, File, TurnedAway
 
 MAX_STREAMS = 16
 """Pages that are open at once; with a second's work for each when they come."""
@@ -34,12 +34,16 @@ class Server:
         streams: the updates that wait for each page that is open.
     """
 
-    def __init__(self, door: Door, everything: Callable[[], Iterator[Piece]]) -> None:
+    def __init__(
+        self, files: Mapping[str, File], everything: Callable[[], Iterator[Piece]]
+    ) -> None:
         """
         Args:
+            files: of the page, by path.
             everything: what a page that has just come is told, in pieces.
         """
-        self._door, self._everything = door, everything
+        self._files, self._everything = files, everything
+        self._door: Door | None = None
         self.streams: dict[asyncio.Task[Any], asyncio.Queue[bytes]] = {}
         self._runner: web.ServerRunner | None = None
         self._listening: asyncio.Server | None = None
@@ -63,9 +67,11 @@ class Server:
 
         loop = asyncio.get_running_loop()
         self._listening = await loop.create_server(connection, listen, port)
+        opened = int(self._listening.sockets[0].getsockname()[1])
+        self._door = Door(listen, opened, self._files)
         self._runner = web.ServerRunner(server, handle_signals=False)
         await self._runner.setup()
-        return int(self._listening.sockets[0].getsockname()[1])
+        return opened
 
     async def close(self) -> None:
         """Hang up on everybody."""
@@ -88,6 +94,7 @@ class Server:
                 queue.put_nowait(event)
 
     async def _answer(self, request: web.BaseRequest) -> web.StreamResponse:
+        assert self._door is not None
         verdict = self._door.judge(
             request.method,
             request.headers.getall("Host", []),
@@ -96,7 +103,7 @@ class Server:
         )
         if verdict is None:
             full = len(self.streams) >= MAX_STREAMS
-            return _refused(Refusal.FULL) if full else await self._stream(request)
+            return _refused(TurnedAway.FULL) if full else await self._stream(request)
         if isinstance(verdict, File):
             headers = {**HEADERS, "Content-Type": verdict.kind}
             return web.Response(body=verdict.content, headers=headers)
@@ -130,9 +137,9 @@ class _HungUp(asyncio.Protocol):
         transport.close()
 
 
-def _refused(refusal: Refusal) -> web.Response:
+def _refused(refusal: TurnedAway) -> web.Response:
     code, why = refusal.value
-    extra = {"Allow": "GET"} if refusal is Refusal.METHOD else {}
+    extra = {"Allow": "GET"} if refusal is TurnedAway.METHOD else {}
     headers = {**HEADERS, **extra, "Content-Type": "text/plain; charset=utf-8"}
     return web.Response(status=code, text=why + "\n", headers={**headers, "Connection": "close"})
 

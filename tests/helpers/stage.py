@@ -8,7 +8,6 @@ from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 from onlooked_team import Actor, entry
-from stage_ports import free_port
 
 from drslamd.events import Event, NetworkState
 from drslamd.io.clock import Clock, MonotonicClock
@@ -17,7 +16,7 @@ from drslamd.view.scene.hearing import Hearing
 
 TICK_S = 0.1
 HOUR_S = 3_600
-SCATTER_EVERY_S = 5
+SCATTER_EVERY_S = 10
 
 
 class MovedClock:
@@ -114,7 +113,7 @@ async def playing(stage: Stage) -> AsyncIterator[Stage]:
     """The map is open, on a free port of loopback; `stage.url` leads there."""
     opened: asyncio.Future[int] = asyncio.get_running_loop().create_future()
     running: asyncio.Future[Any] = asyncio.ensure_future(
-        stage.map.run("127.0.0.1", await free_port(), opened.set_result)
+        stage.map.run("127.0.0.1", 0, opened.set_result)
     )
     try:
         stage.url = f"http://127.0.0.1:{await opened}/"

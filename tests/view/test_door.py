@@ -8,7 +8,7 @@ import socket
 import pytest
 from places import REPOSITORY
 
-from drslamd.view.door import HEADERS, STREAM, Door, File, Refusal, files, is_loopback
+from drslamd.view.door import HEADERS, STREAM, Door, File, TurnedAway, files, is_loopback
 
 PAGE = File("text/html; charset=utf-8", b"page")
 FILES = {"/": PAGE, "/app.js": File("text/javascript; charset=utf-8", b"script")}
@@ -23,7 +23,7 @@ def ask(
     hosts: tuple[str, ...] = ("127.0.0.1:8808",),
     site: str = "",
     path: str = "/",
-) -> Refusal | File | None:
+) -> TurnedAway | File | None:
     return Door(listen, port, FILES).judge(method, hosts, site, path)
 
 
@@ -35,8 +35,8 @@ def test_the_page_its_files_and_the_stream_are_handed_out() -> None:
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "HEAD", "OPTIONS", "CONNECT", "get"])
 def test_the_map_can_only_be_looked_at(method: str) -> None:
-    assert ask(method=method) is Refusal.METHOD
-    assert ask(method=method, path=STREAM) is Refusal.METHOD
+    assert ask(method=method) is TurnedAway.METHOD
+    assert ask(method=method, path=STREAM) is TurnedAway.METHOD
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_the_map_can_only_be_looked_at(method: str) -> None:
     ],
 )
 def test_every_other_path_is_refused(path: str) -> None:
-    assert ask(path=path) is Refusal.PATH
+    assert ask(path=path) is TurnedAway.PATH
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_every_other_path_is_refused(path: str) -> None:
     ],
 )
 def test_on_loopback_it_goes_by_names_of_this_computer_only(host: str, is_ours: bool) -> None:
-    assert ask(hosts=(host,)) is (PAGE if is_ours else Refusal.HOST)
+    assert ask(hosts=(host,)) is (PAGE if is_ours else TurnedAway.HOST)
 
 
 @pytest.mark.parametrize(
@@ -89,7 +89,7 @@ def test_on_loopback_it_goes_by_names_of_this_computer_only(host: str, is_ours: 
     ],
 )
 def test_beyond_loopback_it_goes_by_any_address_and_its_own_name(host: str, is_ours: bool) -> None:
-    assert ask(listen="0.0.0.0", hosts=(host,)) is (PAGE if is_ours else Refusal.HOST)
+    assert ask(listen="0.0.0.0", hosts=(host,)) is (PAGE if is_ours else TurnedAway.HOST)
 
 
 def test_a_browser_leaves_out_port_80() -> None:
@@ -99,7 +99,7 @@ def test_a_browser_leaves_out_port_80() -> None:
 
 @pytest.mark.parametrize("hosts", [(), ("127.0.0.1:8808", "127.0.0.1:8808")])
 def test_one_host_is_named_and_not_none_or_two(hosts: tuple[str, ...]) -> None:
-    assert ask(hosts=hosts) is Refusal.HOST
+    assert ask(hosts=hosts) is TurnedAway.HOST
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_one_host_is_named_and_not_none_or_two(hosts: tuple[str, ...]) -> None:
 def test_a_page_from_elsewhere_may_lead_here_but_not_take_anything(
     site: str, path: str, is_refused: bool
 ) -> None:
-    assert (ask(site=site, path=path) is Refusal.ELSEWHERE) is is_refused
+    assert (ask(site=site, path=path) is TurnedAway.ELSEWHERE) is is_refused
 
 
 @pytest.mark.parametrize(

@@ -9,13 +9,12 @@ from collections.abc import AsyncIterator, Iterator
 from typing import Any
 
 import pytest
-from stage_ports import free_port
 from transport_helpers import in_a_loop, until
 
 aiohttp = pytest.importorskip("aiohttp", reason="aiohttp is not installed")
 
 from drslamd.view import server as served  # noqa: E402
-from drslamd.view.door import Door, files  # noqa: E402
+from drslamd.view.door import files  # noqa: E402
 from drslamd.view.server import MAX_CONNECTIONS, MAX_STREAMS, QUEUE, Server, as_event  # noqa: E402
 
 
@@ -27,9 +26,8 @@ def everything() -> Iterator[dict[str, Any]]:
 @contextlib.asynccontextmanager
 async def serving() -> AsyncIterator[tuple[Server, int]]:
     """On a free port of loopback."""
-    port = await free_port()
-    server = Server(Door("127.0.0.1", port, files()), everything)
-    assert await server.open("127.0.0.1", port) == port
+    server = Server(files(), everything)
+    port = await server.open("127.0.0.1", 0)
     try:
         yield server, port
     finally:
@@ -193,7 +191,7 @@ async def test_what_is_no_http_ends_its_own_connection_only() -> None:
 @in_a_loop
 async def test_a_port_that_is_taken_is_an_error_of_the_system() -> None:
     async with serving() as (_, port):
-        second = Server(Door("127.0.0.1", port, {}), everything)
+        second = Server({}, everything)
         with pytest.raises(OSError, match="in use"):
             await second.open("127.0.0.1", port)
         await second.close()

@@ -18,6 +18,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
+from drslamd.cli.view import HTTP_PORT
 from lab.play import real_team
 from lab.play.playback import equip
 from lab.play.virtual_team import SETTLE_S
@@ -85,13 +86,13 @@ def _recording(options: argparse.Namespace) -> Recording:
 
 
 @contextlib.asynccontextmanager
-async def live_map(port: int) -> AsyncIterator[None]:
+async def live_map(port: int, http_port: int = HTTP_PORT) -> AsyncIterator[None]:
     """`drslamd view` of this host's team, as anybody would start it; it says its address itself.
 
     Args:
-        port: of the team's multicast group.
+        port: of the team's multicast group; http_port: of the page.
     """
-    flags = ("--interface", "127.0.0.1", "--port", str(port))
+    flags = ("--interface", "127.0.0.1", "--port", str(port), "--http-port", str(http_port))
     process = await asyncio.create_subprocess_exec(sys.executable, "-m", "drslamd", "view", *flags)
     try:
         yield

@@ -115,7 +115,7 @@ export class MapView {
   scaleBar() {
     const { context, camera } = this;
     const length = round125(130 / camera.scale), px = length * camera.scale;
-    const x = 14, y = camera.height - (camera.width < 500 ? 64 : 18);
+    const x = 14, y = camera.height - (camera.width < 760 ? 64 : 18);
     context.strokeStyle = context.fillStyle = PAGE.soft;
     context.lineWidth = 1.5;
     context.beginPath();
