@@ -29,6 +29,8 @@ export class Camera {
 
   // box: [left, bottom, right, top] in metres of all that is to be seen
   step(box, seconds) {
+    const size = `${this.width}x${this.height}`;
+    if (size !== this.size) { this.size = size; if (this.isFollowing) this.isFirst = true; }
     if (this.isFollowing && box && this.isUnfit(box)) this.target = this.fitted(box);
     if (!this.target) return;
     const share = this.isFirst === false ? 1 - Math.exp(-seconds / GLIDE_S) : 1;

@@ -112,7 +112,7 @@ export function closures(context, { team, ids, t, selected }, camera) {
       else if (age < OLD_S || isChosen) lines.old.push(closure);
     }
   }
-  const styles = { old: [0.2, PAGE.closure, []], fresh: [0.6, PAGE.closure, []], refused: [0.85, PAGE.bad, [4, 4]] };
+  const styles = { old: [0.2, PAGE.closure, []], fresh: [0.48, PAGE.closure, []], refused: [0.85, PAGE.bad, [4, 4]] };
   for (const [name, [alpha, colour, dash]] of Object.entries(styles)) {
     context.globalAlpha = alpha;
     context.strokeStyle = context.fillStyle = colour;
