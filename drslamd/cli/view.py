@@ -8,7 +8,6 @@ import ipaddress
 import re
 import socket
 import sys
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
@@ -69,11 +68,12 @@ def _view(options: argparse.Namespace) -> int:
 
 
 async def _run(options: argparse.Namespace, hearing: Hearing, listening: Listening) -> int:
+    from drslamd.view.door import is_loopback
     from drslamd.view.live_map import LiveMap
 
     live_map = LiveMap(hearing, listening)
     try:
-        await live_map.run(options.listen, options.http_port, _ready(options, hearing.trust()))
+        port = await live_map.open(options.listen, options.http_port)
     except OSError as error:
         where = f"{options.listen}:{options.http_port}"
         print(
@@ -81,6 +81,12 @@ async def _run(options: argparse.Namespace, hearing: Hearing, listening: Listeni
             file=sys.stderr,
         )
         return UNAVAILABLE
+    for host in _hosts(options.listen):
+        print(f"live map: http://{host}:{port}/", flush=True)
+    print(hearing.trust(), file=sys.stderr)
+    if not is_loopback(options.listen):
+        print("whoever reaches this computer over the network can look, too", file=sys.stderr)
+    await live_map.run()
     return OK
 
 
@@ -133,15 +139,6 @@ def _section(section: GossipSection, options: argparse.Namespace) -> GossipSecti
     named = {name: getattr(options, name) for name in ("group", "port", "interface")}
     given = {name: value for name, value in named.items() if value is not None}
     return _Flags.model_validate({"gossip": {**section.model_dump(), **given}}).gossip
-
-
-def _ready(options: argparse.Namespace, trust: str) -> Callable[[int], None]:
-    def say(port: int) -> None:
-        for host in _hosts(options.listen):
-            print(f"live map: http://{host}:{port}/", flush=True)
-        print(trust, file=sys.stderr, flush=True)
-
-    return say
 
 
 def _hosts(listen: str) -> list[str]:

@@ -82,7 +82,7 @@ class Door:
             return TurnedAway.METHOD
         if len(hosts) != 1 or not self._goes_by(hosts[0].lower()):
             return TurnedAway.HOST
-        if site not in ("", "none", "same-origin") and (site != "cross-site" or path != "/"):
+        if site not in ("", "none", "same-origin") and path != "/":
             return TurnedAway.ELSEWHERE
         if path == STREAM:
             return None

@@ -39,34 +39,33 @@ class LiveMap:
         self._hearing, self.scene = hearing, Scene()
         self._listener = listening(self._clock, self.handle)
         self.network, self.up = "not tried yet", False
+        self._server = Server(files(), self._everything)
         self._stop = asyncio.Event()
 
-    async def run(self, listen: str, port: int, ready: Callable[[int], None]) -> None:
-        """Until SIGTERM, SIGINT or `stop`.
-
-        Args:
-            ready: is told the port once pages can be asked for.
+    async def open(self, listen: str, port: int) -> int:
+        """Let pages ask; the port, which is one that is free for port 0.
 
         Raises:
             OSError: the address cannot be listened on.
         """
+        return await self._server.open(listen, port)
+
+    async def run(self) -> None:
+        """Until SIGTERM, SIGINT or `stop`."""
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, self.stop)
-        server = Server(files(), self._everything)
-        opened = await server.open(listen, port)
-        tasks = [asyncio.ensure_future(t) for t in (self._listener.run(), self._tell(server))]
-        stopped = asyncio.ensure_future(self._stop.wait())
+        work = (self._listener.run(), self._tell(), self._stop.wait())
+        tasks = [asyncio.ensure_future(part) for part in work]
         try:
-            ready(opened)
-            done, _ = await asyncio.wait([*tasks, stopped], return_when=asyncio.FIRST_COMPLETED)
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
                 task.result()  # a bug of ours is raised
         finally:
-            for task in (*tasks, stopped):
+            for task in tasks:
                 task.cancel()
-            await asyncio.gather(*tasks, stopped, return_exceptions=True)
-            await server.close()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            await self._server.close()
 
     def stop(self) -> None:
         """End `run`."""
@@ -84,7 +83,7 @@ class LiveMap:
     def _since(self, utime: int) -> float:
         return (utime - self._began) / SECOND_US
 
-    async def _tell(self, server: Server) -> None:
+    async def _tell(self) -> None:
         number = 0
         while True:
             await asyncio.sleep(UPDATE_S)
@@ -94,7 +93,7 @@ class LiveMap:
             if of_all:
                 piece["team"] = self._team()
             if len(piece) > 1:
-                server.tell(piece)
+                self._server.tell(piece)
 
     def _everything(self) -> Iterator[Piece]:
         yield {"hello": __version__, "team": self._team()}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Callable
-from typing import Any
 
 from onlooked_team import Actor, entry
 
@@ -111,12 +110,10 @@ class Stage:
 @contextlib.asynccontextmanager
 async def playing(stage: Stage) -> AsyncIterator[Stage]:
     """The map is open, on a free port of loopback; `stage.url` leads there."""
-    opened: asyncio.Future[int] = asyncio.get_running_loop().create_future()
-    running: asyncio.Future[Any] = asyncio.ensure_future(
-        stage.map.run("127.0.0.1", 0, opened.set_result)
-    )
+    port = await stage.map.open("127.0.0.1", 0)
+    stage.url = f"http://127.0.0.1:{port}/"
+    running = asyncio.ensure_future(stage.map.run())
     try:
-        stage.url = f"http://127.0.0.1:{await opened}/"
         yield stage
         stage.map.stop()
         await running

@@ -109,6 +109,7 @@ def test_one_host_is_named_and_not_none_or_two(hosts: tuple[str, ...]) -> None:
         ("none", "/", False),
         ("cross-site", "/", False),
         ("cross-site", STREAM, True),
+        ("same-site", "/", False),
         ("same-site", STREAM, True),
         ("cross-site", "/app.js", True),
     ],

@@ -55,7 +55,7 @@ class Scene:
         self._waiting: deque[_Waiting] = deque(maxlen=WAITING)
         self._moved: set[int] = set()
         self._new_closures: list[list[Any]] = []
-        self._forgotten: list[list[int]] = []
+        self._forgotten: set[tuple[int, ...]] = set()
 
     # what comes in
 
@@ -107,7 +107,7 @@ class Scene:
         del self.robots[robot]
         for key in [key for key in self.pairs if robot in key]:
             del self.pairs[key]
-        self._forgotten.append([robot])
+        self._forgotten.add((robot,))
         return True
 
     def _forget_pairs(self, robot: int) -> None:
@@ -116,7 +116,7 @@ class Scene:
             if robot in key:
                 pair.forget_closures(key[0])
                 pair.forget_closures(key[1])
-                self._forgotten.append(list(key))
+                self._forgotten.add(key)
 
     def _take_entry(self, seen: RobotSeen, entry: GraphEntry, t: float) -> None:
         for k in entry.keyframes:
@@ -192,9 +192,9 @@ class Scene:
         ]
         out |= {"robots": self._pictures(t), "not_shown": len(self.not_shown)}
         out |= {"pairs": scatters} if scatters else {}
-        out |= {"forget": self._forgotten} if self._forgotten else {}
+        out |= {"forget": sorted(self._forgotten)} if self._forgotten else {}
         out |= {"closures": self._new_closures} if self._new_closures else {}
-        self._forgotten, self._new_closures = [], []
+        self._forgotten, self._new_closures = set(), []
         return out
 
     def everything(self, t: float) -> Iterator[dict[str, Any]]:

@@ -159,7 +159,7 @@ def test_another_start_voids_closures_but_not_the_path() -> None:
     again = Actor(1, epoch=6, ahead_s=1.0, centre=b.centre, turning=b.turning)
     scene.take(again.said(again.status(), 11.0), 11.0)
     update = scene.changes(11.0, True)
-    assert update["forget"] == [[0, 1]]
+    assert update["forget"] == [(0, 1)]
     assert all_of(scene, 11.0)["closures"] == []
     assert len(all_of(scene, 11.0)["paths"]["1"]) > 5
     assert update["robots"][1]["words"]
@@ -188,7 +188,17 @@ def test_robots_beyond_the_bound_are_counted_until_somebody_was_silent_for_long(
     scene.take(late.said(late.status(), 0), FORGET_S)
     assert 200 in scene.robots
     assert 0 not in scene.robots
-    assert scene.changes(FORGET_S, True)["forget"] == [[0]]
+    assert scene.changes(FORGET_S, True)["forget"] == [(0,)]
+
+
+def test_starts_that_follow_each_other_without_end_are_forgotten_once() -> None:
+    scene, (a, b) = Scene(), two()
+    drive(scene, (a, b), 0, 10)
+    scene.changes(10.0, True)
+    for epoch in range(6, 1_000):
+        again = Actor(1, epoch=epoch)
+        scene.take(again.said(again.status(), 10.0), 10.0)
+    assert scene.changes(11.0, True)["forget"] == [(0, 1)]
 
 
 def test_pairs_are_bounded() -> None:
