@@ -35,7 +35,7 @@ RINGS = {
         "status_table",
     ],
     "shell": ["host", "io"],
-    "entry": ["parts", "machine", "doctor", "daemon", "cli", "__main__"],
+    "entry": ["parts", "machine", "doctor", "daemon", "view", "cli", "__main__"],
 }
 """From the inside out; a module imports only from its own ring and those before it."""
 

@@ -1,7 +1,8 @@
 """The command ``drslamd``: one file for each verb.
 
-Exit codes: 0 done, 1 something that doctor found, 64 wrong usage, 69 no daemon answers, 70 a bug
-of ours, 73 a file that cannot be made, 75 another daemon already runs, 78 an unusable set-up.
+Exit codes: 0 done, 1 something that doctor found, 64 wrong usage, 69 no daemon answers (view: no
+aiohttp, or its port is taken), 70 a bug of ours, 73 a file that cannot be made, 75 another daemon
+already runs, 78 an unusable set-up.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import argparse
 import sys
 
 from drslamd import __version__
-from drslamd.cli import check, doctor, keygen, run, status, trajectory
+from drslamd.cli import check, doctor, keygen, run, status, trajectory, view
 from drslamd.cli.exit_codes import BAD_CONFIG
 from drslamd.cli.parser import Parser
 from drslamd.config import ConfigError
@@ -22,13 +23,15 @@ examples:
   drslamd run -c /etc/drslamd/3.toml         the daemon (systemd: drslamd@3)
   drslamd status -c /etc/drslamd/3.toml      what it hears, and why it is not localised
   drslamd doctor -c /etc/drslamd/3.toml      what is wrong, since when, what to do
+  drslamd view --interface wlan0             the team on a live map, in a browser
   drslamd trajectory -c /etc/drslamd/3.toml --tum out/
 
-exit codes: 0 done, 1 doctor found something, 64 wrong usage, 69 no daemon answers, 70 a bug,
-73 a file cannot be made, 75 another daemon already runs, 78 the set-up cannot be used
+exit codes: 0 done, 1 doctor found something, 64 wrong usage, 69 no daemon answers (view: no aiohttp,
+or its port is taken), 70 a bug, 73 a file cannot be made, 75 another daemon already runs, 78 the
+set-up cannot be used
 """
 
-VERBS = (run, check, doctor, status, trajectory, keygen)
+VERBS = (run, check, doctor, status, view, trajectory, keygen)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -87,6 +87,29 @@ def _origin_key(key: bytes, origin: int) -> bytes:
     return blake2b(struct.pack(">h", origin), key=key, person=b"drslamd origin").digest()
 
 
+def header_of(message: bytes, fingerprints: frozenset[bytes]) -> Header | SealFault:
+    """What a message says of itself, nothing of it proven; or why it cannot be a robot's.
+
+    Args:
+        fingerprints: of the types that its channel may carry.
+    """
+    if len(message) < _HEADER.size:
+        return SealFault.TOO_SHORT
+    if len(message) > MAX_PAYLOAD:
+        return SealFault.TOO_LONG
+    fingerprint, *fields, _ = _HEADER.unpack_from(message)
+    header = Header(*fields)
+    if fingerprint not in fingerprints:
+        return SealFault.UNKNOWN_TYPE
+    if header.version != VERSION:
+        return SealFault.WRONG_VERSION
+    if not 0 <= header.origin <= MAX_ROBOT_ID:
+        return SealFault.BAD_ORIGIN
+    if not 0 <= header.utime <= LAST_UTIME:
+        return SealFault.BAD_TIME
+    return header
+
+
 class Seal:
     """Closes our messages and judges those of others."""
 
@@ -147,20 +170,9 @@ class Seal:
             fingerprints: of the types that this channel may carry.
             once: False for messages whose own numbering makes a repetition harmless.
         """
-        if len(message) < _HEADER.size:
-            return SealFault.TOO_SHORT
-        if len(message) > MAX_PAYLOAD:
-            return SealFault.TOO_LONG
-        fingerprint, *fields, tag = _HEADER.unpack_from(message)
-        header = Header(*fields)
-        if fingerprint not in fingerprints:
-            return SealFault.UNKNOWN_TYPE
-        if header.version != VERSION:
-            return SealFault.WRONG_VERSION
-        if not 0 <= header.origin <= MAX_ROBOT_ID:
-            return SealFault.BAD_ORIGIN
-        if not 0 <= header.utime <= LAST_UTIME:
-            return SealFault.BAD_TIME
+        header = header_of(message, fingerprints)
+        if isinstance(header, SealFault):
+            return header
         ours = header.origin == self.robot
         if ours and header.epoch == self.epoch and header.counter <= self._counter:
             return SealFault.OWN
@@ -171,7 +183,7 @@ class Seal:
         if once and not self._window(header).is_new(header.counter):
             return SealFault.SEEN
         proof = _tag(_origin_key(self._key, header.origin), channel, message)
-        if not hmac.compare_digest(tag, proof):
+        if not hmac.compare_digest(message[_TAG_AT : _HEADER.size], proof):
             return SealFault.WRONG_TAG
         return SealFault.OWN_ID_USED if ours else header
 

@@ -6,7 +6,7 @@ import pytest
 from message_builders import OTHER_SECRET, SECRET, a_seal, a_status, forged, kinds, resealed, sealed
 
 from drslamd.gossip import messages
-from drslamd.gossip.seal import Header, Seal, SealFault, team_key
+from drslamd.gossip.seal import Header, Seal, SealFault, header_of, team_key
 
 STATUS = frozenset([messages.FINGERPRINTS["STATUS"]])
 HUGE, LAST_COUNTER = 2**63 - 1, 2**31 - 1
@@ -31,6 +31,13 @@ def counters(*values: int, once: bool = True) -> list[bool]:
 def test_a_message_of_the_team_is_opened_with_its_header() -> None:
     message = sealed(a_seal(3, epoch=5), a_status(), utime=77)
     assert opened(a_seal(1), message) == Header(2, 3, 5, 1, 77)
+
+
+def test_who_has_no_key_reads_what_a_message_says_of_itself_and_nothing_is_proven() -> None:
+    _, payload = forged(a_status(), robot=3, epoch=5, counter=9, utime=77, secret=OTHER_SECRET)
+    assert header_of(payload, STATUS) == Header(2, 3, 5, 9, 77)
+    assert header_of(payload, frozenset()) is SealFault.UNKNOWN_TYPE
+    assert header_of(payload[:38], STATUS) is SealFault.TOO_SHORT
 
 
 def test_the_tag_is_the_keyed_blake2b_that_the_module_describes() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from pathlib import Path
 from typing import Any
@@ -66,10 +67,12 @@ class Played:
         self.share = 0.5
         """Of the error of dead reckoning that is left."""
         self.apart = False
+        self.beside: Any = None
         self.failure = ""
 
-    async def run(self, recording: Recording, *_: Any, **__: Any) -> Outcome:
+    async def run(self, recording: Recording, *_: Any, beside: Any = None, **__: Any) -> Outcome:
         self.recordings.append(recording)
+        self.beside = beside
         if self.failure:
             raise real_team.TeamFailed(self.failure)
         out = Outcome()
@@ -161,6 +164,35 @@ def test_the_seed_the_robots_and_the_time_are_those_that_were_asked_for(
     assert not np.array_equal(one.trails[0].truth, other.trails[0].truth)
     demo.main(["--seconds", "6", *png])
     assert sorted(played.recordings[-1].trails) == [0, 1, 2]
+
+
+def test_the_live_map_runs_beside_the_team_only_when_it_is_asked_for(
+    played: Played, tmp_path: Path
+) -> None:
+    png = ["--png", str(tmp_path / "demo.png")]
+    demo.main([*SMALL, *png])
+    assert played.beside is None
+    demo.main([*SMALL, *png, "--view"])
+    assert played.beside is demo.live_map
+
+
+@pytest.mark.slow
+def test_the_live_map_beside_the_team_says_its_address_and_ends_with_it(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("aiohttp", reason="aiohttp is not installed")
+
+    async def go() -> None:
+        async with demo.live_map(7667, http_port=0):
+            for _ in range(100):
+                await asyncio.sleep(0.1)
+                said.append(capfd.readouterr().out)
+                if "live map: http://127.0.0.1:" in "".join(said):
+                    return
+
+    said: list[str] = []
+    asyncio.run(go())
+    assert "live map: http://127.0.0.1:" in "".join(said)
 
 
 def test_wrong_usage_ends_with_2_and_help_has_examples(capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,11 +11,14 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import contextlib
 import json
 import sys
+from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
+from drslamd.cli.view import HTTP_PORT
 from lab.play import real_team
 from lab.play.playback import equip
 from lab.play.virtual_team import SETTLE_S
@@ -32,6 +35,7 @@ NO_INPUT, FAILED = 66, 70
 EXAMPLES = """\
 examples:
   tools/demo                             three robots, 75 s in a room of 10 m x 12 m
+  tools/demo --view                      the same, on the live map in your browser
   tools/demo --seed 7 --robots 4         another world
   tools/demo --dataset run.pyfg          the same with a recording
   tools/demo --json out/demo.json        the figures for a program
@@ -49,7 +53,8 @@ def main(arguments: list[str] | None = None) -> int:
     progress = Progress(f"{len(recording.trails)} daemons driving", recording.duration + SETTLE_S)
     hardware = equip(recording, varied=options.dataset is None)
     try:
-        result = asyncio.run(real_team.run(recording, hardware, progress=progress))
+        beside = live_map if options.view else None
+        result = asyncio.run(real_team.run(recording, hardware, progress=progress, beside=beside))
     except real_team.TeamFailed as error:
         print(f"\n{error}", file=sys.stderr)
         return FAILED
@@ -64,6 +69,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument("--view", action="store_true", help="show it on the live map meanwhile")
     parser.add_argument("--dataset", type=Path, metavar="FILE", help="play this recording")
     parser.add_argument("--seed", type=int, default=1, help="of the simulated world (default 1)")
     parser.add_argument("--robots", type=int, default=3, help="in the simulated world (default 3)")
@@ -77,6 +83,23 @@ def _recording(options: argparse.Namespace) -> Recording:
     if options.dataset is not None:
         return read(options.dataset)
     return world.simulate(world.Scene(options.robots, options.seconds), options.seed)
+
+
+@contextlib.asynccontextmanager
+async def live_map(port: int, http_port: int = HTTP_PORT) -> AsyncIterator[None]:
+    """`drslamd view` of this host's team, as anybody would start it; it says its address itself.
+
+    Args:
+        port: of the team's multicast group; http_port: of the page.
+    """
+    flags = ("--interface", "127.0.0.1", "--port", str(port), "--http-port", str(http_port))
+    process = await asyncio.create_subprocess_exec(sys.executable, "-m", "drslamd", "view", *flags)
+    try:
+        yield
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            process.terminate()
+        await process.wait()
 
 
 def _report(recording: Recording, result: Outcome, options: argparse.Namespace) -> int:

@@ -11,6 +11,7 @@ import tempfile
 import time
 import tty
 from collections.abc import Callable
+from contextlib import AbstractAsyncContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 
@@ -280,8 +281,14 @@ async def run(
     extra: str = "",
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
+    beside: Callable[[int], AbstractAsyncContextManager[None]] | None = None,
 ) -> Outcome:
-    """Start a team, play the recording to it, ask it."""
+    """Start a team, play the recording to it, ask it.
+
+    Args:
+        beside: what runs meanwhile; it is told the port of the group.
+    """
     async with RealTeam(recording, hardware, extra, seed) as team:
-        await team.play(progress)
+        async with beside(team.port) if beside else nullcontext():
+            await team.play(progress)
         return await team.outcome()
