@@ -17,7 +17,7 @@ from typing import Any
 
 import structlog
 
-from drslamd import report
+from drslamd import graph_report, report
 from drslamd.config import Config
 from drslamd.conventions import MILLISECOND_US, SECOND_US
 from drslamd.events import (
@@ -41,6 +41,7 @@ from drslamd.io.serial_port import SerialPort
 from drslamd.io.state_store import StateStore, read_key
 from drslamd.io.status_socket import StatusSocket
 from drslamd.io.systemd import Notifier
+from drslamd.io.wall_clock import read_wall_clock
 from drslamd.io.worker import Finished, Worker
 from drslamd.parts import dbc_text, make_transport, make_wheels
 from drslamd.robot import Robot
@@ -85,7 +86,8 @@ class Daemon:
         self._pace = Pace()
         questions: dict[str, Callable[[], Any]] = {
             "status": self._picture,
-            "trajectory": lambda: report.trajectories(self.robot),
+            "trajectory": self._paths,
+            "graph": self._graph,
             "closures": lambda: report.closures(self.robot),
         }
         self._status = StatusSocket(socket_path(config), questions)
@@ -267,6 +269,14 @@ class Daemon:
         picture = report.status(self.robot, self._clock.now())
         picture["network"]["dropped"] = self._transport.dropped
         return {**picture, "ms": self._pace.milliseconds(), "loop_lag_ms": self._pace.lag()}
+
+    def _paths(self) -> dict[str, Any]:
+        paths = report.trajectories(self.robot, self._clock.now())
+        return {**paths, "wall": read_wall_clock(self._clock)._asdict()}
+
+    def _graph(self) -> dict[str, Any]:
+        graph = graph_report.graph(self.robot, self._clock.now())
+        return {**graph, "wall": read_wall_clock(self._clock)._asdict()}
 
     def _one_line(self) -> str:
         picture = report.status(self.robot, self._clock.now())

@@ -21,6 +21,7 @@ RINGS = {
         "sensors",
         "slam",
         "lcmtypes",
+        "history",
         "gossip",
         "memory",
         "timers",
@@ -30,10 +31,12 @@ RINGS = {
         "broadcast",
         "conditions",
         "robot",
+        "clock_report",
         "report",
+        "graph_report",
         "status_text",
     ],
-    "shell": ["io"],
+    "shell": ["io", "export"],
     "entry": ["parts", "daemon", "cli", "__main__"],
 }
 """From the inside out; a module imports only from its own ring and those before it."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drslamd.io.tum import write
+from drslamd.export.tum_files import write
 
 
 def test_tum_files_have_eight_columns_and_rising_times(tmp_path: Path) -> None:
