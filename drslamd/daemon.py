@@ -17,7 +17,7 @@ from typing import Any
 
 import structlog
 
-from drslamd import graph_report, report
+from drslamd import report
 from drslamd.config import Config
 from drslamd.conventions import MILLISECOND_US, SECOND_US
 from drslamd.events import (
@@ -44,6 +44,7 @@ from drslamd.io.systemd import Notifier
 from drslamd.io.wall_clock import read_wall_clock
 from drslamd.io.worker import Finished, Worker
 from drslamd.parts import dbc_text, make_transport, make_wheels
+from drslamd.reports import graph_report
 from drslamd.robot import Robot
 from drslamd.slam.calibration.sensor_calibration import SensorCalibration
 
@@ -276,7 +277,8 @@ class Daemon:
 
     def _graph(self) -> dict[str, Any]:
         graph = graph_report.graph(self.robot, self._clock.now())
-        return {**graph, "wall": read_wall_clock(self._clock)._asdict()}
+        windows = report.closures(self.robot)["closures"]
+        return {**graph, "windows": windows, "wall": read_wall_clock(self._clock)._asdict()}
 
     def _one_line(self) -> str:
         picture = report.status(self.robot, self._clock.now())

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from drslamd import clock_report
 from drslamd.conventions import GRID_US, SECOND_US
 from drslamd.events import PortCondition
 from drslamd.gossip.message_types import PoseState
 from drslamd.gossip.peer import Peer
+from drslamd.reports import clock_report
 from drslamd.robot import Robot
 from drslamd.slam.consistency.pair import PairTracker
 from drslamd.slam.graph.trajectory import deform_track
@@ -181,7 +181,7 @@ def trajectories(robot: Robot, utime: int) -> dict[str, Any]:
     """Everybody's path in the frame of the team: ours at 10 Hz, the others' keyframes.
 
     Times are microseconds on the clock of the robot that drove the path; beside them is how far
-    that was from ours (`clock_report.clock`).
+    that was from ours (`reports.clock_report.clock`).
     """
     estimate = robot.back.estimate
     if estimate is None:

@@ -51,5 +51,5 @@ def edges(answer: Mapping[str, Any], table: str) -> tuple[Array, Array, Array]:
 
 
 def seconds(unix_us: int) -> str:
-    """UNIX seconds with all their microseconds, which a float of JSON would round."""
-    return f"{unix_us // 1_000_000}.{unix_us % 1_000_000:06d}"
+    """UNIX seconds to the microsecond."""
+    return f"{unix_us / 1e6:.6f}"

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from drslamd.export import stamps
-from drslamd.export.files import replaced
 from drslamd.export.answers import keyframe_times, seconds
+from drslamd.export.files import replaced
 
 STATES = ("not localised", "localised", "doubtful", "stale")
 """Words of `PoseState`."""

@@ -2,7 +2,7 @@
 
 ``VERTEX_SE2 key x y theta``, ``EDGE_SE2 i j x y theta`` and six of the information matrix; m, rad.
 Nothing is said to be fixed: GTSAM reads no edge behind ``FIX``. Odometry is without the scale
-and yaw rate that were learned. Ranges have no line in this format (`drslamd.export.pyfg_file` has them);
+and yaw rate that were learned. Ranges have no line in this format (`pyfg_file` has them);
 whose keyframe a key is, and when, is in ``keyframes.csv``.
 """
 
@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from drslamd.export.answers import columns, edges
 from drslamd.export.csv_tables import keyframe_rows
 from drslamd.export.files import replaced
-from drslamd.export.answers import columns, edges
 
 
 def write(folder: Path, answer: Mapping[str, Any]) -> list[Path]:

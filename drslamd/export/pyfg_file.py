@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from drslamd.export.files import replaced
 from drslamd.export.answers import Array, columns, edges, keyframe_times, seconds
+from drslamd.export.files import replaced
 
 LETTERS = [letter for letter in string.ascii_uppercase + string.ascii_lowercase if letter != "L"]
 """L is for landmarks."""

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from drslamd.export import stamps
+from drslamd.export.answers import seconds
 from drslamd.export.files import replaced
 
 
@@ -29,7 +30,7 @@ def write(folder: Path, trajectories: dict[str, Any]) -> list[Path]:
         frame = f"in the odometry frame of robot {trajectories['frame']}"
         lines = [f"# {stamps.sentences(robot, clock, known, wall)}; {frame}"]
         lines += [
-            f"{unix_us // 1_000_000}.{unix_us % 1_000_000:06d} {x:.6f} {y:.6f} 0 0 0 "
+            f"{seconds(unix_us)} {x:.6f} {y:.6f} 0 0 0 "
             f"{math.sin(th / 2):.9f} {math.cos(th / 2):.9f}"
             for unix_us, (x, y, th) in zip(known.unix_us.tolist(), path["poses"], strict=True)
         ]

@@ -18,12 +18,12 @@ from mcap.writer import Writer
 
 from drslamd import __version__
 from drslamd.export import stamps
+from drslamd.export.answers import columns, keyframe_times
 from drslamd.export.files import replaced
 from drslamd.export.ros2 import nouns
 from drslamd.export.ros2.cdr import serialised
 from drslamd.export.ros2.definitions import schema_name, schema_text
-from drslamd.export.ros2.health import diagnostics
-from drslamd.export.answers import columns, keyframe_times
+from drslamd.export.ros2.diagnostics import diagnostics
 from drslamd.slam import se2
 
 Said = tuple[int, str, str, Mapping[str, Any]]

@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from drslamd import clock_report
 from drslamd.conventions import GRID_US
-from drslamd.history.pose_history import COLUMNS as POSE_COLUMNS
-from drslamd.report import closures
+from drslamd.history import pose_history
+from drslamd.reports import clock_report
 from drslamd.robot import Robot
 from drslamd.slam import se2, settings
 from drslamd.slam.graph import team_frame
@@ -45,11 +44,11 @@ them."""
 
 
 def graph(robot: Robot, utime: int) -> dict[str, Any]:
-    """Keyframes with their solved poses, odometry, closures and ranges between them, the answers
-    of module 1, the poses that were published of late, and all clocks against ours."""
+    """Keyframes with their solved poses, odometry, closures and ranges between them, the poses that
+    were published of late, and all clocks against ours."""
     estimate, own = robot.back.estimate, robot.own
     out: dict[str, Any] = {"robot": own.robot, "epoch": own.epoch, "utime": utime, "frame": None}
-    out |= {"windows": closures(robot)["closures"], "poses": _published(robot)}
+    out["poses"] = _published(robot)
     chains = {own.robot: own} | {k: peer.chain for k, peer in robot.team.peers.items()}
     if estimate is not None:
         out["frame"] = estimate.frame.robot
@@ -151,4 +150,4 @@ def _published(robot: Robot) -> dict[str, Any]:
     """Everybody's poses of late, as they were published, on their own clocks."""
     said = {k: peer.poses for k, peer in robot.team.peers.items()}
     said[robot.own.robot] = robot.broadcast.poses
-    return {str(k): _table(POSE_COLUMNS, poses.rows()) for k, poses in sorted(said.items())}
+    return {str(k): _table(pose_history.COLUMNS, poses.rows()) for k, poses in sorted(said.items())}
