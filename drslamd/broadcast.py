@@ -26,6 +26,7 @@ from drslamd.gossip.message_types import (
     Status,
 )
 from drslamd.gossip.team import Team
+from drslamd.history.pose_history import PoseHistory
 from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.front_end import FrontEnd
@@ -56,6 +57,8 @@ class Broadcast:
         self._status_said = self._pose_said = -QUIET_US
         self._pose: tuple[Segment, PoseState, Array] | None = None
         """What was said last: in whose frame, what it was worth, and the pose."""
+        self.poses = PoseHistory()
+        """What was said before."""
         self._odometry_said: deque[tuple[int, int]] = deque(maxlen=BATCHES)
         """When batches were said, and one past the last sample of each."""
 
@@ -153,6 +156,7 @@ class Broadcast:
         if not is_sayable(message):
             return []
         self._pose, self._pose_said = (frame, where.state, found.pose), utime
+        self.poses.add(message.row())
         return [self._team.send(message, utime)]
 
     def public(self, said: list[PublicPoses], utime: int) -> list[Effect]:

@@ -39,9 +39,11 @@ from drslamd.io.serial_port import SerialPort
 from drslamd.io.state_store import StateStore, read_key
 from drslamd.io.status_socket import StatusSocket
 from drslamd.io.systemd import Notifier
+from drslamd.io.wall_clock import read_wall_clock
 from drslamd.io.worker import Finished, Worker
 from drslamd.machine.folders import socket_path, state_dir
 from drslamd.parts import dbc_text, make_transport, make_wheels
+from drslamd.reports import graph_report
 from drslamd.robot import Robot
 from drslamd.slam.calibration.sensor_calibration import SensorCalibration
 
@@ -82,7 +84,8 @@ class Daemon:
         self._pace = Pace()
         questions: dict[str, Callable[[], Any]] = {
             "status": self._picture,
-            "trajectory": lambda: report.trajectories(self.robot),
+            "trajectory": self._paths,
+            "graph": self._graph,
             "closures": lambda: report.closures(self.robot),
         }
         self._status = StatusSocket(socket_path(config), questions)
@@ -265,6 +268,15 @@ class Daemon:
         picture["network"]["dropped"] = self._transport.dropped
         picture["cpu_s"] = round(cpu_s(), 3)
         return {**picture, "ms": self._pace.milliseconds(), "loop_lag_ms": self._pace.lag()}
+
+    def _paths(self) -> dict[str, Any]:
+        paths = report.trajectories(self.robot, self._clock.now())
+        return {**paths, "wall": read_wall_clock(self._clock)._asdict()}
+
+    def _graph(self) -> dict[str, Any]:
+        graph = graph_report.graph(self.robot, self._clock.now())
+        windows = report.closures(self.robot)["closures"]
+        return {**graph, "windows": windows, "wall": read_wall_clock(self._clock)._asdict()}
 
     def _one_line(self) -> str:
         picture = report.status(self.robot, self._clock.now())

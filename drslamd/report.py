@@ -14,6 +14,7 @@ from drslamd.conventions import GRID_US, SECOND_US
 from drslamd.events import PortCondition
 from drslamd.gossip.message_types import PoseState
 from drslamd.gossip.peer import Peer
+from drslamd.reports import clock_report
 from drslamd.robot import Robot
 from drslamd.slam.consistency.pair import PairTracker
 from drslamd.slam.graph.trajectory import deform_track
@@ -186,10 +187,11 @@ def _graph(robot: Robot) -> dict[str, Any]:
     return out
 
 
-def trajectories(robot: Robot) -> dict[str, Any]:
+def trajectories(robot: Robot, utime: int) -> dict[str, Any]:
     """Everybody's path in the frame of the team: ours at 10 Hz, the others' keyframes.
 
-    Times are microseconds on the clock of the robot that drove the path.
+    Times are microseconds on the clock of the robot that drove the path; beside them is how far
+    that was from ours (`reports.clock_report.clock`).
     """
     estimate = robot.back.estimate
     if estimate is None:
@@ -203,8 +205,9 @@ def trajectories(robot: Robot) -> dict[str, Any]:
             )
         out[str(number)] = {
             "epoch": solved.chain.epoch,
-            "utime": (n * GRID_US).astype(int).tolist(),
+            "utime": (n * GRID_US).astype(np.int64).tolist(),
             "poses": np.round(poses, 6).tolist(),
+            "clock": clock_report.clock(robot, solved.chain, utime),
         }
     return {"frame": estimate.frame.robot, "robots": out}
 

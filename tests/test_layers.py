@@ -21,6 +21,7 @@ RINGS = {
         "sensors",
         "slam",
         "lcmtypes",
+        "history",
         "gossip",
         "memory",
         "timers",
@@ -30,11 +31,12 @@ RINGS = {
         "broadcast",
         "conditions",
         "robot",
+        "reports",
         "report",
         "status_text",
         "status_table",
     ],
-    "shell": ["host", "io"],
+    "shell": ["host", "io", "export"],
     "entry": ["parts", "machine", "doctor", "daemon", "view", "cli", "__main__"],
 }
 """From the inside out; a module imports only from its own ring and those before it."""

@@ -19,7 +19,7 @@ from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 
 
 def test_without_an_estimate_there_are_no_paths() -> None:
-    assert report.trajectories(RobotScene().robot) == {"frame": None, "robots": {}}
+    assert report.trajectories(RobotScene().robot, T0) == {"frame": None, "robots": {}}
 
 
 def test_our_path_is_said_at_ten_hertz_and_those_of_others_at_their_keyframes() -> None:
@@ -33,12 +33,13 @@ def test_our_path_is_said_at_ten_hertz_and_those_of_others_at_their_keyframes() 
     own = Trajectory(scene.robot.own, ends, turned)
     other = Trajectory(Chain(1, 8), np.array([40, 50]), np.array([[1, 2, 3], [4, 5, 6.0]]))
     scene.robot.back.on_solution(TeamEstimate(Segment(1, 8, 0), {2: own, 1: other}))
-    told = json.loads(json.dumps(report.trajectories(scene.robot)))
+    told = json.loads(json.dumps(report.trajectories(scene.robot, scene.utime)))
     assert (told["frame"], list(told["robots"])) == (1, ["1", "2"])
     assert told["robots"]["1"] == {
         "epoch": 8,
         "utime": [4 * SECOND, 5 * SECOND],
         "poses": [[1, 2, 3], [4, 5, 6]],
+        "clock": {"source": "unknown", "readings": []},
     }
     ours = told["robots"]["2"]
     assert ours["utime"] == [(first + k) * GRID_US for k in range(30)]
@@ -57,7 +58,7 @@ def test_our_path_also_goes_where_keyframes_were_thinned_out() -> None:
     scene.robot.back.on_solution(TeamEstimate(frame, {0: whole}))
     thinned = Trajectory(own, whole.n[[0, 2]], bent[[0, 2]])
     scene.robot.back.on_solution(TeamEstimate(frame, {0: thinned}))
-    poses = report.trajectories(scene.robot)["robots"]["0"]["poses"]
+    poses = report.trajectories(scene.robot, scene.utime)["robots"]["0"]["poses"]
     assert poses[10] == pytest.approx([0.5, 0.2, 0.0], abs=1e-6)
 
 

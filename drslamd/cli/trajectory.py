@@ -21,7 +21,9 @@ def add(verbs: Verbs) -> None:
         "everybody's path in the team's frame",
         "  drslamd trajectory -c /etc/drslamd/3.toml --tum out/",
     )
-    trajectory.add_argument("--tum", metavar="DIR", help="write one TUM file per robot there")
+    trajectory.add_argument(
+        "--tum", metavar="DIR", help="write one TUM file per robot there, in UNIX time"
+    )
 
 
 def _trajectory(options: argparse.Namespace) -> int:
@@ -31,8 +33,12 @@ def _trajectory(options: argparse.Namespace) -> int:
     if options.tum is None:
         print(json.dumps(answer))
         return OK
-    from drslamd.io.tum import write
+    from drslamd.export.stamps import complaints
+    from drslamd.export.tum_files import write
 
+    clocks = {robot: path["clock"] for robot, path in answer["robots"].items()}
+    for sentence in complaints(answer, clocks):
+        print(sentence, file=sys.stderr)
     try:
         for path in write(Path(options.tum), answer):
             print(path)

@@ -97,5 +97,9 @@ class Pose:
     pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
     covariance: tuple[float, ...] = (0.0,) * 6
 
+    def row(self) -> list[float]:
+        """As `pose_history.COLUMNS` names its numbers."""
+        return [self.pose_utime, self.state, self.frame, *self.pose, *self.covariance]
+
 
 Message = Union[Status, OdometryBatch, GraphEntry, Pose, PublicPoses]

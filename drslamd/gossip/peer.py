@@ -17,6 +17,8 @@ from drslamd.gossip.message_types import (
     Status,
 )
 from drslamd.gossip.peer_clock import PeerClock
+from drslamd.history.clock_history import ClockHistory, ClockReading
+from drslamd.history.pose_history import PoseHistory
 from drslamd.slam.odometry.track import PEER_TRACK_SAMPLES, Track
 from drslamd.slam.peer_in_range import PeerInRange
 
@@ -54,9 +56,11 @@ class Peer:
     def __init__(self, chain: Chain, utime: int) -> None:
         self.chain = chain
         self.clock = PeerClock()
+        self.clock_history = ClockHistory()
         self.track = Track(PEER_TRACK_SAMPLES)
         self.status: Status | None = None
         self.pose: Pose | None = None
+        self.poses = PoseHistory()
         self.last_heard = utime
         self.received = 0
         self._status_counter = self._pose_counter = 0
@@ -91,6 +95,9 @@ class Peer:
         self._remember(status, utime)
         of_us = self._named_as(own)
         self.clock.echoed((of_us.heard.delay_us, of_us.utime) if of_us else None)
+        offset = self.clock.offset(utime)
+        if offset is not None:
+            self.clock_history.add(ClockReading(utime, offset.us, offset.uncertainty_us))
         return True
 
     def _remember(self, status: Status, utime: int) -> None:
@@ -110,6 +117,7 @@ class Peer:
         """Keep the latest pose."""
         if not _is_overtaken(counter, self._pose_counter):
             self._pose_counter, self.pose = counter, pose
+            self.poses.add(pose.row())
 
     def extend_track(self, batch: OdometryBatch, utime: int) -> None:
         """Append what is new in a batch; one that leaves a gap waits for those before it."""

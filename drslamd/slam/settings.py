@@ -59,11 +59,17 @@ def closure_method(section: RelativePoseSection, tuning: Tuning = DEFAULTS) -> C
 
 def optimizer(config: Config, own: Chain, tuning: Tuning = DEFAULTS) -> Optimizer:
     """Of `optimizer.algorithm`."""
-    section, ranges = config.optimizer, config.relative_pose
+    section = config.optimizer
     if section.algorithm == "rbcd":
         return RbcdOptimizer(own, section.rank)
     if section.algorithm == "closures":
         return ClosureOptimizer(tuning.believable)
+    return banded_optimizer(config, tuning)
+
+
+def banded_optimizer(config: Config, tuning: Tuning = DEFAULTS) -> BandedOptimizer:
+    """The numbers of ranges and odometry, whatever solves them."""
+    ranges = config.relative_pose
     return BandedOptimizer(
         bias_sigma=ranges.range_bias_sigma_m,
         range_sigma=ranges.range_sigma_m,

@@ -51,6 +51,14 @@ def config(tmp_path: Path) -> Iterator[Path]:
         yield path
 
 
+def told(team: VirtualTeam) -> Any:
+    """By robot 1, whose host's wall clock shows the time of the recording."""
+    member, now = team.member(1), team.simulator.now
+    utime = member.clock.local(now)
+    wall = {"utc_minus_clock_us": now - utime, "uncertainty_us": 0}
+    return {**report.trajectories(member.robot, utime), "wall": wall}
+
+
 def ask(config: Path, answer: Any, *arguments: str) -> int:
     socket = Path(config.read_text().rpartition("status_socket = ")[2].strip().strip('"'))
     with answering(socket, answer):
@@ -60,7 +68,7 @@ def ask(config: Path, answer: Any, *arguments: str) -> int:
 def test_it_prints_everybodys_path_as_json(
     team: VirtualTeam, config: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    answer = report.trajectories(team.member(1).robot)
+    answer = told(team)
     assert ask(config, answer) == 0
     assert json.loads(capsys.readouterr().out) == answer
     assert answer["frame"] == 0
@@ -72,7 +80,7 @@ def test_tum_files_hold_the_paths_in_one_frame(
 ) -> None:
     """Read as other tools read them; own path at 10 Hz; one SE(2) brings both onto the truth."""
     out = tmp_path / "new" / "tum"
-    assert ask(config, report.trajectories(team.member(1).robot), "--tum", str(out)) == 0
+    assert ask(config, told(team), "--tum", str(out)) == 0
     files = {robot: out / f"robot{robot}.txt" for robot in (0, 1)}
     assert capsys.readouterr().out.split() == [str(path) for path in files.values()]
     found, true = {}, {}
@@ -82,12 +90,11 @@ def test_tum_files_hold_the_paths_in_one_frame(
         assert (np.diff(table[:, 0]) > 0).all()
         yaw = Rotation.from_quat(table[:, 4:]).as_euler("zyx")
         assert np.abs(np.column_stack([table[:, 3], yaw[:, 1:]])).max() < 1e-6
-        clock, trail = team.member(robot).clock, team.recording.trails[robot]
-        t = np.array([clock.world(round(1e6 * s)) / 1e6 for s in table[:, 0]])
+        trail, t = team.recording.trails[robot], table[:, 0]
         found[robot] = np.column_stack([table[:, 1:3], yaw[:, 0]])
         true[robot] = metrics.at_times(trail.t, trail.truth, t)
         if robot == 1:
-            assert np.diff(table[:, 0]) == pytest.approx(0.1, abs=1e-6)
+            assert np.diff(t) == pytest.approx(0.1, abs=1e-6)
             assert t[-1] > 39.0
     same = {robot: np.zeros(len(poses)) for robot, poses in found.items()}
     errors = metrics.team_errors(metrics.aligned(found, true, same), true)["team"]
@@ -100,8 +107,8 @@ def test_who_is_not_localised_yet_has_no_files(
 ) -> None:
     lonely = VirtualTeam(SCENE, on=(1,))
     lonely.run(1.0)
-    answer = report.trajectories(lonely.member(1).robot)
-    assert answer == {"frame": None, "robots": {}}
+    answer = told(lonely)
+    assert (answer["frame"], answer["robots"]) == (None, {})
     assert ask(config, answer, "--tum", str(tmp_path / "tum")) == 0
     assert capsys.readouterr().out == ""
 
@@ -110,6 +117,6 @@ def test_a_folder_that_cannot_be_made_ends_with_73(
     team: VirtualTeam, config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "file").write_text("")
-    answer = report.trajectories(team.member(1).robot)
+    answer = told(team)
     assert ask(config, answer, "--tum", str(tmp_path / "file" / "tum")) == 73
     assert "Not a directory" in capsys.readouterr().err

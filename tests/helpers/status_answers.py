@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,23 @@ from drslamd.io.status_socket import StatusSocket
 
 @contextmanager
 def answering(path: Path, answer: Any, question: str = "trajectory") -> Iterator[None]:
+    """A daemon that knows one question."""
+    with answering_all(path, {question: answer}):
+        yield
+
+
+@contextmanager
+def answering_all(path: Path, answers: Mapping[str, Any]) -> Iterator[None]:
     """A status socket in a thread of its own, as the daemon has one."""
     ready = threading.Event()
     ends: list[tuple[asyncio.AbstractEventLoop, asyncio.Event]] = []
 
+    questions: dict[str, Callable[[], Any]] = {
+        name: partial(dict, answer) for name, answer in answers.items()
+    }
+
     async def serve() -> None:
-        server, end = StatusSocket(path, {question: lambda: answer}), asyncio.Event()
+        server, end = StatusSocket(path, questions), asyncio.Event()
         assert await server.open() == ""
         ends.append((asyncio.get_running_loop(), end))
         ready.set()

@@ -100,7 +100,11 @@ def test_the_figures_are_what_such_a_team_reaches(run: Run) -> None:
     [
         ("gone.pyfg", None, "No such file or directory"),
         ("run.bag", "x", "readers exist for .pyfg"),
-        ("bad.pyfg", "VERTEX_SE2 1 A0\n", "bad.pyfg line 1: VERTEX_SE2 has 3 words, not 6"),
+        (
+            "bad.pyfg",
+            "VERTEX_SE2 1 A0\n",
+            "bad.pyfg line 1: VERTEX_SE2 has 2 fields; t key x y yaw belong",
+        ),
     ],
 )
 def test_a_recording_that_cannot_be_used_ends_with_66_and_one_sentence(

@@ -43,7 +43,7 @@ def played(piece: Piece, optimizer: str = "banded") -> Simulator:
 def said(simulator: Simulator) -> str:
     """What the first robot makes of it."""
     robot = simulator.members[0].robot
-    return repr([report.trajectories(robot), report.closures(robot)])
+    return repr([report.trajectories(robot, 0), report.closures(robot)])
 
 
 @cache

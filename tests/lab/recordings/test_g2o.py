@@ -44,12 +44,29 @@ def test_vertices_are_kept_and_missing_ones_are_nan(tmp_path: Path) -> None:
     ("text", "what"),
     [
         ("", "no EDGE_SE2 line"),
-        ("EDGE_SE2 0 1 1 2 3\n", "line 1: 3 numbers, 9 belong here"),
-        (EDGE + "EDGE_SE3:QUAT 0 1\n", "line 2: EDGE_SE3:QUAT is not"),
-        (EDGE.replace("1.5", "nan"), "line 1: a number that is not finite"),
-        (EDGE.replace("7", "x"), "line 1: invalid literal"),
+        ("EDGE_SE2 0 1 1 2 3\n", "line 1: 3 numbers stand there, 9 belong there: dx dy dyaw I11"),
+        ("EDGE_SE2 0\n", "line 1: nothing is no id: a whole number below 2"),
+        ("VERTEX_SE2\n", "line 1: .* x y yaw"),
+        ("VERTEX_SE2 9223372036854775808 0 0 0\n", "line 1: 9223372036854775808 is no id"),
+        (
+            EDGE + "EDGE_SE3:QUAT 0 1\n",
+            "line 2: EDGE_SE3:QUAT is not .*VERTEX_SE2, EDGE_SE2 and FIX",
+        ),
+        (EDGE.replace("1.5", "nan"), "line 1: nan is not a finite number"),
+        (EDGE.replace("7", "x"), "line 1: x is no id"),
     ],
 )
 def test_what_cannot_be_read_is_said_with_its_line(tmp_path: Path, text: str, what: str) -> None:
     with pytest.raises(BadRecording, match=what):
         graph(tmp_path, text)
+
+
+def test_comments_and_a_byte_order_mark_change_nothing(tmp_path: Path) -> None:
+    read = graph(tmp_path, "\ufeff# by hand\n" + EDGE + "  # 7 9\n// end\n")
+    assert (read.ids.tolist(), len(read.i)) == ([7, 9], 1)
+
+
+def test_the_largest_id_is_read(tmp_path: Path) -> None:
+    read = graph(tmp_path, EDGE.replace("7", str((1 << 63) - 1), 1))
+    assert read.ids.tolist() == [9, (1 << 63) - 1]
+    assert (read.i.tolist(), read.j.tolist()) == ([1], [0])

@@ -91,13 +91,14 @@ def outcome(simulator: Simulator) -> Outcome:
     """Ask every robot of a simulation what a daemon would be asked."""
     out = Outcome()
     for robot, member in simulator.members.items():
+        now = member.clock.local(simulator.now)
         add_answers(
             out,
             robot,
             member.clock,
-            report.trajectories(member.robot),
+            report.trajectories(member.robot, now),
             report.closures(member.robot),
-            report.status(member.robot, member.clock.local(simulator.now)),
+            report.status(member.robot, now),
         )
         out.live[robot] = _live(member)
         for name, ms in member.traces.solve_ms.items():

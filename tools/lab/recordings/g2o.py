@@ -2,7 +2,8 @@
 
 Lines: ``VERTEX_SE2 id x y yaw`` and ``EDGE_SE2 i j dx dy dyaw I11 I12 I13 I22 I23 I33``
 (information of x, y, yaw in the frame of i). ``FIX id`` says nothing that is needed here. Every
-edge line is one measurement: two between the same two poses both count, and an empty line is none.
+edge line is one measurement: two between the same two poses both count; empty lines and comments
+are none. An id is a whole number, be it one of GTSAM with the letter of a robot in its upper byte.
 """
 
 from __future__ import annotations
@@ -13,9 +14,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lab.recordings import text_lines
 from lab.recordings.recording import Array, BadRecording
 
 Index = NDArray[np.int64]
+
+EDGE = "dx dy dyaw I11 I12 I13 I22 I23 I33"
 
 
 @dataclass(frozen=True)
@@ -47,19 +51,19 @@ def read(path: Path) -> G2o:
     vertices: dict[int, list[float]] = {}
     ends: list[tuple[int, int]] = []
     values: list[list[float]] = []
-    for number, line in enumerate(path.read_text().splitlines(), start=1):
-        words = line.split()
+    for number, words in text_lines.worded(path):
         try:
-            if not words or words[0] == "FIX":
-                continue
             if words[0] == "VERTEX_SE2":
-                vertices[int(words[1])] = _numbers(words[2:], 3)
+                vertices[_key(words, 1)] = text_lines.numbers(words[2:], "x y yaw")
             elif words[0] == "EDGE_SE2":
-                ends.append((int(words[1]), int(words[2])))
-                values.append(_numbers(words[3:], 9))
-            else:
-                raise ValueError(f"{words[0]} is not a line of a planar pose graph")
-        except (IndexError, ValueError) as error:
+                ends.append((_key(words, 1), _key(words, 2)))
+                values.append(text_lines.numbers(words[3:], EDGE))
+            elif words[0] != "FIX":
+                raise ValueError(
+                    f"{words[0][:40]} is not a line of a planar pose graph: "
+                    "VERTEX_SE2, EDGE_SE2 and FIX are"
+                )
+        except ValueError as error:
             raise BadRecording(f"{path.name} line {number}: {error}") from None
     if not ends:
         raise BadRecording(f"{path.name}: no EDGE_SE2 line")
@@ -74,10 +78,8 @@ def read(path: Path) -> G2o:
     return G2o(path.name, ids, poses, i, j, table[:, :3], information)
 
 
-def _numbers(words: list[str], count: int) -> list[float]:
-    if len(words) != count:
-        raise ValueError(f"{len(words)} numbers, {count} belong here")
-    values = [float(word) for word in words]
-    if not np.isfinite(values).all():
-        raise ValueError("a number that is not finite")
-    return values
+def _key(words: list[str], place: int) -> int:
+    word = words[place] if place < len(words) else "nothing"
+    if not (word.isdecimal() and len(word) < 20 and int(word) < 1 << 63):
+        raise ValueError(f"{word[:40]} is no id: a whole number below 2^63 belongs there")
+    return int(word)

@@ -27,6 +27,12 @@ def read(path: Path) -> Recording:
     """
     try:
         content = loadmat(path, squeeze_me=True, struct_as_record=False)
+    except OSError:
+        raise
+    except Exception as error:  # the parser ends with whatever a damaged file makes of it
+        reason = str(error).partition("\n")[0][:80]
+        raise BadRecording(f"{path.name}: not a file of MATLAB ({reason})") from None
+    try:
         robots, pairs = np.atleast_1d(content["robot"]), np.atleast_1d(content["range_m"])
         found = {int(robot.id): _robot(robot) for robot in robots}
         measured = [_pair(pair, set(found)) for pair in pairs]

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lab.recordings import text_lines
 from lab.recordings.recording import Array, BadRecording, EdgeRecording, Trail
 from lab.score import metrics
 
@@ -82,16 +83,11 @@ def _number(file: Path) -> int:
 def _table(file: Path, names: int) -> Array:
     """(k, 4) Unix s, x, y, yaw after so many columns of names; stamps ascending."""
     rows = []
-    for number, line in enumerate(file.read_text().splitlines(), start=1):
-        words = line.split()
-        if not words:
-            continue
+    for number, words in text_lines.worded(file):
         try:
-            rows.append([float(word) for word in words[names : names + 4]])
+            rows.append(text_lines.numbers(words[names : names + 4], "t x y yaw"))
         except ValueError as error:
             raise BadRecording(f"{file.name} line {number}: {error}") from None
-        if len(rows[-1]) != 4:
-            raise BadRecording(f"{file.name} line {number}: {len(words)} words")
     table = np.array(rows).reshape(-1, 4)
     if len(table) < 3:
         raise BadRecording(f"{file.name}: fewer than three lines")

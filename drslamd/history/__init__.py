@@ -1,0 +1,1 @@
+"""What a robot remembers only to tell it when somebody asks; no decision rests on it."""

@@ -1,0 +1,1 @@
+"""What a robot knows of clocks and graph, as plain dictionaries for whoever asks."""

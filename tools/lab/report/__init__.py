@@ -1,0 +1,1 @@
+"""``tools/report``: a run as one page, with everything that says why it came out so."""

@@ -1,0 +1,91 @@
+"""tools/report: run the team on a recording and write one page about it.
+
+Exit codes: 0 done, 2 wrong usage, 66 unusable recording, 73 the page cannot be written, 78 fault in
+--config.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from drslamd import __version__
+from drslamd.config import ConfigError
+from drslamd.export.files import replaced
+from lab.play import edge_run, virtual_team
+from lab.play.virtual_team import SETTLE_S
+from lab.progress import Progress
+from lab.recordings.readers import READERS, has_edges, read, read_edges
+from lab.recordings.recording import BadRecording
+from lab.report.evidence import gather
+from lab.report.page import edge_page, page
+from lab.score import outcome
+
+NO_INPUT, CANNOT_WRITE, BAD_CONFIG = 66, 73, 78
+
+EXAMPLES = """\
+examples:
+  tools/report run.pyfg                           writes run.html
+  tools/report run.pyfg --to out/run.html         writes it there
+  tools/report run.pyfg --config rbcd.toml        with sections added to every robot's TOML
+"""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run it; the exit code."""
+    options = _parser().parse_args(arguments)
+    to = options.to or Path(f"{options.recording.stem}.html")
+    try:
+        extra = options.config.read_text() if options.config else ""
+        text = _report(options.recording, extra)
+    except (BadRecording, OSError) as error:
+        print(error, file=sys.stderr)
+        return NO_INPUT
+    except ConfigError as error:
+        print(error, file=sys.stderr)
+        return BAD_CONFIG
+    try:
+        to.parent.mkdir(parents=True, exist_ok=True)
+        replaced(to, text)
+    except OSError as error:
+        print(f"{to}: {error.strerror}", file=sys.stderr)
+        return CANNOT_WRITE
+    print(to)
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="tools/report",
+        description=f"Run the team on a recording ({', '.join(READERS)}, folder): one HTML page.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("recording", type=Path, metavar="RECORDING")
+    parser.add_argument("--to", type=Path, metavar="FILE", help="the page (default RECORDING.html)")
+    parser.add_argument("--config", type=Path, metavar="TOML", help="sections for every robot")
+    return parser
+
+
+def _report(path: Path, extra: str) -> str:
+    """The page."""
+    configured = "defaults" if not extra else "with the sections of --config"
+    about = f"drslamd {__version__}, in virtual time, {configured}"
+    if has_edges(path):
+        edges = read_edges(path)
+        progress = Progress("rounds of optimisation, at most", edge_run.MOST_ROUNDS, "")
+        result, _ = edge_run.run(edges, extra, progress)
+        progress.end()
+        return edge_page(edges, result, outcome.score(edges, result), about)
+    recording = read(path)
+    progress = Progress(f"{len(recording.trails)} robots", recording.duration + SETTLE_S)
+    simulator = virtual_team.play(recording, extra=extra, progress=progress)
+    progress.end()
+    result = virtual_team.outcome(simulator)
+    evidence, scores = gather(simulator), outcome.score(recording, result)
+    return page(recording, result, evidence, scores, about)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
