@@ -1,7 +1,7 @@
 """tools/replay: recordings of robots once more, faster than they were made.
 
 Exit codes: 0 done (with --check: nothing differs), 1 something differs, 2 wrong usage, 66 no usable
-recording.
+recording, 78 fault in --config.
 """
 
 from __future__ import annotations
@@ -12,18 +12,21 @@ import time
 from pathlib import Path
 
 from drslamd import report, status_text
+from drslamd.config import ConfigError
 from lab.progress import Progress
 from lab.recordings.recording import BadRecording
 from lab.replay.exact import Replayed, Replayer
 from lab.replay.provenance import strangers
 from lab.replay.runs import Run, key_of, read_runs
+from lab.replay.team import gathered, play
 
-DIFFERS, NO_INPUT = 1, 66
+DIFFERS, NO_INPUT, BAD_CONFIG = 1, 66, 78
 
 EXAMPLES = """\
 examples:
   tools/replay robot-003-20261127T021545.123456-0000.lcmlog    what robot 3 knew at the end
   tools/replay recordings/ --check                             does every robot decide as it did?
+  tools/replay recordings/ --config other.toml                 what if?
   tools/replay recordings/ --key team.key                      made with a team key
 """
 
@@ -33,10 +36,16 @@ def main(arguments: list[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         runs = read_runs(options.recordings)
+        if options.config is not None:
+            return _what_if(runs, options.config.read_text(), options.key)
         verdicts = [_replay(run, options.key, options.check) for run in runs]
-    except BadRecording as error:
+    except (BadRecording, OSError) as error:
         print(error, file=sys.stderr)
         return NO_INPUT
+    except ConfigError as error:
+        for fault in error.faults:
+            print(f"{options.config}: {fault}", file=sys.stderr)
+        return BAD_CONFIG
     return 0 if all(verdicts) else DIFFERS
 
 
@@ -50,8 +59,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "recordings", type=Path, nargs="+", metavar="LOG|FOLDER", help="files, or folders of them"
     )
-    parser.add_argument(
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument(
         "--check", action="store_true", help="compare all that is done with what was done then"
+    )
+    what.add_argument(
+        "--config", type=Path, metavar="TOML", help="what if these keys had been set?"
     )
     parser.add_argument(
         "--key", metavar="FILE", help="the team key (default: where the robot had it)"
@@ -75,6 +88,22 @@ def _replay(run: Run, key_file: str | None, is_checked: bool) -> bool:
     for line in status_text.lines(report.status(found.robot, found.utime)):
         print(f"  {line}")
     return True
+
+
+def _what_if(runs: list[Run], extra: str, key_file: str | None) -> int:
+    """All runs together, as they would have been."""
+    team = gathered(runs)
+    progress = Progress(f"{len(team.robots)} robots", team.duration_s)
+    played = play(team, extra, key_file, progress)
+    progress.end()
+    for sentence in team.said():
+        print(sentence)
+    for robot, member in sorted(played.members.items()):
+        now = member.clock.local(played.now)
+        print(f"robot {robot}, what if:")
+        for line in status_text.lines(report.status(member.robot, now)):
+            print(f"  {line}")
+    return 0
 
 
 def _verdict(run: Run, found: Replayed) -> bool:

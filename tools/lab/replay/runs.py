@@ -66,6 +66,11 @@ class Run:
                     last = entry.utime if isinstance(entry, Entry) else last
         return max(last - self.opening.utime, 0) / SECOND_US
 
+    def wall_ahead_us(self) -> int:
+        """How far the wall clock was ahead of the robot's own when the run began."""
+        said = self.opening.provenance.get("clocks", {})
+        return int(said.get("wall_us", 0)) - int(said.get("utime", 0))
+
     def records(self) -> Iterator[Record]:
         """Everything in it; where something is missing, `Told` of kind "gap"."""
         self.said.clear()
