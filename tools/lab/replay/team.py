@@ -36,7 +36,7 @@ from drslamd.recording.records import Marked, Record
 from drslamd.slam.calibration import sensor_calibration
 from drslamd.slam.calibration.sensor_calibration import SensorCalibration
 from lab.play.simulator import Clock, Network, Simulator
-from lab.replay import links
+from lab.replay import mail
 from lab.replay.runs import Run, key_of
 
 FED = (SerialData, CanFrame, PortState, NetworkState)
@@ -56,7 +56,7 @@ class Team:
 
     runs: Sequence[Run]
     clocks: list[Clock]
-    reach: links.Reach
+    reach: mail.Reach
     solve_us: int
 
     @property
@@ -84,16 +84,16 @@ class Team:
 
 def gathered(runs: Sequence[Run]) -> Team:
     """Find the clocks, with the earliest run at time 0."""
-    mails = [links.mail_of(run) for run in runs]
-    clocks = links.clocks(runs, mails)
+    mails = [mail.mail_of(run) for run in runs]
+    clocks = mail.clocks(runs, mails)
     begins = [c.world(run.opening.utime) for run, c in zip(runs, clocks, strict=True)]
     shift = min(begins)
     clocks = [Clock(c.offset_us + round(shift * (1 + c.ppm * 1e-6)), c.ppm) for c in clocks]
-    reach = links.Reach()
+    reach = mail.Reach()
     for a, sender in enumerate(runs):
         for b, receiver in enumerate(runs):
             if sender.robot != receiver.robot:
-                messages = links.travelled(mails[a], mails[b])
+                messages = mail.travelled(mails[a], mails[b])
                 reach.add(sender.robot, clocks[a], receiver.robot, messages)
     return Team(runs, clocks, reach, _median_us(runs))
 
