@@ -266,7 +266,7 @@ def test_the_pages_name_every_tool_and_every_verb() -> None:
     named = [command for page in PAGES for command in all_commands(page)]
     assert PROGRAMS - {"tools/venv"} <= {program for program, _ in named}
     verbs = {arguments[0] for program, arguments in named if program == "drslamd" and arguments}
-    assert verbs == {"check", "keygen", "status", "trajectory"}
+    assert verbs == {"check", "keygen", "record", "status", "trajectory"}
 
 
 @pytest.mark.parametrize("program", ["drslamd", *sorted(PROGRAMS - SHELL_TOOLS)])

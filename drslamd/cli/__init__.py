@@ -10,7 +10,7 @@ import argparse
 import sys
 
 from drslamd import __version__
-from drslamd.cli import check, keygen, run, status, trajectory
+from drslamd.cli import check, keygen, record, run, status, trajectory
 from drslamd.cli.exit_codes import BAD_CONFIG
 from drslamd.cli.parser import Parser
 from drslamd.config import ConfigError
@@ -22,12 +22,13 @@ examples:
   drslamd run -c /etc/drslamd/3.toml         the daemon (systemd: drslamd@3)
   drslamd status -c /etc/drslamd/3.toml      what it hears, and why it is not localised
   drslamd trajectory -c /etc/drslamd/3.toml --tum out/
+  drslamd record run.lcmlog --interface wlan0   what all robots say, for LCM tools
 
 exit codes: 0 done, 64 wrong usage, 69 no daemon answers, 70 a bug, 73 a file cannot be made,
 78 the configuration cannot be used
 """
 
-VERBS = (run, check, status, trajectory, keygen)
+VERBS = (run, check, status, trajectory, record, keygen)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -75,6 +75,9 @@ def _parser() -> argparse.ArgumentParser:
 def _replay(run: Run, key_file: str | None, is_checked: bool) -> bool:
     """One run; is everything as it was?"""
     key = key_of(run, key_file)
+    if is_checked and not run.is_whole:
+        print(f"{run.name}: cannot be compared: the first files of this run are gone")
+        return False
     progress = Progress(f"robot {run.robot}", run.length_s())
     began = time.perf_counter()
     found = Replayer(run, key).follow(progress, is_checked)
@@ -83,6 +86,8 @@ def _replay(run: Run, key_file: str | None, is_checked: bool) -> bool:
     print(f"{run.name}: {found.seconds:.1f} s in {took:.1f} s")
     for sentence in run.said + ([found.ended] if found.ended else []):
         print(f"  {sentence}")
+    if not run.is_whole:
+        print("  the robot began in the middle of the run: its first files are gone")
     if is_checked:
         return _verdict(run, found)
     for line in status_text.lines(report.status(found.robot, found.utime)):

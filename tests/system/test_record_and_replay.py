@@ -1,0 +1,104 @@
+"""Three real daemons record; what they decided is decided again, to the bit."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from pathlib import Path
+
+import lcm
+import pytest
+from lab.play.playback import equip
+from lab.play.real_team import RealTeam
+from lab.recordings import world
+from lab.replay.exact import Replayer
+from lab.replay.runs import Run, key_of, read_runs
+
+from drslamd.gossip import messages
+from drslamd.gossip.message_types import Pose, PoseState
+from drslamd.io.status_socket import ask
+
+pytestmark = pytest.mark.slow
+
+SCENE = world.Scene(robots=3, seconds=40.0)
+KILLED, KILLED_AT_S = 1, 14.0
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What three daemons recorded, of whom one was killed and started again."""
+    folder = tmp_path_factory.mktemp("recorded")
+    recording = world.simulate(SCENE, 1)
+    extra = f'record = true\nrecord_dir = "{folder}"\n'
+
+    async def run() -> None:
+        hardware = equip(recording, varied=True)
+        async with RealTeam(recording, hardware, extra) as team:
+            kill = asyncio.ensure_future(kill_and_start(team))
+            await team.play()
+            await kill
+            for robot in team.robots.values():
+                said = await ask(robot.socket, "status")
+                assert said["recording"]["fault"] == ""
+                assert said["recording"]["events_lost"] == 0
+
+    asyncio.run(asyncio.wait_for(run(), 120))
+    return folder
+
+
+async def kill_and_start(team: RealTeam) -> None:
+    await asyncio.sleep(KILLED_AT_S)
+    robot = team.robots[KILLED]
+    process, robot.process = robot.process, None
+    assert process is not None
+    process.kill()
+    await process.wait()
+    await robot.start()
+
+
+@pytest.fixture(scope="module")
+def runs(folder: Path) -> list[Run]:
+    return read_runs([folder])
+
+
+def test_every_run_is_there(runs: list[Run]) -> None:
+    assert [run.robot for run in runs] == [0, KILLED, KILLED, 2]
+    lengths = [run.length_s() for run in runs]
+    assert min(lengths[0], lengths[3]) > SCENE.seconds
+    # at most the last second was not on the disk yet, and starting takes some
+    assert KILLED_AT_S - 6 < lengths[1] < KILLED_AT_S + 6
+
+
+def test_all_of_them_decide_the_same_again_and_much_faster(runs: list[Run]) -> None:
+    seconds, began = 0.0, time.process_time()
+    for run in runs:
+        found = Replayer(run, key_of(run, None)).follow()
+        assert (found.difference, found.ended) == (None, ""), run.name
+        assert found.sends > 10
+        seconds += found.seconds
+    assert seconds > 10 * (time.process_time() - began)
+    assert found.robot.back.estimate is not None
+
+
+def test_so_does_one_whose_file_was_cut(runs: list[Run], tmp_path: Path) -> None:
+    (path,) = runs[0].files
+    whole = path.read_bytes()
+    (tmp_path / path.name).write_bytes(whole[: len(whole) * 2 // 3 + 5])
+    (run,) = read_runs([tmp_path])
+    found = Replayer(run, key_of(run, None)).follow()
+    assert found.difference is None
+    assert found.seconds > 15
+
+
+def test_the_lcm_package_reads_the_poses_that_were_published(runs: list[Run]) -> None:
+    """As lcm-spy and lcm-logplayer do."""
+    (path,) = runs[2 + 1].files
+    states = []
+    log = lcm.EventLog(str(path), "r")
+    for event in log:
+        if event.channel == "DRSLAM_POSE_002":
+            message = messages.decode("POSE", event.data)
+            assert isinstance(message, Pose)
+            states.append(message.state)
+    log.close()
+    assert states.count(PoseState.LOCALISED) > 5
