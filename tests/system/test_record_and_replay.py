@@ -14,9 +14,14 @@ from lab.recordings import world
 from lab.replay.exact import Replayer
 from lab.replay.runs import Run, key_of, read_runs
 
+from drslamd.events import Effect, Event
 from drslamd.gossip import messages
 from drslamd.gossip.message_types import Pose, PoseState
+from drslamd.io.recording.log_files import LogFiles
+from drslamd.io.recording.recorder import Recorder
 from drslamd.io.status_socket import ask
+from drslamd.recording.encoder import Encoder
+from drslamd.recording.records import Beginning
 
 pytestmark = pytest.mark.slow
 
@@ -102,3 +107,28 @@ def test_the_lcm_package_reads_the_poses_that_were_published(runs: list[Run]) ->
             states.append(message.state)
     log.close()
     assert states.count(PoseState.LOCALISED) > 5
+
+
+def test_recording_costs_less_than_a_hundredth_of_a_core(runs: list[Run], tmp_path: Path) -> None:
+    """All events and answers of a run once more into a recorder, and onto the disk."""
+    replayer, happened = Replayer(runs[0], key_of(runs[0], None)), []
+    handle = replayer.found.robot.handle
+
+    def noted(event: Event) -> list[Effect]:
+        effects = handle(event)
+        happened.append((event, effects))
+        return effects
+
+    replayer.found.robot.handle = noted  # type: ignore[method-assign]
+    seconds = replayer.follow().seconds
+    recorder = Recorder(LogFiles(tmp_path, 0, 1 << 30), Encoder(0, True), {}, dict)
+    recorder.begin(1, Beginning(1))
+    began = time.process_time()
+    for event, effects in happened:
+        recorder.event(event)
+        recorder.effects(event.utime, effects)
+    recorder._flush()
+    took = time.process_time() - began
+    recorder._files.close()
+    assert len(happened) > 3_000
+    assert took < 0.01 * seconds

@@ -19,6 +19,7 @@ from lab.progress import Progress
 from lab.recordings.readers import READERS, has_edges, read, read_edges
 from lab.recordings.recording import BadRecording, EdgeRecording, Recording
 from lab.replay import scored, truth
+from lab.replay.complaints import Complaints
 from lab.replay.runs import is_recording, read_runs
 from lab.replay.team import gathered, play
 from lab.score import outcome, reasons, table
@@ -101,7 +102,8 @@ def _evaluate_own(options: argparse.Namespace, extra: str) -> int:
     true = truth.read(options.truth) if options.truth else None
     team = gathered(read_runs([options.recording]))
     progress = Progress(f"{len(team.robots)} robots", team.duration_s)
-    played = play(team, extra, options.key, progress)
+    complaints = Complaints()
+    played = play(team, extra, options.key, progress, complaints.note)
     progress.end()
     result, name = virtual_team.outcome(played), options.recording.name
     if true is None:
@@ -113,7 +115,8 @@ def _evaluate_own(options: argparse.Namespace, extra: str) -> int:
         recording = scored.as_recording(name, team, played, true)
         scores = outcome.score(recording, result)
         lines = table.lines(scores)
-    print("\n".join([*team.said(), *lines, *reasons.lines(result.status)]))
+    why = reasons.lines(result.status, complaints.lasted())
+    print("\n".join([*team.said(), *lines, *why]))
     _write(options, scores)
     return 0
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from daemon_scenes import Stepped, configured, until, with_worker
 from lab.play.simulator import Simulator
 from lab.recordings import world
 from lab.replay.exact import Replayed, Replayer
@@ -14,6 +15,10 @@ from lab.replay.runs import Run, key_of, read_runs
 from recorded_teams import SHORT, record_team
 
 from drslamd import report
+from drslamd.conventions import SECOND_US
+from drslamd.daemon import Daemon
+from drslamd.events import Restart, SerialData, Tick
+from drslamd.io.recording.recorder import Recorder
 from drslamd.recording.event_log import Entry, entries, packed
 
 
@@ -147,3 +152,34 @@ def test_where_events_are_missing_it_ends_and_says_so(runs: list[Run], tmp_path:
     assert found.ended == "events are missing here; what follows cannot be replayed"
     assert 5 < found.seconds < 20
     assert "bytes at" in run.said[0]
+
+
+def test_a_robot_that_took_the_place_of_another_is_followed(tmp_path: Path) -> None:
+    """Through a real daemon without its ports: its robot begins again under another epoch."""
+    clock = Stepped()
+    daemon = Daemon(configured(tmp_path, "record = true\n"), clock)
+    recorder = daemon._recorder
+    assert isinstance(recorder, Recorder)
+
+    def drive(seconds: int) -> None:
+        for _ in range(seconds):
+            clock.utime += SECOND_US
+            daemon.handle(SerialData(clock.utime, "uwb", b"\x55\x04 no frame"))
+            daemon.handle(Tick(clock.utime))
+
+    async def scene() -> None:
+        drive(5)
+        old = daemon.robot
+        daemon._perform(Restart(old.own.epoch + 5, "test"))
+        await until(lambda: daemon.robot is not old)
+        drive(5)
+
+    with_worker(daemon, scene)
+    recorder._flush()
+    recorder._files.close()
+    (run,) = read_runs([tmp_path / "state" / "recordings"])
+    found = replayed(run)
+    assert (found.difference, found.ended, run.said) == (None, "", [])
+    assert found.robot.own == daemon.robot.own
+    assert found.robot.own.epoch > run.opening.beginning.epoch
+    assert report.status(found.robot, clock.utime) == report.status(daemon.robot, clock.utime)

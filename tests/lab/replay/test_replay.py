@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -45,6 +46,14 @@ def test_without_it_the_last_status_is_shown(folder: Path, capsys: Printed) -> N
     assert lines[0].startswith(f"robot 1, {path.name}: 14.0 s in ")
     assert lines[1] == "  robot 1, epoch 1"
     assert any(line.startswith("  ! not localised: ") for line in lines)
+
+
+def test_any_moment_before_the_end_can_be_looked_at(folder: Path, capsys: Printed) -> None:
+    assert replay.main([str(recordings(folder)[0]), "--at", "6.5"]) == 0
+    early = capsys.readouterr().out
+    assert ": 6.5 s in " in early.splitlines()[0]
+    assert replay.main([str(recordings(folder)[0])]) == 0
+    assert capsys.readouterr().out.splitlines()[1:] != early.splitlines()[1:]
 
 
 def test_a_difference_ends_with_1_and_its_time(
@@ -115,6 +124,7 @@ def test_without_a_truth_it_says_why_nobody_is_localised(
     assert out.startswith(
         "robot 0: not localised\nrobot 1: not localised\nrobot 0 is not localised"
     )
+    assert re.search(r"^  for 1\d s: not localised: ", out, re.MULTILINE)
     assert "  with robot 1: not connected; windows: " in out
     scores = json.loads(figures.read_text())
     assert scores["team"] is None

@@ -53,3 +53,11 @@ def test_a_robot_alone_has_no_windows() -> None:
     said = status()
     said["pairs"]["2"]["windows"] = {}
     assert "windows: none;" in reasons.lines({1: said})[2]
+
+
+def test_what_lasted_is_said_instead_of_the_end_where_it_was_counted() -> None:
+    lasted = {1: [(k, f"complaint {k}") for k in range(20, 0, -1)], 2: [(9, "of another one")]}
+    said = reasons.lines({1: status()}, lasted)
+    assert said[1 : 1 + reasons.MOST] == [f"  for {k} s: complaint {k}" for k in range(20, 14, -1)]
+    assert said[1 + reasons.MOST].startswith("  with robot 2")
+    assert reasons.lines({3: status()}, lasted)[1].startswith("  with robot 2")

@@ -7,6 +7,7 @@ recording, 78 fault in --config.
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import time
 from pathlib import Path
@@ -25,6 +26,7 @@ DIFFERS, NO_INPUT, BAD_CONFIG = 1, 66, 78
 EXAMPLES = """\
 examples:
   tools/replay robot-003-20261127T021545.123456-0000.lcmlog    what robot 3 knew at the end
+  tools/replay recordings/ --at 63.5                           and what 63.5 s after it began?
   tools/replay recordings/ --check                             does every robot decide as it did?
   tools/replay recordings/ --config other.toml                 what if?
   tools/replay recordings/ --key team.key                      made with a team key
@@ -38,7 +40,7 @@ def main(arguments: list[str] | None = None) -> int:
         runs = read_runs(options.recordings)
         if options.config is not None:
             return _what_if(runs, options.config.read_text(), options.key)
-        verdicts = [_replay(run, options.key, options.check) for run in runs]
+        verdicts = [_replay(run, options) for run in runs]
     except (BadRecording, OSError) as error:
         print(error, file=sys.stderr)
         return NO_INPUT
@@ -66,21 +68,25 @@ def _parser() -> argparse.ArgumentParser:
     what.add_argument(
         "--config", type=Path, metavar="TOML", help="what if these keys had been set?"
     )
+    what.add_argument(
+        "--at", type=float, metavar="S", help="what was known S seconds after the beginning?"
+    )
     parser.add_argument(
         "--key", metavar="FILE", help="the team key (default: where the robot had it)"
     )
     return parser
 
 
-def _replay(run: Run, key_file: str | None, is_checked: bool) -> bool:
+def _replay(run: Run, options: argparse.Namespace) -> bool:
     """One run; is everything as it was?"""
-    key = key_of(run, key_file)
+    key, is_checked = key_of(run, options.key), options.check
     if is_checked and not run.is_whole:
         print(f"{run.name}: cannot be compared: the first files of this run are gone")
         return False
-    progress = Progress(f"robot {run.robot}", run.length_s())
+    until = math.inf if options.at is None else options.at
+    progress = Progress(f"robot {run.robot}", min(run.length_s(), until))
     began = time.perf_counter()
-    found = Replayer(run, key).follow(progress, is_checked)
+    found = Replayer(run, key).follow(progress, is_checked, until)
     took = time.perf_counter() - began
     progress.end()
     print(f"{run.name}: {found.seconds:.1f} s in {took:.1f} s")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -61,13 +62,17 @@ class Replayer:
         return make_robot(self._config, self._run, self._key, beginning)
 
     def follow(
-        self, progress: Callable[[float], None] | None = None, is_checked: bool = True
+        self,
+        progress: Callable[[float], None] | None = None,
+        is_checked: bool = True,
+        until_s: float = math.inf,
     ) -> Replayed:
         """Replay it up to its end, or to what is missing in it.
 
         Args:
             progress: told the seconds that have passed.
             is_checked: end at the first difference.
+            until_s: end at this time from its beginning.
         """
         self._digest = self._run.opening.digest
         for record in self._run.records():
@@ -85,7 +90,8 @@ class Replayer:
                 self._on_event(record)
             if progress:
                 progress(self.found.seconds)
-            if is_checked and self.found.difference is not None:
+            is_wrong = is_checked and self.found.difference is not None
+            if is_wrong or self.found.seconds >= until_s:
                 break
         return self.found
 

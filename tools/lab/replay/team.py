@@ -136,11 +136,13 @@ def play(
     extra: str = "",
     key_file: str | None = None,
     progress: Callable[[float], None] | None = None,
+    watch: Callable[[Simulator], None] | None = None,
 ) -> Simulator:
     """Play the runs of a team.
 
     Args:
         extra: TOML that changes everybody's configuration.
+        watch: shown the team every second.
 
     Raises:
         BadRecording: a team key is not at hand.
@@ -156,6 +158,8 @@ def play(
     end = team.duration_s
     for second in range(1, int(end) + 1):
         simulator.run(second)
+        if watch:
+            watch(simulator)
         if progress:
             progress(second)
     simulator.run(end)

@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 MOST = 6
 """Reasons of a robot that are named, the most frequent first."""
 
 
-def lines(status: Mapping[int, Mapping[str, Any]]) -> list[str]:
-    """Of robots that are not localised: what each says of itself at the end.
+def lines(
+    status: Mapping[int, Mapping[str, Any]],
+    lasted: Mapping[int, Sequence[tuple[int, str]]] | None = None,
+) -> list[str]:
+    """Of robots that are not localised: what each says of itself.
 
     Args:
-        status: of each robot, as `report.status` gives it.
+        status: of each robot at the end, as `report.status` gives it.
+        lasted: of each robot, seconds and what it complained of so long; what it says at the end
+            where nobody counted.
     """
     lost = [robot for robot, said in sorted(status.items()) if "frame" not in said["pose"]]
     out: list[str] = []
     for robot in lost:
         said = status[robot]
         out.append(f"robot {robot} is {said['pose']['state']}")
-        out += [f"  {problem}" for problem in said["problems"]]
+        if lasted is None:
+            out += [f"  {problem}" for problem in said["problems"]]
+        else:
+            out += [f"  for {s} s: {what}" for s, what in lasted.get(robot, ())[:MOST]]
         out += _pairs(said) + _refused(said)
     return out
 
