@@ -289,7 +289,7 @@ class Daemon:
     def _one_line(self) -> str:
         picture = report.status(self.robot, self._clock.now())
         alive = sum(peer["alive"] for peer in picture["peers"].values())
-        problems = "; ".join(picture["problems"])
+        problems = "; ".join(picture["problems"] + self._recorder.problems())
         return f"{picture['pose']['state']}, {alive} peers" + (f"; {problems}" if problems else "")
 
     async def _end(self, tasks: list[asyncio.Task[None]]) -> None:

@@ -66,6 +66,7 @@ def dbc_text(config: Config) -> str:
 def make_recorder(
     config: Config, clock: Clock, state_dir: Path, dbc_text: str, key: bytes
 ) -> Recorder | NoRecorder:
+    """What keeps all that is heard and done, if `daemon.record` says so."""
     section = config.daemon
     if not section.record:
         return NoRecorder()

@@ -205,6 +205,7 @@ def test_what_is_wrong_with_the_recording_is_one_of_the_problems(
     daemon = Daemon(configured(tmp_path, more), clock)
     daemon._recorder._flush()  # type: ignore[union-attr]
     assert daemon._picture()["problems"][-1].startswith("nothing is recorded: cannot write")
+    assert "; nothing is recorded: " in daemon._one_line()
 
 
 def test_nothing_is_recorded_unless_it_is_asked_for(tmp_path: Path, daemon: Daemon) -> None:

@@ -153,6 +153,8 @@ class Decoder:
         self._new_file()
         self.robot, self._is_framed = int(content["robot"]), bool(content["is_framed"])
         beginning, part = _beginning(content["beginning"]), int(content["part"])
+        if not isinstance(content["provenance"], dict):
+            raise ValueError("provenance is no table")
         return Opening(utime, beginning, part, content["provenance"], int(content["digest"]))
 
 

@@ -133,6 +133,7 @@ def test_nothing_that_a_stranger_wrote_raises(kind: str, data: bytes) -> None:
         (Entry(0, 1, "REC_NEW_003", b""), "REC_NEW_003: KeyError 'NEW'"),
         (Entry(0, 1, "REC_OWN_003", b"\0\0"), "REC_OWN_003: IndexError"),
         (Entry(0, 1, "REC_TEXT_003", b"[]"), "REC_TEXT_003: "),
+        (Entry(0, 1, "REC_TEXT_003", b'{"kind": "opening"}'), "REC_TEXT_003: KeyError 'format'"),
         (Entry(0, 1, "REC_TEXT_003", b'{"kind": "port"}'), "REC_TEXT_003: KeyError 'condition'"),
     ],
 )

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import subprocess
+import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 import lcm
@@ -13,6 +16,8 @@ from lab.play.real_team import RealTeam
 from lab.recordings import world
 from lab.replay.exact import Replayer
 from lab.replay.runs import Run, key_of, read_runs
+from namespace import hindrance
+from places import REPOSITORY
 
 from drslamd.events import Effect, Event
 from drslamd.gossip import messages
@@ -21,6 +26,7 @@ from drslamd.io.recording.log_files import LogFiles
 from drslamd.io.recording.recorder import Recorder
 from drslamd.io.status_socket import ask
 from drslamd.recording.encoder import Encoder
+from drslamd.recording.event_log import Entry, entries
 from drslamd.recording.records import Beginning
 
 pytestmark = pytest.mark.slow
@@ -132,3 +138,29 @@ def test_recording_costs_less_than_a_hundredth_of_a_core(runs: list[Run], tmp_pa
     recorder._files.close()
     assert len(happened) > 3_000
     assert took < 0.01 * seconds
+
+
+def test_lcm_logplayer_plays_the_file_and_drslamd_record_hears_it(
+    runs: list[Run], tmp_path: Path
+) -> None:
+    player = Path(sys.executable).parent / "lcm-logplayer"
+    if hindrance() or not player.exists():
+        pytest.skip(hindrance() or f"no {player}: pip install lcm")
+    (path,) = runs[3].files
+    heard = tmp_path / "heard.lcmlog"
+    listen = f"{sys.executable} -m drslamd record {heard} --interface 127.0.0.1 --port 17667"
+    play = f"{player} -l 'udpm://239.255.76.67:17667?ttl=0' --speed=10 {path}"
+    script = (
+        "ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo\n"
+        f"{listen} > {tmp_path}/said 2>/dev/null & \n"
+        f"while [ ! -e {heard} ]; do sleep 0.1; done\n"
+        f"{play} && kill -INT $! && wait $!"
+    )
+    command = ["unshare", "-rn", "sh", "-c", script]
+    subprocess.run(command, check=True, timeout=60, cwd=REPOSITORY, capture_output=True)
+    with path.open("rb") as file:
+        wanted = Counter(e.channel for e in entries(file) if isinstance(e, Entry))
+    lines = (tmp_path / "said").read_text().splitlines()
+    said = {line[9:]: int(line[:8]) for line in lines if " DRSLAM" in line}
+    assert said["DRSLAM_POSE_002"] == wanted["DRSLAM_POSE_002"] > 5
+    assert said == {name: n for name, n in wanted.items() if name.startswith("DRSLAM")}

@@ -14,6 +14,8 @@ from contextlib import suppress
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
+import structlog
+
 MAX_FILE_BYTES = 64 << 20
 """Three quarters of an hour of a busy robot."""
 FILES = 16
@@ -58,7 +60,7 @@ class LogFiles:
         self.name, self.fault = "", ""
         self._robot, self._quota = robot, quota_bytes
         self._epoch, self._part = 0, -1
-        self._descriptor = -1
+        self._descriptor, self._size = -1, 0
 
     def begin(self, epoch: int) -> None:
         """Name the files after this start."""
@@ -76,7 +78,7 @@ class LogFiles:
             self._make_room()
             flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND
             self._descriptor = os.open(self.folder / name, flags, 0o640)
-            self.name = name
+            self.name, self._size = name, 0
         except OSError as error:
             self._stop(f"cannot write {self.folder / name}: {error.strerror}")
 
@@ -84,7 +86,6 @@ class LogFiles:
         """Append; a disk that takes no more ends the recording, at a whole entry where it can."""
         if self.fault or self._descriptor < 0:
             return
-        before = os.fstat(self._descriptor).st_size
         try:
             free = os.fstatvfs(self._descriptor)
             if free.f_bavail * free.f_frsize < SPARE_BYTES + len(data):
@@ -96,9 +97,10 @@ class LogFiles:
             rest = memoryview(data)
             while rest:
                 rest = rest[os.write(self._descriptor, rest) :]
+            self._size += len(data)
         except OSError as error:
             with suppress(OSError):  # a reader passes over the half of an entry
-                os.ftruncate(self._descriptor, before)
+                os.ftruncate(self._descriptor, self._size)
             self._stop(f"cannot write {self.folder / self.name}: {error.strerror}")
 
     def close(self) -> None:
@@ -110,13 +112,17 @@ class LogFiles:
     def _stop(self, why: str) -> None:
         self.fault = why
         self.close()
+        structlog.get_logger().warning("recording.fault", what=why)
 
     def _make_room(self) -> None:
         """Delete our oldest files until another one fits into the quota."""
-        sizes = [(path, path.stat().st_size) for path in recordings(self.folder, self._robot)]
-        used = sum(size for _, size in sizes)
-        for path, size in sizes:
+        sizes: dict[Path, int] = {}
+        for path in recordings(self.folder, self._robot):
+            with suppress(FileNotFoundError):  # somebody makes room too
+                sizes[path] = path.stat().st_size
+        used = sum(sizes.values())
+        for path, size in sizes.items():
             if used + self.file_bytes <= self._quota:
                 break
-            path.unlink()
+            path.unlink(missing_ok=True)
             used -= size

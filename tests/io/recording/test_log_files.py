@@ -85,6 +85,13 @@ def test_the_oldest_go_when_another_one_does_not_fit(tmp_path: Path, spare: int,
     assert all(other.exists() for other in others)
 
 
+def test_a_file_that_somebody_deletes_meanwhile_is_no_fault(tmp_path: Path) -> None:
+    (tmp_path / file_name(3, EPOCH - 1, 0)).symlink_to(tmp_path / "gone")
+    files = files_in(tmp_path)
+    assert files.fault == ""
+    files.close()
+
+
 def test_a_folder_that_cannot_be_made_is_a_fault_with_its_name(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     files = files_in(tmp_path / "file")

@@ -41,7 +41,7 @@ def main(arguments: list[str] | None = None) -> int:
         if options.config is not None:
             return _what_if(runs, options.config.read_text(), options.key)
         verdicts = [_replay(run, options) for run in runs]
-    except (BadRecording, OSError) as error:
+    except (BadRecording, OSError, UnicodeDecodeError) as error:
         print(error, file=sys.stderr)
         return NO_INPUT
     except ConfigError as error:

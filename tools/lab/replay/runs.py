@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from drslamd.config import Config, ConfigError
 from drslamd.conventions import SECOND_US
@@ -15,7 +15,7 @@ from drslamd.io.recording.provenance import fingerprint
 from drslamd.io.state_store import read_key
 from drslamd.recording.decoder import Decoder, Unreadable
 from drslamd.recording.event_log import Damage, Entry, entries
-from drslamd.recording.records import Opening, Record, Told
+from drslamd.recording.records import Beginning, Opening, Record, Told
 from drslamd.robot import Robot
 from drslamd.slam.calibration import sensor_calibration
 from drslamd.slam.calibration.sensor_calibration import SensorCalibration
@@ -53,7 +53,7 @@ class Run:
             BadRecording: this program knows no such configuration.
         """
         try:
-            return Config.model_validate_json(_json(self.opening.provenance["configuration"]))
+            return Config.model_validate_json(json.dumps(self.opening.provenance["configuration"]))
         except (ValueError, KeyError) as error:
             raise BadRecording(f"{self.files[0]}: its configuration: {error}") from None
 
@@ -141,8 +141,8 @@ def is_recording(path: Path) -> bool:
     return any(recordings(folder) for folder in below)
 
 
-def make_robot(config: Config, run: Run, key: bytes, beginning: Any = None) -> Robot:
-    """The robot that began then."""
+def make_robot(config: Config, run: Run, key: bytes, beginning: Beginning | None = None) -> Robot:
+    """The robot that began then, or when the run began."""
     began = beginning or run.opening.beginning
     kept = began.calibration if sensor_calibration.is_sound(began.calibration) else {}
     return Robot(
@@ -193,9 +193,3 @@ def _opening(path: Path) -> tuple[Opening, int]:
     except OSError as error:
         raise BadRecording(f"{path}: {error.strerror}") from None
     raise BadRecording(f"{path}: no recording of drslamd: there is no entry in it")
-
-
-def _json(content: Any) -> str:
-    import json
-
-    return json.dumps(content)

@@ -2,7 +2,7 @@
 
 The robots get the bytes of their own devices when they got them. What they say to each other is
 said anew, and reaches whom it could reach then; what robots said of whom there is no recording is
-said as it was. Computations are made anew and take as long as their kind took in the mean.
+said as it was. Computations are made anew and take the median of the times that were recorded.
 """
 
 from __future__ import annotations
