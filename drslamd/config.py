@@ -263,6 +263,12 @@ class DaemonSection(Section):
     """Default: drslamd-<id>.sock in $RUNTIME_DIRECTORY under systemd, else in the state folder."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     log_format: Literal["text", "json"] = "text"
+    record: bool = False
+    """Keep everything that is heard and done, for `tools/replay` and LCM's own tools."""
+    record_dir: str = ""
+    """Default: recordings in the state folder."""
+    record_mb: Annotated[int, Field(ge=16, le=1_000_000)] = 1000
+    """Of this robot in that folder; the oldest files go first."""
 
 
 class Config(Section):

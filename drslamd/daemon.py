@@ -42,7 +42,8 @@ from drslamd.io.systemd import Notifier
 from drslamd.io.wall_clock import read_wall_clock
 from drslamd.io.worker import Finished, Worker
 from drslamd.machine.folders import socket_path, state_dir
-from drslamd.parts import dbc_text, make_transport, make_wheels
+from drslamd.parts import dbc_text, make_recorder, make_transport, make_wheels
+from drslamd.recording.records import Beginning
 from drslamd.reports import graph_report
 from drslamd.robot import Robot
 from drslamd.slam.calibration.sensor_calibration import SensorCalibration
@@ -72,7 +73,9 @@ class Daemon:
         self._load_fault = self._store.fault
         epochs = {int(robot): epoch for robot, epoch in state.get("epochs", {}).items()}
         kept = SensorCalibration.of_state(state.get("calibration", {}))
-        self._new_robot = partial(Robot, config, team_key(secret), dbc_text=dbc_text(config))
+        key, dbc = team_key(secret), dbc_text(config)
+        self._make_robot = partial(Robot, config, key, dbc_text=dbc)
+        self._recorder = make_recorder(config, self._clock, state_dir(config), dbc, key)
         last = {"epochs": epochs, "calibration": kept.state()}
         self.robot = self._new_robot(self._store.begin(last, state.get("epoch", 0)), epochs, kept)
         self._ends: Robot | None = None
@@ -117,6 +120,7 @@ class Daemon:
             )
         )
         self._worker.start()
+        self._recorder.start()
         log.info("daemon.start", robot=self._config.robot.id, epoch=self.robot.own.epoch)
         if self._config.team.insecure:
             log.warning("team.insecure", remedy="make a key with: drslamd keygen")
@@ -144,9 +148,21 @@ class Daemon:
         """One event in, its effects carried out; an exception is our bug and ends the daemon."""
         if self._failure is not None:
             return
-        for effect in self.robot.handle(event):
+        for effect in self._answers(event):
             self._perform(effect)
         self._wake()
+
+    def _new_robot(self, epoch: int, epochs: dict[int, int], kept: SensorCalibration) -> Robot:
+        beginning = Beginning(epoch, dict(epochs), kept.state())
+        self._recorder.begin(self._clock.now(), beginning)
+        return self._make_robot(epoch, epochs, kept)
+
+    def _answers(self, event: Event) -> list[Effect]:
+        # recorded before it is tried, so that a bug can be replayed
+        self._recorder.event(event)
+        effects = self.robot.handle(event)
+        self._recorder.effects(event.utime, effects)
+        return effects
 
     def _perform(self, effect: Effect) -> None:
         self._carry_out[type(effect)](effect)
@@ -267,6 +283,8 @@ class Daemon:
         picture = report.status(self.robot, self._clock.now())
         picture["network"]["dropped"] = self._transport.dropped
         picture["cpu_s"] = round(cpu_s(), 3)
+        picture["recording"] = self._recorder.status()
+        picture["problems"] += self._recorder.problems()
         return {**picture, "ms": self._pace.milliseconds(), "loop_lag_ms": self._pace.lag()}
 
     def _paths(self) -> dict[str, Any]:
@@ -281,7 +299,7 @@ class Daemon:
     def _one_line(self) -> str:
         picture = report.status(self.robot, self._clock.now())
         alive = sum(peer["alive"] for peer in picture["peers"].values())
-        problems = "; ".join(picture["problems"])
+        problems = "; ".join(picture["problems"] + self._recorder.problems())
         return f"{picture['pose']['state']}, {alive} peers" + (f"; {problems}" if problems else "")
 
     async def _end(self, tasks: list[asyncio.Task[None]]) -> None:
@@ -289,7 +307,7 @@ class Daemon:
         if self._timer is not None:
             self._timer.cancel()
         if self._failure is None:
-            for effect in self.robot.handle(Stop(self._clock.now())):
+            for effect in self._answers(Stop(self._clock.now())):
                 if isinstance(effect, Save):
                     self._store.save(effect.state)
                 else:
@@ -298,6 +316,7 @@ class Daemon:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
         await self._status.close()
+        await self._recorder.close()
         self._worker.stop()
         log.info("daemon.stop", robot=self._config.robot.id)
 

@@ -1,8 +1,9 @@
-"""The parts of a daemon that its configuration chooses: the network, the wheels, their DBC file."""
+"""The parts of a daemon that its configuration chooses: network, wheels, DBC file, recording."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,12 @@ from drslamd.io.can_bus import CanBus, require_python_can
 from drslamd.io.clock import Clock
 from drslamd.io.liblcm import Liblcm, require_lcm
 from drslamd.io.multicast import Multicast
+from drslamd.io.recording.log_files import LogFiles
+from drslamd.io.recording.provenance import clocks, provenance
+from drslamd.io.recording.recorder import NoRecorder, Recorder
 from drslamd.io.serial_port import SerialPort
 from drslamd.io.transport import Transport
+from drslamd.recording.encoder import Encoder
 
 Handle = Callable[[Any], None]
 """Takes an event."""
@@ -58,3 +63,16 @@ def dbc_text(config: Config) -> str:
         reason = getattr(error, "strerror", None) or "not a text file"
         remedy = denied(path) if isinstance(error, PermissionError) else "correct the path"
         raise ConfigError([f"wheels.dbc_file = {str(path)!r}: {reason}; {remedy}"]) from None
+
+
+def make_recorder(
+    config: Config, clock: Clock, state_dir: Path, dbc_text: str, key: bytes
+) -> Recorder | NoRecorder:
+    """What keeps all that is heard and done, if `daemon.record` says so."""
+    section = config.daemon
+    if not section.record:
+        return NoRecorder()
+    folder = Path(section.record_dir) if section.record_dir else state_dir / "recordings"
+    files = LogFiles(folder, config.robot.id, section.record_mb << 20)
+    encoder = Encoder(config.robot.id, is_framed=config.gossip.provider == "native")
+    return Recorder(files, encoder, provenance(config, dbc_text, key), partial(clocks, clock))

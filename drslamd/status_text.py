@@ -40,6 +40,10 @@ def lines(s: dict[str, Any]) -> list[str]:
             f"of {pair['closures_seen']} ({windows})"
         )
     out.append(f"group {s['graph']['group'] or 'none'}")
+    recording = s.get("recording")
+    if recording:
+        size = recording["bytes"] / 1e6
+        out.append(f"recorded {size:.1f} MB in {recording['folder']}, now {recording['file']}")
     return out
 
 

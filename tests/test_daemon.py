@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +14,12 @@ from daemon_scenes import Stepped, configured, heard_by, until, with_worker
 
 from drslamd.conventions import MILLISECOND_US, SECOND_US
 from drslamd.daemon import Daemon
-from drslamd.events import Event, JobDone, Restart, Send, Solve, Tick, Write
+from drslamd.events import Effect, Event, JobDone, Restart, Send, SerialData, Solve, Tick, Write
 from drslamd.io.clock import MonotonicClock
+from drslamd.io.recording.log_files import recordings
+from drslamd.recording.decoder import Decoder
+from drslamd.recording.event_log import Entry, entries
+from drslamd.recording.records import Beginning, Sent
 
 
 @pytest.fixture
@@ -126,6 +132,85 @@ def test_what_an_old_robot_had_asked_for_is_not_told_to_the_new_one(daemon: Daem
     with_worker(daemon, scene)
     assert heard == heard_by_old == []
     assert daemon._picture()["ms"] == {}
+
+
+# what is recorded
+
+
+def recording(daemon: Daemon) -> list[Any]:
+    """What was written so far."""
+    recorder: Any = daemon._recorder
+    recorder._flush()
+    decoder, found = Decoder(), []
+    for path in recordings(recorder._files.folder):
+        for entry in entries(io.BytesIO(path.read_bytes())):
+            assert isinstance(entry, Entry)
+            found.append(decoder.decode(entry))
+    return [record for record in found if record is not None]
+
+
+@pytest.fixture
+def recorded(tmp_path: Path, clock: Stepped) -> Iterator[Daemon]:
+    """One that records, and was not started."""
+    daemon = Daemon(configured(tmp_path, "record = true\n"), clock)
+    yield daemon
+    daemon._recorder._files.close()  # type: ignore[union-attr]
+
+
+def test_an_event_is_recorded_before_it_is_answered_and_its_answer_before_it_is_done(
+    recorded: Daemon, clock: Stepped, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    event, send = SerialData(clock.utime, "uwb", b"x"), Send("DRSLAM_STATUS_001", b"y")
+
+    def answer(_: Event) -> list[Effect]:
+        assert recording(recorded)[-1] == event
+        return [send]
+
+    def carry_out(_: Effect) -> None:
+        assert recording(recorded)[-1] == Sent(clock.utime, send)
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(recorded.robot, "handle", answer)
+    monkeypatch.setattr(recorded, "_perform", carry_out)
+    with pytest.raises(ZeroDivisionError):
+        recorded.handle(event)
+
+
+def test_the_recording_opens_with_what_the_robot_began_with(recorded: Daemon) -> None:
+    opening = recording(recorded)[0]
+    assert opening.beginning == Beginning(recorded.robot.own.epoch, {}, {"bias_m": {}})
+    assert opening.provenance["configuration"]["daemon"]["record"] is True
+
+
+def test_a_robot_in_the_place_of_another_is_recorded_with_what_it_begins_with(
+    recorded: Daemon,
+) -> None:
+    old = recorded.robot
+    old.team.seal.epochs[2] = 77
+
+    async def scene() -> None:
+        recorded._perform(Restart(old.own.epoch + 5, "test"))
+        await until(lambda: recorded.robot is not old)
+
+    with_worker(recorded, scene)
+    found = [record for record in recording(recorded) if isinstance(record, Beginning)]
+    assert found == [Beginning(recorded.robot.own.epoch, {2: 77}, {"bias_m": {}})]
+
+
+def test_what_is_wrong_with_the_recording_is_one_of_the_problems(
+    tmp_path: Path, clock: Stepped
+) -> None:
+    (tmp_path / "file").touch()
+    more = f'record = true\nrecord_dir = "{tmp_path}/file"\n'
+    daemon = Daemon(configured(tmp_path, more), clock)
+    daemon._recorder._flush()  # type: ignore[union-attr]
+    assert daemon._picture()["problems"][-1].startswith("nothing is recorded: cannot write")
+    assert "; nothing is recorded: " in daemon._one_line()
+
+
+def test_nothing_is_recorded_unless_it_is_asked_for(tmp_path: Path, daemon: Daemon) -> None:
+    assert daemon._picture()["recording"] is None
+    assert not (tmp_path / "state" / "recordings").exists()
 
 
 # what goes wrong inside

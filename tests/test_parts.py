@@ -13,8 +13,9 @@ from daemon_scenes import CONFIG, Stepped
 from drslamd.config import Config, ConfigError, parse
 from drslamd.io.can_bus import CanBus
 from drslamd.io.multicast import Multicast
+from drslamd.io.recording.recorder import NoRecorder, Recorder
 from drslamd.io.serial_port import SerialPort
-from drslamd.parts import dbc_text, make_transport, make_wheels
+from drslamd.parts import dbc_text, make_recorder, make_transport, make_wheels
 
 KOBUKI = 'source = "kobuki"\nport = "/dev/none"\n'
 ODRIVE = """source = "odrive"
@@ -118,3 +119,20 @@ def test_a_dbc_file_that_cannot_be_read_is_one_sentence(
     with pytest.raises(ConfigError) as caught:
         dbc_text(configured(DBC.format(path)))
     assert caught.value.faults == [f"wheels.dbc_file = '{path}': {sentence}; correct the path"]
+
+
+@pytest.mark.parametrize(
+    ("more", "folder"), [("", "state/recordings"), ('record_dir = "/data/runs"\n', "/data/runs")]
+)
+def test_a_recording_goes_where_it_is_told_or_into_the_state_folder(more: str, folder: str) -> None:
+    config = configured(more=f"record = true\nrecord_mb = 32\n{more}")
+    recorder = make_recorder(config, Stepped(), Path("state"), "", bytes(32))
+    assert isinstance(recorder, Recorder)
+    assert recorder._files.folder == Path(folder)
+    assert recorder._files.file_bytes == 2 << 20
+    assert recorder._encoder._is_framed
+
+
+def test_without_a_word_nothing_is_recorded() -> None:
+    made = make_recorder(configured(), Stepped(), Path("state"), "", bytes(32))
+    assert isinstance(made, NoRecorder)

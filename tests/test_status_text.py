@@ -152,6 +152,13 @@ def test_each_other_thing_about_a_peer_has_its_words(
     assert news("peers", "1", key, value) == [usual.replace(instead_of, words)]
 
 
+def test_a_robot_that_records_says_how_much_and_where() -> None:
+    recording = {"folder": "/var/rec", "file": "robot-003-x.lcmlog", "bytes": 1_234_567}
+    whole = {**answer(), "recording": recording}
+    assert lines(whole)[-1] == "recorded 1.2 MB in /var/rec, now robot-003-x.lcmlog"
+    assert lines({**whole, "recording": None}) == lines(answer())
+
+
 def test_a_peer_with_another_graph_is_told_what_is_lacking() -> None:
     whole = answer()
     whole["peers"]["1"] |= {"same_graph": False, "log_entries_lacking": 3}

@@ -11,7 +11,17 @@ import argparse
 import sys
 
 from drslamd import __version__
-from drslamd.cli import check, doctor, export, keygen, run, status, trajectory, view
+from drslamd.cli import (
+    check,
+    doctor,
+    export,
+    keygen,
+    record,
+    run,
+    status,
+    trajectory,
+    view,
+)
 from drslamd.cli.exit_codes import BAD_CONFIG
 from drslamd.cli.parser import Parser
 from drslamd.config import ConfigError
@@ -26,13 +36,14 @@ examples:
   drslamd view --interface wlan0             the team on a live map, in a browser
   drslamd trajectory -c /etc/drslamd/3.toml --tum out/
   drslamd export -c /etc/drslamd/3.toml --to out/ --format csv mcap
+  drslamd record run.lcmlog --interface wlan0   what all robots say, for LCM tools
 
-exit codes: 0 done, 1 doctor found something, 64 wrong usage, 69 no daemon answers (view: no aiohttp,
-or its port is taken), 70 a bug, 73 a file cannot be made, 75 another daemon already runs, 78 the
-set-up cannot be used
+exit codes: 0 done, 1 doctor found something, 64 wrong usage, 69 no daemon answers (view: no
+aiohttp, or its port is taken), 70 a bug, 73 a file cannot be made, 75 another daemon already runs,
+78 the set-up cannot be used
 """
 
-VERBS = (run, check, doctor, status, view, trajectory, export, keygen)
+VERBS = (run, check, doctor, status, view, trajectory, export, record, keygen)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -10,6 +10,7 @@ import asyncio
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 from drslamd.config import ConfigError
 from lab.play import edge_run, real_team, virtual_team
@@ -17,7 +18,11 @@ from lab.play.virtual_team import SETTLE_S
 from lab.progress import Progress
 from lab.recordings.readers import READERS, has_edges, read, read_edges
 from lab.recordings.recording import BadRecording, EdgeRecording, Recording
-from lab.score import outcome, table
+from lab.replay import scored, truth
+from lab.replay.complaints import Complaints
+from lab.replay.runs import is_recording, read_runs
+from lab.replay.team import gathered, play
+from lab.score import outcome, reasons, table
 from lab.score.outcome import Outcome
 
 NO_INPUT, FAILED, BAD_CONFIG = 66, 70, 78
@@ -28,6 +33,7 @@ examples:
   tools/evaluate run.pyfg --json scores.json      and as JSON (schema: tools/README.md)
   tools/evaluate run.pyfg --speed real            real processes, pseudo-terminals, multicast
   tools/evaluate swust_three_robots               a folder of relative poses: modules 2 and 3 only
+  tools/evaluate recordings/ --truth mocap/       what robots recorded themselves (record = true)
   tools/evaluate run.pyfg --config rbcd.toml      with sections added to every robot's TOML
 """
 
@@ -38,6 +44,8 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         extra = options.config.read_text() if options.config else ""
         recording: Recording | EdgeRecording
+        if is_recording(options.recording):
+            return _evaluate_own(options, extra)
         if has_edges(options.recording):
             recording = read_edges(options.recording)
             result = _run_edges(recording, extra)
@@ -54,11 +62,15 @@ def main(arguments: list[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return FAILED
     scores = outcome.score(recording, result)
-    print("\n".join(table.lines(scores)))
+    print("\n".join([*table.lines(scores), *reasons.lines(result.status)]))
+    _write(options, scores)
+    return 0
+
+
+def _write(options: argparse.Namespace, scores: dict[str, Any]) -> None:
     if options.json:
         options.json.parent.mkdir(parents=True, exist_ok=True)
         options.json.write_text(json.dumps(scores, indent=1) + "\n")
-    return 0
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -71,8 +83,42 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("recording", type=Path, metavar="RECORDING")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     parser.add_argument("--speed", choices=("real", "virtual"), default="virtual")
+    parser.add_argument(
+        "--truth",
+        type=Path,
+        metavar="FILE|DIR",
+        help="TUM or CSV of each robot, for own recordings",
+    )
+    parser.add_argument("--key", metavar="FILE", help="the team key of own recordings")
     parser.add_argument("--config", type=Path, metavar="TOML", help="sections for every robot")
     return parser
+
+
+def _evaluate_own(options: argparse.Namespace, extra: str) -> int:
+    """What a team recorded itself; the exit code.
+
+    Raises: as of `main`.
+    """
+    true = truth.read(options.truth) if options.truth else None
+    team = gathered(read_runs([options.recording]))
+    progress = Progress(f"{len(team.robots)} robots", team.duration_s)
+    complaints = Complaints()
+    played = play(team, extra, options.key, progress, complaints.note)
+    progress.end()
+    result, name = virtual_team.outcome(played), options.recording.name
+    if true is None:
+        scores = scored.without_truth(name, result.status)
+        lines = [
+            f"robot {robot}: {text}" for robot, text in sorted(scored.places(result.status).items())
+        ]
+    else:
+        recording = scored.as_recording(name, team, played, true)
+        scores = outcome.score(recording, result)
+        lines = table.lines(scores)
+    why = reasons.lines(result.status, complaints.lasted())
+    print("\n".join([*team.said(), *lines, *why]))
+    _write(options, scores)
+    return 0
 
 
 def _run(recording: Recording, speed: str, extra: str) -> Outcome:

@@ -133,13 +133,13 @@ class Simulator:
         epoch: int = 1,
         epochs: dict[int, int] | None = None,
         kept: SensorCalibration = UNLEARNED,
+        dbc_text: str = "",
     ) -> Member:
         """Switch a robot on, now."""
 
         def renew(fresh: int) -> Robot:
-            return Robot(
-                config, team_key(secret), fresh, dict(epochs or {}), kept, tuning=self._tuning
-            )
+            key, known = team_key(secret), dict(epochs or {})
+            return Robot(config, key, fresh, known, kept, dbc_text, self._tuning)
 
         member = Member(renew(epoch), renew, clock or Clock(), hardware, Traces())
         self.members[config.robot.id] = member

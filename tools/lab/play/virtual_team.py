@@ -128,6 +128,7 @@ def add_answers(
         )
     out.frames[robot] = status["pose"].get("frame")
     out.groups[robot] = status["graph"]["group"]
+    out.status[robot] = status
     out.bytes_sent[robot] = status["network"]["bytes_sent"]
     out.bias_m = {**status["graph"].get("range_bias_m", {}), **out.bias_m}
     out.scale = {**status["graph"].get("wheel_scale", {}), **out.scale}

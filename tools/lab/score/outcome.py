@@ -58,6 +58,8 @@ class Outcome:
     scale: dict[str, float] = field(default_factory=dict)
     """Scale error of each robot's odometry, likewise."""
     ms: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    status: dict[int, dict[str, Any]] = field(default_factory=dict)
+    """What each robot said of itself at the end."""
 
     @property
     def is_one_team(self) -> bool:

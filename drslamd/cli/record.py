@@ -1,0 +1,104 @@
+"""``drslamd record``: what robots say on a network, into an LCM log, without a daemon."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import time
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from drslamd.cli.exit_codes import CANNOT_CREATE, OK, UNAVAILABLE
+from drslamd.cli.parser import Verbs, load, verb
+from drslamd.config import ConfigError, GossipSection, Section
+from drslamd.config_faults import sentences
+
+SAY_EVERY_S = 1.0
+
+
+class _Group(Section):
+    """The part of a configuration that says where robots talk."""
+
+    gossip: GossipSection
+
+
+def add(verbs: Verbs) -> None:
+    """Add the verb."""
+    record = verb(
+        verbs,
+        "record",
+        _record,
+        "write what all robots say into an LCM log, until Ctrl-C",
+        "  drslamd record run.lcmlog --interface wlan0     on a laptop in the robots' network\n"
+        "  drslamd record run.lcmlog -c /etc/drslamd/3.toml\n\n"
+        "lcm-logplayer and lcm-spy open the file. What a robot itself hears and does, for\n"
+        "tools/replay, its daemon records: record = true in [daemon].",
+    )
+    record.add_argument("file", metavar="FILE", help="a new file; none is written over")
+    record.add_argument("-c", "--config", metavar="FILE", help="take [gossip] from this TOML file")
+    record.add_argument("--interface", metavar="NAME", help="network interface, like wlan0")
+    record.add_argument("--group", metavar="ADDRESS", help="multicast group of the team")
+    record.add_argument("--port", type=int, metavar="PORT", help="UDP port of the team")
+
+
+def _record(options: argparse.Namespace) -> int:
+    from drslamd.io.recording.listener import Listener
+
+    section, path = _section(options), Path(options.file)
+    where = f"{section.group}:{section.port} on {section.interface or 'the default interface'}"
+    if path.exists():
+        print(f"{path}: is there already; give another name", file=sys.stderr)
+        return CANNOT_CREATE
+    try:
+        listener = Listener(section, path)
+    except OSError as error:
+        is_file = error.filename is not None
+        what = f"{path}: " if is_file else f"cannot join {where}: "
+        print(f"{what}{error.strerror or error}", file=sys.stderr)
+        return CANNOT_CREATE if is_file else UNAVAILABLE
+    stopped: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda got, _: stopped.append(got))
+    print(f"listening to {where}, Ctrl-C ends", file=sys.stderr)
+    shown = time.monotonic()
+
+    def is_over() -> bool:
+        nonlocal shown
+        if sys.stderr.isatty() and time.monotonic() - shown >= SAY_EVERY_S:
+            shown = time.monotonic()
+            count = sum(listener.channels.values())
+            print(f"\r{count} messages, {listener.bytes / 1e6:.1f} MB", end="", file=sys.stderr)
+        return bool(stopped)
+
+    code = OK
+    try:
+        listener.run(is_over)
+    except OSError as error:
+        print(f"\n{path}: ended: {error.strerror or error}", file=sys.stderr)
+        code = CANNOT_CREATE
+    listener.close()
+    for channel, count in sorted(listener.channels.items()):
+        print(f"{count:>8} {channel}")
+    if listener.refused:
+        print(f"{listener.refused:>8} datagrams that are no LCM message of one piece: left out")
+    if not listener.channels:
+        print(
+            "nothing was heard: are group, port and interface those of the robots? "
+            "name the interface with --interface",
+            file=sys.stderr,
+        )
+    return code
+
+
+def _section(options: argparse.Namespace) -> GossipSection:
+    """Where to listen. Raises ConfigError, with a sentence for each fault."""
+    section = load(options.config).gossip if options.config else GossipSection()
+    named = {"interface": options.interface, "group": options.group, "port": options.port}
+    given = {key: value for key, value in named.items() if value is not None}
+    options.config = options.config or "drslamd record"
+    try:
+        return _Group.model_validate({"gossip": {**section.model_dump(), **given}}).gossip
+    except ValidationError as error:
+        raise ConfigError(sentences(error, _Group)) from None

@@ -1,0 +1,1 @@
+"""Recordings of real robots: read, replayed to the bit, played again with another configuration."""
