@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from drslamd.conventions import GRID_US
 from drslamd.export.answers import columns
 from drslamd.gossip import messages
+from drslamd.gossip.message_types import PoseState
 from drslamd.reports import graph_report
 from drslamd.slam.consistency.pair import PairTracker
 from drslamd.slam.se2 import unpacked
@@ -24,6 +25,10 @@ from lab.recordings.recording import Array
 
 MOST_CLOSURES = 150
 """Hypotheses in one matrix, the newest: more are no longer squares on paper."""
+
+
+MEANT = (PoseState.LOCALISED, PoseState.DOUBTFUL)
+"""Poses of now; a stale one says where a robot was and how far it may have driven since."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +133,7 @@ def _published(member: Member) -> Published:
     for _, channel, payload in member.traces.sent:
         if messages.kind_of_channel(channel) == "POSE":
             message: Any = messages.decode("POSE", payload)
-            if isinstance(message, messages.Pose):
+            if isinstance(message, messages.Pose) and message.state in MEANT:
                 rows.append(message.row())
     table = np.array(rows).reshape(-1, 12)
     state, frame = table[:, 1].astype(np.int64), table[:, 2].astype(np.int64)

@@ -248,6 +248,7 @@ def computations(ms: Mapping[str, list[float]]) -> str:
         axes.set_xscale("log")
         axes.set_xlabel("computation [ms] on this computer")
         axes.set_ylabel("share that was shorter")
-        axes.legend(loc="lower right")
+        if any(ms.values()):
+            axes.legend(loc="lower right")
 
     return svg(draw, 2.4)

@@ -1,0 +1,77 @@
+"""tools/report: its page, its codes; what fails leaves the page of before."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lab.play import virtual_team
+from lab.recordings import pyfg, world
+from lab.report.__main__ import main
+
+SCENE = world.Scene(robots=2, seconds=6.0, odometry_hz=10, range_hz=10, both_measure=False)
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    path = tmp_path / "small.pyfg"
+    pyfg.write(path, world.simulate(SCENE, 3), 0.06, np.array([0.002, 0.001, 0.005]))
+    return path
+
+
+def test_a_short_run_has_its_page(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    to = tmp_path / "new" / "page.html"
+    assert main([str(recording), "--to", str(to)]) == 0
+    assert capsys.readouterr().out == f"{to}\n"
+    assert to.read_text().startswith("<!doctype html>")
+    assert list(to.parent.iterdir()) == [to]
+
+
+def test_without_a_name_it_is_that_of_the_recording(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main([str(recording)]) == 0
+    assert (tmp_path / "small.html").is_file()
+
+
+def test_a_recording_that_cannot_be_used_leaves_the_page_of_before(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page, bad = tmp_path / "page.html", tmp_path / "bad.pyfg"
+    page.write_text("good")
+    bad.write_text("EDGE_SE2 1\n")
+    assert main([str(bad), "--to", str(page)]) == 66
+    assert capsys.readouterr().err.startswith("bad.pyfg line 1: EDGE_SE2 has 1 fields")
+    assert main([str(tmp_path / "gone.pyfg"), "--to", str(page)]) == 66
+    assert page.read_text() == "good"
+
+
+def test_a_fault_in_the_middle_leaves_the_page_of_before(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = tmp_path / "page.html"
+    page.write_text("good")
+    monkeypatch.setattr(virtual_team, "outcome", lambda _: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        main([str(recording), "--to", str(page)])
+    assert page.read_text() == "good"
+
+
+def test_a_page_that_cannot_be_written_ends_with_73(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    assert main([str(recording), "--to", str(tmp_path / "file" / "page.html")]) == 73
+    assert capsys.readouterr().err.endswith("page.html: File exists\n")
+
+
+def test_a_wrong_configuration_ends_with_78(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "x.toml").write_text('[optimizer]\nalgorithm = "magic"\n')
+    assert main([str(recording), "--config", str(tmp_path / "x.toml")]) == 78
+    assert "optimizer.algorithm" in capsys.readouterr().err
