@@ -21,7 +21,7 @@ def test_every_pair_has_its_residuals_at_times_of_the_recording(found: Evidence)
         assert len(pair.t) == len(pair.metres) == len(pair.sigma) > 20
         assert -0.1 <= pair.t.min() < pair.t.max() < 41
         assert np.sqrt(np.mean(pair.metres**2)) < 0.1
-        assert np.median(pair.sigma) == pytest.approx(0.1, abs=0.01)
+        assert np.median(pair.sigma) == pytest.approx(0.1, abs=0.03)
 
 
 def test_what_is_kept_agrees_with_each_other_and_with_the_truth(found: Evidence) -> None:
