@@ -74,9 +74,8 @@ def _write(options: argparse.Namespace, answers: dict[str, Any]) -> int:
     if said["frame"] is None:
         print("this robot is not localised: there are no paths and no graph yet", file=sys.stderr)
     try:
-        for name in dict.fromkeys(options.format):
-            for path in write(name, options.to, answers):
-                print(path)
+        written = [path for name in options.format for path in write(name, options.to, answers)]
+        print("".join(f"{path}\n" for path in dict.fromkeys(written)), end="")
     except CannotWrite as error:
         print(error, file=sys.stderr)
         return UNAVAILABLE

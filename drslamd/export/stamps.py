@@ -59,7 +59,7 @@ def sentences(robot: str, clock: Mapping[str, Any], stamps: Stamps, wall: Mappin
     most = float(stamps.uncertainty_s.max(initial=0.0))
     by = "" if clock["source"] == "own" else f" by {clock['source']}"
     if wall["uncertainty_us"] is None:
-        return f"robot {robot}: UNIX time of a host whose clock nobody sets, +-{most:.3f} s{by}"
+        return f"robot {robot}: UNIX time, if that of the host is right, +-{most:.3f} s{by}"
     return f"robot {robot}: UNIX time, +-{most:.3f} s{by}"
 
 

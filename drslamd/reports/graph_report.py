@@ -25,9 +25,11 @@ from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem, build_pr
 from drslamd.slam.optimizer.problem import BetweenFactors, corrected, range_errors
 from drslamd.slam.se2 import Array
 
-MOST_ROWS = 20_000
-"""Of one table, two megabytes of JSON and a fifth of a second of a Raspberry Pi: keyframes of
-twenty robots, ranges of ten pairs over some hours."""
+MOST_ROWS = 10_000
+"""Of one table: the keyframes that twenty robots have after thinning. A full one is a megabyte of
+JSON and holds up a daemon for a tenth of a second."""
+SMALLEST = 1e-12
+"""m^2 and rad^2; what is smaller is none."""
 DIGITS = 6
 """Micrometres, and 0.1 mrad of a variance."""
 KEYFRAME_COLUMNS = (
@@ -133,7 +135,7 @@ def _table(columns: tuple[str, ...], rows: Array) -> dict[str, Any]:
         if is_whole:
             out.append(values.astype(np.int64).tolist())
         else:
-            out.append([float(f"{v:.7g}") for v in values] if is_square else _rounded(values))
+            out.append(_significant(values) if is_square else _rounded(values))
     return {
         "columns": list(columns),
         "rows": [list(row) for row in zip(*out, strict=True)],
@@ -143,6 +145,13 @@ def _table(columns: tuple[str, ...], rows: Array) -> dict[str, Any]:
 
 def _rounded(values: Array) -> list[float]:
     found: list[float] = np.round(values, DIGITS).tolist()
+    return found
+
+
+def _significant(values: Array) -> list[float]:
+    """Seven digits of each."""
+    size = 10.0 ** np.floor(np.log10(np.maximum(np.abs(values), SMALLEST)))
+    found: list[float] = (np.round(values / size, DIGITS) * size).tolist()
     return found
 
 

@@ -59,7 +59,7 @@ def test_large_stamps_keep_their_microseconds() -> None:
     ("clock", "wall", "said"),
     [
         (OWN, SET, "robot 3: UNIX time, +-0.001 s"),
-        (OWN, UNSET, "robot 3: UNIX time of a host whose clock nobody sets, +-0.000 s"),
+        (OWN, UNSET, "robot 3: UNIX time, if that of the host is right, +-0.000 s"),
         (
             {"source": "one way", "readings": [[0, 0, 100_000]]},
             SET,

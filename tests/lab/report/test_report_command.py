@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from lab.play import virtual_team
 from lab.recordings import pyfg, world
 from lab.report.__main__ import main
+from recorded_teams import SHORT, WALL_US, record_team
 
 SCENE = world.Scene(robots=2, seconds=6.0, odometry_hz=10, range_hz=10, both_measure=False)
 
@@ -75,3 +77,34 @@ def test_a_wrong_configuration_ends_with_78(
     (tmp_path / "x.toml").write_text('[optimizer]\nalgorithm = "magic"\n')
     assert main([str(recording), "--config", str(tmp_path / "x.toml")]) == 78
     assert "optimizer.algorithm" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a team recorded itself, and its truth beside it in UNIX time."""
+    folder = tmp_path_factory.mktemp("own")
+    played = world.simulate(replace(SHORT, seconds=30.0), 3)
+    record_team(folder / "recordings", played)
+    (folder / "truth").mkdir()
+    for robot, trail in played.trails.items():
+        rows = [
+            f"{WALL_US / 1e6 + t:.6f} {x} {y} 0 0 0 {np.sin(th / 2)} {np.cos(th / 2)}"
+            for t, (x, y, th) in zip(trail.t, trail.truth, strict=True)
+        ]
+        (folder / "truth" / f"robot_{robot}.tum").write_text("\n".join(rows))
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("has_truth", [True, False])
+def test_what_robots_recorded_has_a_page_with_and_without_a_truth(
+    has_truth: bool, own: Path, tmp_path: Path
+) -> None:
+    page = tmp_path / "page.html"
+    truth = ["--truth", str(own / "truth")] if has_truth else []
+    assert main([str(own / "recordings"), "--to", str(page), *truth]) == 0
+    text = page.read_text()
+    assert "<h1>recordings</h1>" in text
+    assert ("<h2>Errors over time</h2>" in text) is has_truth
+    assert "<h2>Residuals of ranges</h2>" in text
+    assert "No robot was localised" not in text

@@ -11,26 +11,34 @@ import team_answers
 from lab.play.virtual_team import outcome
 from lab.report import figures
 from lab.report.evidence import Agreement, Evidence, Residuals, gather
-from lab.report.honesty import honesty
+from lab.report.honesty import honesty, origins
 from lab.score.outcome import Outcome
 
 
 def every(result: Outcome, evidence: Evidence) -> dict[str, str]:
     recording = team_answers.recording()
+    origin = origins(recording, starts_at_zero=True)
+    truths = {robot: trail.truth for robot, trail in recording.trails.items()}
     return {
+        "paths": figures.paths(result),
+        "ellipses alone": figures.ellipses(evidence, {}, {}),
         "maps": figures.maps(recording, result),
         "errors": figures.errors(recording, result),
         "convergence": figures.convergence(recording, result),
         "residuals": figures.residuals(evidence.residuals),
-        "honesty": figures.honesty(honesty(recording, evidence.published)),
-        "ellipses": figures.ellipses(recording, evidence),
+        "honesty": figures.honesty(honesty(recording, evidence.published, origin)),
+        "ellipses": figures.ellipses(evidence, truths, origin),
         "traffic": figures.traffic(evidence.sent, 40.0),
         "computations": figures.computations(result.ms),
         **{f"pair {k}": figures.agreement(k, pair) for k, pair in evidence.agreement.items()},
     }
 
 
-@pytest.mark.parametrize("full", [True, False], ids=["a whole run", "nothing at all"])
+@pytest.mark.parametrize(
+    "full",
+    [pytest.param(True, marks=pytest.mark.slow), False],
+    ids=["a whole run", "nothing at all"],
+)
 def test_each_figure_is_one_element_with_its_words_as_text(full: bool) -> None:
     simulator = team_answers.team().simulator
     drawn = every(outcome(simulator), gather(simulator)) if full else every(Outcome(), Evidence())

@@ -18,8 +18,11 @@ from lab.play.virtual_team import SETTLE_S
 from lab.progress import Progress
 from lab.recordings.readers import READERS, has_edges, read, read_edges
 from lab.recordings.recording import BadRecording
+from lab.replay import scored, truth
+from lab.replay.runs import is_recording, read_runs
+from lab.replay.team import gathered, play
 from lab.report.evidence import gather
-from lab.report.page import edge_page, page
+from lab.report.page import blind_page, edge_page, page
 from lab.score import outcome
 
 NO_INPUT, CANNOT_WRITE, BAD_CONFIG = 66, 73, 78
@@ -28,6 +31,7 @@ EXAMPLES = """\
 examples:
   tools/report run.pyfg                           writes run.html
   tools/report run.pyfg --to out/run.html         writes it there
+  tools/report recordings/ --truth mocap/         what robots recorded themselves (record = true)
   tools/report run.pyfg --config rbcd.toml        with sections added to every robot's TOML
 """
 
@@ -35,10 +39,10 @@ examples:
 def main(arguments: list[str] | None = None) -> int:
     """Run it; the exit code."""
     options = _parser().parse_args(arguments)
-    to = options.to or Path(f"{options.recording.stem}.html")
+    to = options.to or Path(f"{options.recording.resolve().stem}.html")
     try:
         extra = options.config.read_text() if options.config else ""
-        text = _report(options.recording, extra)
+        text = _report(options, extra)
     except (BadRecording, OSError) as error:
         print(error, file=sys.stderr)
         return NO_INPUT
@@ -64,14 +68,24 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("recording", type=Path, metavar="RECORDING")
     parser.add_argument("--to", type=Path, metavar="FILE", help="the page (default RECORDING.html)")
+    parser.add_argument(
+        "--truth",
+        type=Path,
+        metavar="FILE|DIR",
+        help="TUM or CSV of each robot, for own recordings",
+    )
+    parser.add_argument("--key", metavar="FILE", help="the team key of own recordings")
     parser.add_argument("--config", type=Path, metavar="TOML", help="sections for every robot")
     return parser
 
 
-def _report(path: Path, extra: str) -> str:
+def _report(options: argparse.Namespace, extra: str) -> str:
     """The page."""
-    configured = "defaults" if not extra else "with the sections of --config"
+    path = options.recording
+    configured = "as configured" if not extra else "with the sections of --config"
     about = f"drslamd {__version__}, in virtual time, {configured}"
+    if is_recording(path):
+        return _own(options, extra, about)
     if has_edges(path):
         edges = read_edges(path)
         progress = Progress("rounds of optimisation, at most", edge_run.MOST_ROUNDS, "")
@@ -85,6 +99,22 @@ def _report(path: Path, extra: str) -> str:
     result = virtual_team.outcome(simulator)
     evidence, scores = gather(simulator), outcome.score(recording, result)
     return page(recording, result, evidence, scores, about)
+
+
+def _own(options: argparse.Namespace, extra: str, about: str) -> str:
+    """Of what a team recorded itself, with or without a truth."""
+    true = truth.read(options.truth) if options.truth else None
+    team = gathered(read_runs([options.recording]))
+    progress = Progress(f"{len(team.robots)} robots", team.duration_s)
+    played = play(team, extra, options.key, progress)
+    progress.end()
+    result, evidence = virtual_team.outcome(played), gather(played)
+    name = options.recording.resolve().name
+    if true is None:
+        return blind_page(name, result, evidence, team.duration_s, about)
+    recording = scored.as_recording(name, team, played, true)
+    scores = outcome.score(recording, result)
+    return page(recording, result, evidence, scores, about, starts_at_zero=False)
 
 
 if __name__ == "__main__":

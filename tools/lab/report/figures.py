@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.patches import Ellipse
 
-from lab.recordings.recording import Array, Recording
+from lab.recordings.recording import Array
 from lab.report.evidence import Agreement, Evidence, Residuals
 from lab.report.honesty import HONEST, Honesty
 from lab.score import metrics, panels
@@ -183,23 +183,40 @@ def honesty(found: Mapping[int, Honesty]) -> str:
     return svg(draw, 2.6)
 
 
-def ellipses(recording: Recording, evidence: Evidence) -> str:
-    """Published poses with their 95 % ellipses over the truth, in the frame of the most poses."""
-    robots = sorted(recording.trails)
+def paths(result: Outcome) -> str:
+    """Each robot's own account, in the frame that it names; nobody knows the truth."""
+    robots = sorted(result.final)
+
+    def draw(figure: Any) -> None:
+        axes = figure.subplots()
+        panels.draw_paths(axes, {r: p.poses for r, p in result.final.items()}, robots)
+        panels.set_map(axes, "drslamd, in the frame of the team")
+        panels.map_legend(axes, robots)
+
+    return svg(draw, 5.0, 5.2)
+
+
+def ellipses(evidence: Evidence, truths: Mapping[int, Array], origin: Mapping[int, Array]) -> str:
+    """Published poses with their 95 % ellipses, in the frame that most of them name, over the truth
+    (k, 3) of each robot where it is known.
+
+    Args:
+        origin: where the frame of each robot truly is.
+    """
+    robots = sorted(evidence.published)
     frames = np.concatenate([np.zeros(0, int), *(p.frame for p in evidence.published.values())])
-    known = [f for f in np.unique(frames).tolist() if f in recording.trails]
 
     def draw(figure: Any) -> None:
         axes = figure.subplots()
         panels.set_map(axes, "Published poses, 95 % ellipses")
-        if not known:
+        if not len(frames):
             return
-        frame = max(known, key=lambda f: int((frames == f).sum()))
-        origin = recording.trails[frame].truth[0]
+        frame = int(np.bincount(frames).argmax())
         for robot, said in sorted(evidence.published.items()):
             shade = panels.colour(robots.index(robot))
-            truth = metrics.relative(origin, recording.trails[robot].truth)
-            axes.plot(*truth[:, :2].T, color=panels.TRUTH, lw=3, zorder=1)
+            if robot in truths and frame in origin:
+                truth = metrics.relative(origin[frame], truths[robot])
+                axes.plot(*truth[:, :2].T, color=panels.TRUTH, lw=3, zorder=1)
             mine = np.flatnonzero(said.frame == frame)
             for k in mine[:: max(1, len(mine) // MOST_ELLIPSES)]:
                 axes.add_patch(_ellipse(said.poses[k], said.covariances[k], shade))

@@ -33,10 +33,29 @@ class Honesty:
         return float(np.mean([c.is_inside for c in self.claims])) if self.claims else float("nan")
 
 
-def honesty(recording: Recording, published: dict[int, Published]) -> dict[int, Honesty]:
-    """Of each robot, in the frames that its poses name: where the robots of those really began.
+def origins(recording: Recording, starts_at_zero: bool) -> dict[int, Array]:
+    """Where the odometry frame of each robot truly is (3,).
+
+    Args:
+        starts_at_zero: the robots began to count with the recording, as those that are played one
+            do; otherwise its odometry is in their frames.
+    """
+    out = {}
+    for robot, trail in recording.trails.items():
+        begin = np.zeros(3) if starts_at_zero else trail.odometry[0]
+        out[robot] = metrics.compose(trail.truth[0], metrics.relative(begin, np.zeros(3)))
+    return out
+
+
+def honesty(
+    recording: Recording, published: dict[int, Published], origin: dict[int, Array]
+) -> dict[int, Honesty]:
+    """Of each robot, in the frames that its poses name, while there is a truth.
 
     The robot of the frame itself knows its own start, so its poses say the least; all count.
+
+    Args:
+        origin: see `origins`.
     """
     out = {}
     for robot, said in sorted(published.items()):
@@ -46,9 +65,8 @@ def honesty(recording: Recording, published: dict[int, Published]) -> dict[int, 
         for t, pose, covariance, truth, frame in zip(
             said.t, said.poses, said.covariances, true, said.frame.tolist(), strict=True
         ):
-            if frame in recording.trails and covariance.any():
-                origin = recording.trails[frame].truth[0]
-                claims.append(claim(pose, covariance, metrics.relative(origin, truth)))
+            if frame in origin and trail.t[0] <= t <= trail.t[-1]:
+                claims.append(claim(pose, covariance, metrics.relative(origin[frame], truth)))
                 times.append(t)
         out[robot] = Honesty(np.array(times), claims)
     return out

@@ -11,7 +11,7 @@ import numpy as np
 from lab.recordings.recording import EdgeRecording, Recording
 from lab.report import figures
 from lab.report.evidence import Evidence
-from lab.report.honesty import Honesty, honesty
+from lab.report.honesty import Honesty, honesty, origins
 from lab.score.outcome import Outcome, Played
 
 STYLE = """
@@ -29,16 +29,53 @@ Rows = Iterable[Sequence[str]]
 
 
 def page(
-    recording: Recording, result: Outcome, evidence: Evidence, scores: dict[str, Any], about: str
+    recording: Recording,
+    result: Outcome,
+    evidence: Evidence,
+    scores: dict[str, Any],
+    about: str,
+    starts_at_zero: bool = True,
 ) -> str:
-    """Of a recording of ranges and odometry.
+    """Of a run whose truth is known.
 
     Args:
         about: by which version, with which configuration; one line.
+        starts_at_zero: see `honesty.origins`.
     """
-    claims = honesty(recording, evidence.published)
+    origin = origins(recording, starts_at_zero)
+    claims = honesty(recording, evidence.published, origin)
+    truths = {robot: trail.truth for robot, trail in recording.trails.items()}
     parts = [
         *_result(recording, result, scores),
+        *_measured(evidence),
+        _section("What poses claim", figures.honesty(claims), NEES),
+        _table(("robot", "poses", "mean NEES", "in the 95 % ellipse"), _claimed(claims)),
+        f"<figure>{figures.ellipses(evidence, truths, origin)}</figure>",
+        *_spent(evidence, result, recording.duration),
+    ]
+    return _whole(recording.name, about, parts)
+
+
+def blind_page(name: str, result: Outcome, evidence: Evidence, seconds: float, about: str) -> str:
+    """Of a run whose truth nobody knows: nothing in it is an error.
+
+    Args:
+        seconds: that it took.
+    """
+    parts = [
+        "<h2>Result</h2>",
+        *_unlocalised(result),
+        f"<figure>{figures.paths(result)}</figure>",
+        *_measured(evidence),
+        "<h2>What poses claim</h2>",
+        f"<figure>{figures.ellipses(evidence, {}, {})}</figure>",
+        *_spent(evidence, result, seconds),
+    ]
+    return _whole(name, about, parts)
+
+
+def _measured(evidence: Evidence) -> list[str]:
+    return [
         _section("Residuals of ranges", figures.residuals(evidence.residuals), RESIDUALS),
         _table(("pair", "ranges", "rms [m]", "median [m]", "beyond 3 sigma"), _spread(evidence)),
         "<h2>Consistency</h2>",
@@ -47,21 +84,26 @@ def page(
             for name, pair in evidence.agreement.items()
         ),
         f"<p>{CONSISTENCY}</p>",
-        _section("What poses claim", figures.honesty(claims), NEES),
-        _table(("robot", "poses", "mean NEES", "in the 95 % ellipse"), _claimed(claims)),
-        f"<figure>{figures.ellipses(recording, evidence)}</figure>",
-        _section("Traffic", figures.traffic(evidence.sent, recording.duration), TRAFFIC),
+    ]
+
+
+def _spent(evidence: Evidence, result: Outcome, seconds: float) -> list[str]:
+    return [
+        _section("Traffic", figures.traffic(evidence.sent, seconds), TRAFFIC),
         _section("Computations", figures.computations(result.ms), COMPUTATIONS),
         "<h2>What was said to be wrong at the end</h2>",
         _table(("robot", "sentence"), _said(evidence)),
     ]
-    return _whole(recording, about, parts)
+
+
+def _unlocalised(result: Outcome) -> list[str]:
+    return [] if result.final else ['<p class="wrong">No robot was localised.</p>']
 
 
 def edge_page(recording: EdgeRecording, result: Outcome, scores: dict[str, Any], about: str) -> str:
     """Of relative poses that others estimated: neither ranges nor messages are in it."""
     kept = f"<p>{scores['closures']['kept']} of {scores['closures']['seen']} edges were kept.</p>"
-    return _whole(recording, about, [*_result(recording, result, scores), kept])
+    return _whole(recording.name, about, [*_result(recording, result, scores), kept])
 
 
 RESIDUALS = (
@@ -92,7 +134,7 @@ def _result(recording: Played, result: Outcome, scores: dict[str, Any]) -> list[
             ),
             _errors(scores),
         ),
-        *([] if result.final else ['<p class="wrong">No robot was localised.</p>']),
+        *_unlocalised(result),
         f"<figure>{figures.maps(recording, result)}</figure>",
         _section("Errors over time", figures.errors(recording, result), "Dead reckoning dashed."),
         *(
@@ -151,8 +193,8 @@ def _table(head: Sequence[str], rows: Rows) -> str:
     return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
 
 
-def _whole(recording: Played, about: str, parts: list[str]) -> str:
-    name = html.escape(recording.name)
+def _whole(name: str, about: str, parts: list[str]) -> str:
+    name = html.escape(name)
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{name}</title>'
         f'<meta name="viewport" content="width=device-width"><style>{STYLE}</style></head><body>'
