@@ -14,7 +14,7 @@ from lab.recordings.recording import BadRecording, Trail
 from places import REPOSITORY
 
 ROWS = re.findall(
-    r"^\| (.+?) \| `(lab/[\w/]+\.py)` \| ",
+    r"^\| (.+?) \| `(lab/recordings/\w+\.py)` \| ",
     (REPOSITORY / "tools" / "README.md").read_text(),
     flags=re.MULTILINE,
 )
