@@ -44,7 +44,7 @@ def add(verbs: Verbs) -> None:
 
 
 def _record(options: argparse.Namespace) -> int:
-    from drslamd.io.recording.listener import Listener
+    from drslamd.io.recording.group_log import GroupLog
 
     section, path = _section(options), Path(options.file)
     where = f"{section.group}:{section.port} on {section.interface or 'the default interface'}"
@@ -52,7 +52,7 @@ def _record(options: argparse.Namespace) -> int:
         print(f"{path}: is there already; give another name", file=sys.stderr)
         return CANNOT_CREATE
     try:
-        listener = Listener(section, path)
+        log = GroupLog(section, path)
     except OSError as error:
         is_file = error.filename is not None
         what = f"{path}: " if is_file else f"cannot join {where}: "
@@ -68,22 +68,22 @@ def _record(options: argparse.Namespace) -> int:
         nonlocal shown
         if sys.stderr.isatty() and time.monotonic() - shown >= SAY_EVERY_S:
             shown = time.monotonic()
-            count = sum(listener.channels.values())
-            print(f"\r{count} messages, {listener.bytes / 1e6:.1f} MB", end="", file=sys.stderr)
+            count = sum(log.channels.values())
+            print(f"\r{count} messages, {log.bytes / 1e6:.1f} MB", end="", file=sys.stderr)
         return bool(stopped)
 
     code = OK
     try:
-        listener.run(is_over)
+        log.run(is_over)
     except OSError as error:
         print(f"\n{path}: ended: {error.strerror or error}", file=sys.stderr)
         code = CANNOT_CREATE
-    listener.close()
-    for channel, count in sorted(listener.channels.items()):
+    log.close()
+    for channel, count in sorted(log.channels.items()):
         print(f"{count:>8} {channel}")
-    if listener.refused:
-        print(f"{listener.refused:>8} datagrams that are no LCM message of one piece: left out")
-    if not listener.channels:
+    if log.refused:
+        print(f"{log.refused:>8} datagrams that are no LCM message of one piece: left out")
+    if not log.channels:
         print(
             "nothing was heard: are group, port and interface those of the robots? "
             "name the interface with --interface",

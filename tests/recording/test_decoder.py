@@ -7,7 +7,7 @@ import json
 
 import pytest
 from event_strategies import effects, events, utimes
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from drslamd.events import ChannelMessage, Datagram, Effect, Event, JobDone, Send, Tick
@@ -18,6 +18,7 @@ from drslamd.recording.encoder import Encoder
 from drslamd.recording.event_log import Entry, entries
 from drslamd.recording.records import KINDS, Beginning, Marked, Opening, Record, Sent, Told
 
+SETTINGS = settings(derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 BEGINNING = Beginning(2**50, {1: 7, 2: 2**40}, {"scale": [0.1, 0.02]})
 OPENING = Opening(5, BEGINNING, 3, {"host": "robot", "configuration": {"robot": {"id": 3}}})
 
@@ -42,6 +43,7 @@ def as_decoded(event: Event) -> Record:
     return event
 
 
+@SETTINGS
 @given(st.lists(events, max_size=8), st.booleans())
 def test_every_event_comes_back(happened: list[Event], is_framed: bool) -> None:
     encoder = Encoder(3, is_framed)
@@ -49,6 +51,7 @@ def test_every_event_comes_back(happened: list[Event], is_framed: bool) -> None:
     assert read(data) == [OPENING, *map(as_decoded, happened)]
 
 
+@SETTINGS
 @given(st.lists(st.tuples(events, st.lists(effects, max_size=4)), max_size=6))
 def test_what_was_sent_stands_between_the_events(
     happened: list[tuple[Event, list[Effect]]],
@@ -65,6 +68,7 @@ def test_what_was_sent_stands_between_the_events(
     assert told == [type(effect).__name__.lower() for effect in rare]
 
 
+@SETTINGS
 @given(utimes, st.binary(max_size=30), st.booleans(), st.integers(0, 5))
 def test_an_own_message_comes_back_as_it_was_heard(
     utime: int, payload: bytes, is_framed: bool, later: int
@@ -117,6 +121,7 @@ def opened() -> Decoder:
     return reader
 
 
+@SETTINGS
 @given(
     st.sampled_from(KINDS) | st.just("NEW") | st.text("AB_", max_size=3),
     st.binary(max_size=40)

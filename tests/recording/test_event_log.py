@@ -7,12 +7,13 @@ from pathlib import Path
 
 import lcm
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from drslamd.recording import event_log
 from drslamd.recording.event_log import MAX_DATA, Damage, Entry, entries, packed
 
+SETTINGS = settings(derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 CHANNELS = st.text(st.characters(min_codepoint=33, max_codepoint=126), min_size=1, max_size=63)
 ENTRIES = st.builds(
     Entry, st.integers(0, 2**62), st.integers(0, 2**62), CHANNELS, st.binary(max_size=60)
@@ -27,6 +28,7 @@ def read(data: bytes) -> list[Entry | Damage]:
     return list(entries(io.BytesIO(data)))
 
 
+@SETTINGS
 @given(st.lists(ENTRIES, max_size=5))
 def test_what_was_written_is_read(log: list[Entry]) -> None:
     assert read(bytes_of(log)) == log
@@ -55,6 +57,7 @@ def test_a_tail_that_was_cut_anywhere_is_said_and_all_before_it_is_read(size: in
     assert read(ALL[:size]) == [TWO[0], Damage(FIRST, size - FIRST, True)]
 
 
+@SETTINGS
 @given(st.binary(max_size=80).filter(lambda b: b"\xed" not in b))
 def test_bytes_between_two_entries_are_passed_over_and_said(between: bytes) -> None:
     found = read(bytes_of(TWO[:1]) + between + bytes_of(TWO[1:]))

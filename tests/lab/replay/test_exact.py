@@ -74,7 +74,7 @@ def test_every_robot_decides_as_it_did_and_knows_what_it_knew(
         assert found.robot.back.estimate is not None
         now = member.clock.local(team.now)
         assert report.status(found.robot, now) == report.status(member.robot, now)
-        assert report.trajectories(found.robot) == report.trajectories(member.robot)
+        assert report.trajectories(found.robot, now) == report.trajectories(member.robot, now)
 
 
 def test_a_message_that_was_another_one_is_named_with_its_time(

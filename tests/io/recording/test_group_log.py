@@ -14,7 +14,7 @@ import pytest
 from transport_helpers import GROUP, section
 
 from drslamd.gossip import lc02
-from drslamd.io.recording.listener import Listener
+from drslamd.io.recording.group_log import GroupLog
 
 SECTION = section()
 
@@ -28,8 +28,8 @@ def say(*datagrams: bytes) -> None:
             talker.sendto(datagram, (GROUP, SECTION.port))
 
 
-def heard(path: Path, *datagrams: bytes) -> Listener:
-    listener = Listener(SECTION, path)
+def heard(path: Path, *datagrams: bytes) -> GroupLog:
+    listener = GroupLog(SECTION, path)
     end = time.monotonic() + 10
     try:
         say(*datagrams)
@@ -64,7 +64,7 @@ def test_what_is_no_message_is_counted_and_left_out(tmp_path: Path) -> None:
 
 
 def test_names_without_end_are_counted_together(tmp_path: Path) -> None:
-    listener = Listener(SECTION, tmp_path / "log")
+    listener = GroupLog(SECTION, tmp_path / "log")
     try:
         for k in range(1_002):
             listener._entry(lc02.encode(1, f"C{k}", b""))
@@ -77,7 +77,7 @@ def test_names_without_end_are_counted_together(tmp_path: Path) -> None:
 def test_a_file_that_is_there_is_not_written_over(tmp_path: Path) -> None:
     (tmp_path / "log").write_text("mine")
     with pytest.raises(FileExistsError):
-        Listener(SECTION, tmp_path / "log")
+        GroupLog(SECTION, tmp_path / "log")
     assert (tmp_path / "log").read_text() == "mine"
 
 
@@ -85,7 +85,7 @@ def test_a_disk_that_is_full_ends_it(tmp_path: Path, monkeypatch: pytest.MonkeyP
     def full(*_: Any) -> int:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    listener = Listener(SECTION, tmp_path / "log")
+    listener = GroupLog(SECTION, tmp_path / "log")
     try:
         monkeypatch.setattr(os, "write", full)
         say(lc02.encode(1, "A", b"x"))

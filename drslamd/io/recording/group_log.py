@@ -23,7 +23,7 @@ DATAGRAMS_AT_ONCE = 64
 """Read in one go; then they are written."""
 
 
-class Listener:
+class GroupLog:
     """Of one group.
 
     Attributes:
