@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 from daemon_scenes import Stepped, configured, until, with_worker
-from lab.play.simulator import Simulator
 from lab.recordings import world
 from lab.replay.exact import Replayed, Replayer
 from lab.replay.runs import Run, key_of, read_runs
@@ -23,17 +22,10 @@ from drslamd.recording.event_log import Entry, entries, packed
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("recordings")
-
-
-@pytest.fixture(scope="module")
-def team(folder: Path) -> Simulator:
-    return record_team(folder, world.simulate(SHORT, 3))
-
-
-@pytest.fixture(scope="module")
-def runs(folder: Path, team: Simulator) -> list[Run]:
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Run]:
+    """Eighteen seconds of two robots."""
+    folder = tmp_path_factory.mktemp("recordings")
+    record_team(folder, world.simulate(SHORT, 3), until_s=18.0)
     return read_runs([folder])
 
 
@@ -62,9 +54,10 @@ def place(log: list[Entry], channel: str, after_s: float = 0.0) -> int:
     return next(i for i, e in enumerate(log) if e.channel == channel and e.utime >= since)
 
 
-def test_every_robot_decides_as_it_did_and_knows_what_it_knew(
-    team: Simulator, runs: list[Run]
-) -> None:
+@pytest.mark.slow
+def test_every_robot_decides_as_it_did_and_knows_what_it_knew(tmp_path: Path) -> None:
+    team = record_team(tmp_path, world.simulate(SHORT, 3))
+    runs = read_runs([tmp_path])
     assert [run.robot for run in runs] == [0, 1]
     for run in runs:
         found, member = replayed(run), team.members[run.robot]
@@ -137,7 +130,7 @@ def test_a_run_that_was_cut_anywhere_is_the_same_up_to_there(
     (run,) = read_runs([tmp_path])
     found = replayed(run)
     assert found.difference is None
-    assert found.seconds > 5
+    assert found.seconds > 3
     assert all("the end is cut" in sentence for sentence in run.said)
 
 
@@ -150,8 +143,8 @@ def test_where_events_are_missing_it_ends_and_says_so(runs: list[Run], tmp_path:
     found = replayed(run)
     assert found.difference is None
     assert found.ended == "events are missing here; what follows cannot be replayed"
-    assert 5 < found.seconds < 20
-    assert "bytes at" in run.said[0]
+    assert 3 < found.seconds < 12
+    assert run.said[0].startswith(path.name)
 
 
 def test_a_robot_that_took_the_place_of_another_is_followed(tmp_path: Path) -> None:

@@ -38,6 +38,14 @@ def own(folder: Path, live: Simulator) -> Team:
     return gathered(read_runs([folder]))
 
 
+@pytest.fixture(scope="module")
+def brief(tmp_path_factory: pytest.TempPathFactory) -> tuple[Team, Simulator]:
+    """Twelve seconds, in which nobody is localised."""
+    folder = tmp_path_factory.mktemp("brief")
+    simulator = record_team(folder, RECORDING, until_s=12.0)
+    return gathered(read_runs([folder])), simulator
+
+
 def start_of(simulator: Simulator) -> Array:
     """Where robot 1 began, in the frame of robot 0 as robot 0 sees it."""
     estimate = simulator.members[0].robot.back.estimate
@@ -45,6 +53,7 @@ def start_of(simulator: Simulator) -> Array:
     return np.asarray(estimate.trajectories[1].poses[0])
 
 
+@pytest.mark.slow
 def test_the_clocks_of_a_team_are_those_that_it_had(own: Team, live: Simulator) -> None:
     zero = live.members[0].clock
     for run, found in zip(own.runs, own.clocks, strict=True):
@@ -84,8 +93,8 @@ def test_what_would_have_made_it_blind_is_seen_and_said(own: Team) -> None:
         assert said["uwb"]["counters"]["ranges.refused.LIMITS"] > 100
 
 
-def test_a_change_is_one_of_the_keys_that_it_names(own: Team) -> None:
-    (run, _) = own.runs
+def test_a_change_is_one_of_the_keys_that_it_names(brief: tuple[Team, Simulator]) -> None:
+    run = brief[0].runs[0]
     before, after = run.config(), configured(run, "[optimizer]\nrank = 7\n")
     assert after.optimizer.rank == 7
     same = after.model_copy(update={"optimizer": before.optimizer})
@@ -101,9 +110,11 @@ def test_a_change_is_one_of_the_keys_that_it_names(own: Team) -> None:
         ("robot = 3\n", "robot = 3"),
     ],
 )
-def test_a_change_that_cannot_be_used_names_its_key(own: Team, extra: str, fault: str) -> None:
+def test_a_change_that_cannot_be_used_names_its_key(
+    brief: tuple[Team, Simulator], extra: str, fault: str
+) -> None:
     with pytest.raises(ConfigError) as raised:
-        configured(own.runs[0], extra)
+        configured(brief[0].runs[0], extra)
     assert raised.value.faults[0].startswith(fault)
 
 
@@ -152,16 +163,17 @@ def live_in(own: Team, live: Simulator) -> Simulator:
     ],
 )
 def test_a_truth_of_another_time_or_of_other_robots_is_refused(
-    own: Team, live: Simulator, truth: dict[int, Array], words: str
+    brief: tuple[Team, Simulator], truth: dict[int, Array], words: str
 ) -> None:
     with pytest.raises(BadRecording) as raised:
-        scored.as_recording("own", own, live, truth)
+        scored.as_recording("own", *brief, truth)
     assert words in str(raised.value)
 
 
 def test_without_recorded_computations_they_take_a_usual_time(
-    own: Team, monkeypatch: pytest.MonkeyPatch
+    brief: tuple[Team, Simulator], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    own, _ = brief
     assert own.solve_us == 20_000
     monkeypatch.setattr(type(own.runs[0]), "records", lambda _: iter(()))
     assert team._median_us(own.runs) == team.SOLVE_US
