@@ -19,7 +19,7 @@ from lab.replay.runs import Run, key_of, read_runs
 from namespace import hindrance
 from places import REPOSITORY
 
-from drslamd.events import Effect, Event
+from drslamd.events import Effect, Event, Stop
 from drslamd.gossip import messages
 from drslamd.gossip.message_types import Pose, PoseState
 from drslamd.io.recording.log_files import LogFiles
@@ -27,7 +27,8 @@ from drslamd.io.recording.recorder import Recorder
 from drslamd.io.status_socket import ask
 from drslamd.recording.encoder import Encoder
 from drslamd.recording.event_log import Entry, entries
-from drslamd.recording.records import Beginning
+from drslamd.recording.records import Beginning, Sent
+from drslamd.robot import GOODBYES
 
 pytestmark = pytest.mark.slow
 
@@ -76,6 +77,12 @@ def test_every_run_is_there(runs: list[Run]) -> None:
     assert [run.robot for run in runs] == [0, KILLED, KILLED, 2]
     lengths = [run.length_s() for run in runs]
     assert min(lengths[0], lengths[3]) > SCENE.seconds
+    for run in (runs[0], runs[2], runs[3]):
+        # ended in order: the goodbyes are on the disk too
+        records = list(run.records())
+        (stop,) = (i for i, record in enumerate(records) if isinstance(record, Stop))
+        assert sum(isinstance(record, Sent) for record in records[stop:]) >= GOODBYES
+        assert run.said == []
     # at most the last second was not on the disk yet, and starting takes some
     assert KILLED_AT_S - 6 < lengths[1] < KILLED_AT_S + 6
 

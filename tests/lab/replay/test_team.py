@@ -8,14 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lab.play import virtual_team
-from lab.play.simulator import Simulator
+from lab.play.playback import equip, robot_config
+from lab.play.simulator import Clock, Simulator
 from lab.recordings import world
 from lab.recordings.recording import Array, BadRecording
 from lab.replay import scored, team
 from lab.replay.runs import read_runs
 from lab.replay.team import Team, configured, gathered, play
 from lab.score import outcome
-from recorded_teams import SHORT, WALL_US, record_team
+from recorded_teams import SHORT, WALL_US, record, record_team
 
 from drslamd import report
 from drslamd.config import ConfigError
@@ -177,3 +178,22 @@ def test_without_recorded_computations_they_take_a_usual_time(
     assert own.solve_us == 20_000
     monkeypatch.setattr(type(own.runs[0]), "records", lambda _: iter(()))
     assert team._median_us(own.runs) == team.SOLVE_US
+
+
+def test_a_robot_that_was_started_again_begins_again(tmp_path: Path) -> None:
+    simulator = Simulator()
+    device = equip(RECORDING)[0]
+    for start in (1, 2):
+        member = simulator.add(robot_config(device), Clock(7_000_000), device, epoch=start)
+        recorder = record(member, simulator, tmp_path)
+        simulator.play(member, device.chunks()[:200] if start == 1 else [])
+        simulator.run(3.0 * start)
+        simulator.kill(member)
+        recorder._flush()
+        recorder._files.close()
+    played = play(gathered(read_runs([tmp_path])))
+    first, second = played._everyone
+    assert (first.robot.own.epoch, second.robot.own.epoch) == (1, 2)
+    assert (first.running, second.running) == (False, True)
+    assert first.robot.front.reckoning.path_m > 0
+    assert second.robot.front.reckoning.path_m == 0
