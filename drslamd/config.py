@@ -48,6 +48,8 @@ class Section(BaseModel):
 class RobotSection(Section):
     id: RobotId
     """Unique in the team; the lowest living id of a group gives the frame of that group."""
+    calibration: str = ""
+    """File made by `drslamd calibrate`: what a tape says of wheels and antennas."""
 
 
 class TeamSection(Section):
@@ -288,6 +290,10 @@ class Config(Section):
         return self.robot.id if self.uwb.id is None else self.uwb.id
 
 
+FILES = (("robot", "calibration"), ("team", "key_file"), ("wheels", "dbc_file"))
+"""Keys that name files which the daemon reads."""
+
+
 class ConfigError(Exception):
     """The file cannot be used; `faults` holds one sentence for each reason."""
 
@@ -297,7 +303,7 @@ class ConfigError(Exception):
 
 
 def parse(text: str, base_dir: str = "") -> Config:
-    """Read TOML text; relative `key_file` and `dbc_file` paths count from `base_dir`.
+    """Read TOML text; relative paths of files count from `base_dir`.
 
     Raises:
         ConfigError: with one sentence per fault.
@@ -310,7 +316,7 @@ def parse(text: str, base_dir: str = "") -> Config:
         raise ConfigError(["not valid TOML: a number of thousands of digits"]) from None
     except RecursionError:
         raise ConfigError(["not valid TOML: brackets or keys nested too deep"]) from None
-    for section, key in (("team", "key_file"), ("wheels", "dbc_file")):
+    for section, key in FILES:
         values = table.get(section)
         if isinstance(values, dict) and isinstance(values.get(key), str) and values[key]:
             values[key] = str(PurePath(base_dir) / values[key])

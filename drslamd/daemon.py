@@ -42,7 +42,13 @@ from drslamd.io.systemd import Notifier
 from drslamd.io.wall_clock import read_wall_clock
 from drslamd.io.worker import Finished, Worker
 from drslamd.machine.folders import socket_path, state_dir
-from drslamd.parts import dbc_text, make_recorder, make_transport, make_wheels
+from drslamd.parts import (
+    dbc_text,
+    make_recorder,
+    make_transport,
+    make_wheels,
+    taped_calibration,
+)
 from drslamd.recording.records import Beginning
 from drslamd.reports import graph_report
 from drslamd.robot import Robot
@@ -63,7 +69,8 @@ class Daemon:
     def __init__(self, config: Config, clock: Clock | None = None) -> None:
         """
         Raises:
-            ConfigError: the team key, the DBC file or a chosen package cannot be used.
+            ConfigError: the team key, the DBC file, the calibration or a chosen package cannot be
+                used.
         """
         self._config = config
         self._clock = clock or MonotonicClock()
@@ -73,9 +80,9 @@ class Daemon:
         self._load_fault = self._store.fault
         epochs = {int(robot): epoch for robot, epoch in state.get("epochs", {}).items()}
         kept = SensorCalibration.of_state(state.get("calibration", {}))
-        key, dbc = team_key(secret), dbc_text(config)
-        self._make_robot = partial(Robot, config, key, dbc_text=dbc)
-        self._recorder = make_recorder(config, self._clock, state_dir(config), dbc, key)
+        key, dbc, taped = team_key(secret), dbc_text(config), taped_calibration(config)
+        self._make_robot = partial(Robot, config, key, dbc_text=dbc, taped=taped)
+        self._recorder = make_recorder(config, self._clock, state_dir(config), dbc, key, taped)
         last = {"epochs": epochs, "calibration": kept.state()}
         self.robot = self._new_robot(self._store.begin(last, state.get("epoch", 0)), epochs, kept)
         self._ends: Robot | None = None

@@ -1,4 +1,4 @@
-"""The parts of a daemon that its configuration chooses: network, wheels, DBC file, recording."""
+"""What a configuration chooses: network, wheels, DBC file, calibration, recording."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 from drslamd.config import Config, ConfigError, DbcSection, SerialWheelSection
 from drslamd.host.owners import denied
+from drslamd.host.plain_file import read_plain
 from drslamd.io.can_bus import CanBus, require_python_can
 from drslamd.io.clock import Clock
 from drslamd.io.liblcm import Liblcm, require_lcm
@@ -19,6 +20,8 @@ from drslamd.io.recording.recorder import NoRecorder, Recorder
 from drslamd.io.serial_port import SerialPort
 from drslamd.io.transport import Transport
 from drslamd.recording.encoder import Encoder
+from drslamd.setup.calibration_file import MAX_BYTES, Taped, UnusableCalibration, read
+from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
 
 Handle = Callable[[Any], None]
 """Takes an event."""
@@ -66,7 +69,12 @@ def dbc_text(config: Config) -> str:
 
 
 def make_recorder(
-    config: Config, clock: Clock, state_dir: Path, dbc_text: str, key: bytes
+    config: Config,
+    clock: Clock,
+    state_dir: Path,
+    dbc_text: str,
+    key: bytes,
+    taped: SensorCalibration = UNLEARNED,
 ) -> Recorder | NoRecorder:
     """What keeps all that is heard and done, if `daemon.record` says so."""
     section = config.daemon
@@ -75,4 +83,43 @@ def make_recorder(
     folder = Path(section.record_dir) if section.record_dir else state_dir / "recordings"
     files = LogFiles(folder, config.robot.id, section.record_mb << 20)
     encoder = Encoder(config.robot.id, is_framed=config.gossip.provider == "native")
-    return Recorder(files, encoder, provenance(config, dbc_text, key), partial(clocks, clock))
+    origin = provenance(config, dbc_text, key, taped)
+    return Recorder(files, encoder, origin, partial(clocks, clock))
+
+
+def taped_calibration(config: Config) -> SensorCalibration:
+    """What a tape says of this robot, nothing where the configuration names no file.
+
+    Raises:
+        ConfigError: the file cannot be read, or belongs to another robot or to other wheels.
+    """
+    path = config.robot.calibration
+    if not path:
+        return UNLEARNED
+    try:
+        taped = read_taped(Path(path))
+        if taped is not None:
+            return taped.calibration(config)
+        reason = "No such file; make it with drslamd calibrate, or leave the key out"
+    except UnusableCalibration as error:
+        reason = str(error)
+    raise ConfigError([f"robot.calibration = {path!r}: {reason}"])
+
+
+def read_taped(path: Path) -> Taped | None:
+    """What such a file says, None where there is none.
+
+    Raises:
+        UnusableCalibration: it cannot be read.
+    """
+    try:
+        return read(read_plain(path, MAX_BYTES))
+    except FileNotFoundError:
+        return None
+    except PermissionError as error:
+        raise UnusableCalibration(f"{error.strerror}; {denied(path)}") from None
+    except UnicodeDecodeError:
+        raise UnusableCalibration("not a text file; make it with drslamd calibrate") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise UnusableCalibration(f"{reason}; name a file that drslamd calibrate made") from None

@@ -88,13 +88,14 @@ class Robot:
         kept: SensorCalibration = UNLEARNED,
         dbc_text: str = "",
         tuning: Tuning = DEFAULTS,
+        taped: SensorCalibration = UNLEARNED,
     ) -> None:
         """
         Args:
             key: of `seal.team_key`.
             epoch: of this start, above all earlier ones.
             epochs: last known epoch of each peer, from before this start.
-            kept: what the last start learned of our sensors.
+            kept: what the last start learned of our sensors; taped: what a person measured.
             dbc_text: content of `wheels.dbc_file`, where there is one.
             tuning: of the estimator.
         """
@@ -103,9 +104,8 @@ class Robot:
         self.uwb = LinkTrackInput(config.uwb_id, config.uwb.max_range_m)
         self.wheels = WheelInput(config.wheels, dbc_text)
         self.team = Team(Seal(key, config.robot.id, epoch, epochs))
-        self.calibration = CalibrationStore(
-            kept, closure_method(config.relative_pose).uses_calibration
-        )
+        uses_kept = closure_method(config.relative_pose).uses_calibration
+        self.calibration = CalibrationStore(kept, uses_kept, taped)
         self.front = FrontEnd(config, self.own, self.calibration.used, tuning)
         self.back = BackEnd(config, self.own, tuning)
         self.broadcast = Broadcast(config, self.team, self.front, self.back)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from drslamd.conventions import SECOND_US
 from drslamd.daemon import Daemon
 from drslamd.events import NetworkState, PortCondition, PortState, Restart, Save, SaveDone, Tick
 from drslamd.io import state_store
+from drslamd.sensors.samples import Motion
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED
 from drslamd.slam.graph.estimate import Learned
 
@@ -58,6 +60,27 @@ def test_a_restart_takes_ports_network_and_knowledge_along(
     assert new.team.seal.epochs == {9: 123}
     assert new.calibration.latest == learned
     assert kept(tmp_path)["epochs"] == {"9": 123}
+
+
+def test_a_calibration_is_known_from_the_first_start_on_and_narrows_the_prior(
+    tmp_path: Path, clock: Stepped
+) -> None:
+    plain = Daemon(configured(tmp_path), clock).robot.front.model
+    (tmp_path / "1.cal").write_text(
+        "robot.id = 1\npush = {scale = 0.02, sigma = 0.006}\n[wheels]\nsource = 'kobuki'\n"
+        "track_m = 0.23\ncounts_per_metre = 11724.4\nreverse_left = false\n"
+        "reverse_right = false\n[bias.4]\nbias_m = 0.1\nsigma_m = 0.08\n"
+    )
+    config = configured(tmp_path)
+    named = config.robot.model_copy(update={"calibration": str(tmp_path / "1.cal")})
+    robot = Daemon(config.model_copy(update={"robot": named}), clock).robot
+    motion = robot.calibration.used.corrected(Motion(1, 1.0, 0.5))
+    assert motion.distance_m == pytest.approx(0.98)
+    assert motion.turn_rad == pytest.approx(0.49)
+    # what changes between two starts is still allowed for
+    assert plain.noise.scale == 0.10
+    assert robot.front.model.noise.scale == pytest.approx(math.hypot(0.006, 0.03))
+    assert robot.calibration.used.bias_sigma(4, 0.3) == pytest.approx(math.hypot(0.08, 0.15))
 
 
 def test_an_epoch_is_on_disk_before_anything_is_sent_under_it(tmp_path: Path) -> None:

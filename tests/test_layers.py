@@ -24,6 +24,7 @@ RINGS = {
         "history",
         "gossip",
         "recording",
+        "setup",
         "memory",
         "timers",
         "jobs",

@@ -15,7 +15,16 @@ from drslamd.io.can_bus import CanBus
 from drslamd.io.multicast import Multicast
 from drslamd.io.recording.recorder import NoRecorder, Recorder
 from drslamd.io.serial_port import SerialPort
-from drslamd.parts import dbc_text, make_recorder, make_transport, make_wheels
+from drslamd.parts import (
+    dbc_text,
+    make_recorder,
+    make_transport,
+    make_wheels,
+    taped_calibration,
+)
+from drslamd.setup.calibration_file import MAX_BYTES
+from drslamd.slam.calibration.sensor_calibration import UNLEARNED
+from drslamd.slam.graph.estimate import Learned
 
 KOBUKI = 'source = "kobuki"\nport = "/dev/none"\n'
 ODRIVE = """source = "odrive"
@@ -136,3 +145,44 @@ def test_a_recording_goes_where_it_is_told_or_into_the_state_folder(more: str, f
 def test_without_a_word_nothing_is_recorded() -> None:
     made = make_recorder(configured(), Stepped(), Path("state"), "", bytes(32))
     assert isinstance(made, NoRecorder)
+
+
+def named(path: Path) -> Config:
+    return parse(CONFIG.replace("id = 1", f'id = 1\ncalibration = "{path}"'))
+
+
+def test_no_calibration_is_nothing_known() -> None:
+    assert taped_calibration(configured()) == UNLEARNED
+
+
+def test_a_calibration_is_read_from_the_folder_of_the_configuration(tmp_path: Path) -> None:
+    (tmp_path / "1.cal").write_text("robot.id = 1\nbias.4 = {bias_m = 0.1, sigma_m = 0.08}\n")
+    text = CONFIG.replace("id = 1", 'id = 1\ncalibration = "1.cal"')
+    assert taped_calibration(parse(text, str(tmp_path))).bias == {4: Learned(0.1, 0.08)}
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        (None, "No such file; make it with drslamd calibrate, or leave the key out"),
+        (b"robot.id = 2\n", "it is of robot 2, not 1; measure this one: drslamd calibrate"),
+        (b"\xff", "not a text file"),
+        (b"robot", "not valid TOML: "),
+        (b"#" * (MAX_BYTES + 1), "it has more than 65536 bytes; name a file that drslamd cal"),
+    ],
+)
+def test_a_calibration_that_cannot_be_used_is_one_sentence(
+    tmp_path: Path, content: bytes | None, why: str
+) -> None:
+    path = tmp_path / "1.calibration.toml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(ConfigError) as error:
+        taped_calibration(named(path))
+    (fault,) = error.value.faults
+    assert fault.startswith(f"robot.calibration = {str(path)!r}: {why}")
+
+
+def test_a_folder_is_no_calibration(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="Is a directory"):
+        taped_calibration(named(tmp_path))

@@ -1,8 +1,8 @@
 """The command ``drslamd``: one file for each verb.
 
-Exit codes: 0 done, 1 something that doctor found, 64 wrong usage, 69 no daemon answers (view: no
-aiohttp, or its port is taken), 70 a bug of ours, 73 a file that cannot be made, 75 another daemon
-already runs, 78 an unusable set-up.
+Exit codes: 0 done, 1 something that doctor or calibrate found, 64 wrong usage, 69 no daemon or
+sensor answers (view: no aiohttp, or its port is taken), 70 a bug of ours, 73 a file that cannot be
+made, 75 another daemon already runs, 78 an unusable set-up.
 """
 
 from __future__ import annotations
@@ -24,26 +24,29 @@ from drslamd.cli import (
 )
 from drslamd.cli.exit_codes import BAD_CONFIG
 from drslamd.cli.parser import Parser
+from drslamd.cli.setting_up import calibrate, init
 from drslamd.config import ConfigError
 
 EXAMPLES = """\
 examples:
+  drslamd init                               what is plugged in becomes a configuration
   drslamd keygen /etc/drslamd/team.key       a secret for the team; copy it to every robot
   drslamd check -c /etc/drslamd/3.toml       would it run here, and if not, why?
   drslamd run -c /etc/drslamd/3.toml         the daemon (systemd: drslamd@3)
   drslamd status -c /etc/drslamd/3.toml      what it hears, and why it is not localised
+  drslamd calibrate -c /etc/drslamd/3.toml   push it a metre, turn it once: scale and track
   drslamd doctor -c /etc/drslamd/3.toml      what is wrong, since when, what to do
   drslamd view --interface wlan0             the team on a live map, in a browser
   drslamd trajectory -c /etc/drslamd/3.toml --tum out/
   drslamd export -c /etc/drslamd/3.toml --to out/ --format csv mcap
   drslamd record run.lcmlog --interface wlan0   what all robots say, for LCM tools
 
-exit codes: 0 done, 1 doctor found something, 64 wrong usage, 69 no daemon answers (view: no
-aiohttp, or its port is taken), 70 a bug, 73 a file cannot be made, 75 another daemon already runs,
-78 the set-up cannot be used
+exit codes: 0 done, 1 doctor or calibrate found something, 64 wrong usage, 69 no daemon or sensor
+answers (view: no aiohttp, or its port is taken), 70 a bug, 73 a file cannot be made, 75 another
+daemon already runs, 78 the set-up cannot be used
 """
 
-VERBS = (run, check, doctor, status, view, trajectory, export, record, keygen)
+VERBS = (init, run, check, calibrate, doctor, status, view, trajectory, export, record, keygen)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -21,6 +21,7 @@ from drslamd.conventions import ROBOT_NAMES, SECOND_US
 from drslamd.gossip.epochs import is_kept_epoch, next_epoch
 from drslamd.gossip.seal import KEY_BYTES
 from drslamd.host.owners import denied
+from drslamd.host.plain_file import read_plain
 from drslamd.io.clock import uptime_s, wall_s
 from drslamd.slam.calibration import sensor_calibration
 
@@ -40,7 +41,7 @@ class StateStore:
     def load(self) -> dict[str, Any]:
         """What was kept, or nothing when there is none or it is not ours to read."""
         try:
-            state = json.loads(_read_bounded(self.path))
+            state = json.loads(read_plain(self.path, MAX_STATE_BYTES))
         except FileNotFoundError:
             return {}
         except RecursionError:
@@ -105,26 +106,6 @@ class StateStore:
 def cannot_write(path: Path, reason: str) -> str:
     """What is said of a state that cannot be kept."""
     return f"cannot write {path}: {reason}"
-
-
-def _read_bounded(path: Path) -> str:
-    """The text of a file.
-
-    Raises:
-        OSError: it cannot be read.
-        ValueError: it is too large, no plain file or not text.
-    """
-
-    def at_once(name: str, flags: int) -> int:
-        return os.open(name, flags | os.O_NONBLOCK)  # a pipe would wait for its other end
-
-    with open(path, "rb", opener=at_once) as file:
-        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-            raise ValueError("it is no plain file")
-        data = file.read(MAX_STATE_BYTES + 1)
-    if len(data) > MAX_STATE_BYTES:
-        raise ValueError(f"it has more than {MAX_STATE_BYTES} bytes")
-    return data.decode()
 
 
 def is_sound(state: Mapping[str, Any]) -> bool:

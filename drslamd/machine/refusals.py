@@ -14,7 +14,7 @@ from drslamd.io.liblcm import require_lcm
 from drslamd.io.state_store import read_key
 from drslamd.machine.finding import Finding, Severity
 from drslamd.machine.folders import socket_path, socket_to_ask, state_dir
-from drslamd.parts import dbc_text
+from drslamd.parts import dbc_text, taped_calibration
 
 SECOND_DAEMON = "second daemon"
 """The check of which the findings end with an exit code of their own."""
@@ -96,5 +96,6 @@ LOOKS: dict[str, Callable[[Config], object]] = {
     "lcm": _transport,
     "python-can": _can,
     "dbc": _dbc,
+    "calibration": taped_calibration,
 }
 """In the order in which one fault follows from another; each raises ConfigError."""

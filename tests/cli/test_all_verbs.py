@@ -31,7 +31,7 @@ def test_wrong_usage_ends_with_64_and_says_what_is_wrong(
     assert "drslamd" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("verb", ["run", "status", "trajectory"])
+@pytest.mark.parametrize("verb", ["run", "status", "trajectory", "calibrate"])
 def test_a_bad_configuration_ends_with_78_and_one_sentence_per_fault(
     verb: str, config: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

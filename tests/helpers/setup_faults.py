@@ -216,6 +216,36 @@ def _dbc() -> list[Fault]:
     ]
 
 
+def calibrated(content: str | None, mode: int = 0o644) -> Make:
+    """A calibration that the configuration names."""
+
+    def make(setup: Setup, _: pytest.MonkeyPatch) -> None:
+        setup.change(("id = 3", 'id = 3\ncalibration = "3.cal"'))
+        if content is not None:
+            (setup.folder / "3.cal").write_text(content)
+            (setup.folder / "3.cal").chmod(mode)
+
+    return make
+
+
+def _calibration() -> list[Fault]:
+    def pipe(setup: Setup, patch: pytest.MonkeyPatch) -> None:
+        calibrated(None)(setup, patch)
+        os.mkfifo(setup.folder / "3.cal")
+
+    own = "robot.id = 3\n"
+    other_track = f"{own}wheels.track_m = 0.25\npush = {{scale = 0.1, sigma = 0.01}}\n"
+    measure = "drslamd calibrate"
+    return [
+        Fault("no calibration", calibrated(None), "3.cal': No such file", measure),
+        Fault("calibration a pipe", pipe, "no plain file", measure),
+        Fault("another's calibration", calibrated("robot.id = 4\n"), "it is of robot 4", measure),
+        Fault("other wheels", calibrated(other_track), "it was measured with wheels.", measure),
+        Fault("no calibration's text", calibrated("hello"), "not valid TOML", "measure anew"),
+        Fault("calibration closed", calibrated(own, 0), "Permission denied", "ch", as_nobody=True),
+    ]
+
+
 def faults_that_are_refused() -> list[Fault]:
     """Those with which `run` does not start."""
 
@@ -226,4 +256,4 @@ def faults_that_are_refused() -> list[Fault]:
         patch.delenv("RUNTIME_DIRECTORY", raising=False)
 
     no_home_fault = Fault("no home", no_home, "HOME is not set", "daemon.state_dir")
-    return [*_configuration(), *_team_key(), *_packages(), *_dbc(), no_home_fault]
+    return [*_configuration(), *_team_key(), *_packages(), *_dbc(), *_calibration(), no_home_fault]

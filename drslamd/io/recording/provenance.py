@@ -14,9 +14,12 @@ import scipy
 from drslamd import __version__
 from drslamd.config import Config
 from drslamd.io.clock import Clock
+from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
 
 
-def provenance(config: Config, dbc_text: str, key: bytes) -> dict[str, Any]:
+def provenance(
+    config: Config, dbc_text: str, key: bytes, taped: SensorCalibration = UNLEARNED
+) -> dict[str, Any]:
     """Everything that a replay needs, and what a reader of the recording asks first.
 
     The team key is not in it: who has a recording must not be able to forge messages.
@@ -31,6 +34,7 @@ def provenance(config: Config, dbc_text: str, key: bytes) -> dict[str, Any]:
         "system": platform.release(),
         "configuration": config.model_dump(mode="json", exclude_none=True),
         "dbc": dbc_text,
+        "taped": taped.state(),
         "key": fingerprint(key),
     }
 

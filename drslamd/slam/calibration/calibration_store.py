@@ -21,6 +21,7 @@ from drslamd.slam.calibration.sensor_calibration import (
     SensorCalibration,
     is_value,
 )
+from drslamd.slam.calibration.taped import with_tape
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
 
 NEWS_BIAS_M = 0.05
@@ -41,14 +42,18 @@ class CalibrationStore:
         latest: what the next start should know.
     """
 
-    def __init__(self, kept: SensorCalibration, is_used: bool) -> None:
+    def __init__(
+        self, kept: SensorCalibration, is_used: bool, taped: SensorCalibration = UNLEARNED
+    ) -> None:
         """
         Args:
-            kept: of the start before this one.
+            kept: of the start before this one; is_used: may it be?
+            taped: measured by a person, and always used.
         """
-        self.used = kept if is_used else UNLEARNED
-        self.latest = kept
-        self._kept, self._saved = kept, kept
+        known = with_tape(kept, taped)
+        self.used = known if is_used else taped
+        self.latest = known
+        self._kept, self._saved = known, known
 
     def update(self, estimate: TeamEstimate | None, own: int, owned: Collection[int]) -> None:
         """Module 3 has spoken.

@@ -13,17 +13,21 @@ from daemon_scenes import Stepped, configured
 from drslamd import __version__
 from drslamd.config import Config
 from drslamd.io.recording.provenance import clocks, fingerprint, provenance
+from drslamd.slam.calibration.sensor_calibration import SensorCalibration
+from drslamd.slam.graph.estimate import Learned
 
 KEY = bytes(range(32))
 
 
 def test_it_names_versions_host_and_the_whole_configuration(tmp_path: Path) -> None:
     config = configured(tmp_path)
-    said = json.loads(json.dumps(provenance(config, "BO_ 1", KEY)))
+    taped = SensorCalibration(scale=Learned(0.02, 0.006))
+    said = json.loads(json.dumps(provenance(config, "BO_ 1", KEY, taped)))
     assert said["drslamd"] == __version__
     assert (said["numpy"], said["scipy"]) == (np.__version__, scipy.__version__)
     assert Config.model_validate_json(json.dumps(said["configuration"])) == config
     assert said["dbc"] == "BO_ 1"
+    assert SensorCalibration.of_state(said["taped"]) == taped
     assert said["host"]
 
 

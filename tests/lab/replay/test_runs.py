@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import lcm
 import pytest
 from lab.recordings.recording import BadRecording
-from lab.replay.runs import is_recording, key_of, read_runs
+from lab.replay.runs import is_recording, key_of, make_robot, read_runs
 
 from drslamd.config import parse
 from drslamd.events import SerialData
@@ -163,3 +164,22 @@ def test_a_configuration_of_another_version_is_one_sentence(tmp_path: Path) -> N
     run.opening.provenance["configuration"]["robot"]["colour"] = "red"
     with pytest.raises(BadRecording, match="its configuration"):
         run.config()
+
+
+@pytest.mark.parametrize(
+    ("state", "scale"),
+    [({"scale": [0.02, 0.006]}, 0.02), ({"scale": [9.0, 0.006]}, 0.0), ("no table", 0.0)],
+)
+def test_a_robot_is_made_with_what_a_tape_said_then(
+    tmp_path: Path, state: object, scale: float
+) -> None:
+    write(tmp_path)
+    (run,) = read_runs([tmp_path])
+    named = run.config().robot.model_copy(update={"calibration": "3.calibration.toml"})
+    config = run.config().model_copy(update={"robot": named})
+    origin = {**run.opening.provenance, "taped": state}
+    run.opening = replace(run.opening, provenance=origin)
+    robot = make_robot(config, run, team_key(None))
+    assert robot.calibration.used.scale.value == scale
+    # a configuration that names no file asks what would have been without it
+    assert make_robot(run.config(), run, team_key(None)).calibration.used.scale.value == 0.0

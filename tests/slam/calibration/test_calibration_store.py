@@ -64,6 +64,28 @@ def test_nothing_is_taken_out_where_it_is_not_wanted_but_it_is_still_learned(
     assert after(memory, bias=Learned(0.1, 0.02)).bias == {2: Learned(0.1, 0.02)}
 
 
+TAPED = SensorCalibration(scale=Learned(0.3, 0.006), turn=Learned(-0.3, 0.01))
+
+
+@pytest.mark.parametrize(("section", "yaw"), [(None, -0.002), (OFF, 0.0), (PAPER, 0.0)])
+def test_what_was_taped_is_taken_out_even_where_nothing_that_was_learned_is(
+    section: RelativePoseSection | None, yaw: float
+) -> None:
+    is_used = section is None or closure_method(section).uses_calibration
+    memory = CalibrationStore(KEPT, is_used, TAPED)
+    assert (memory.used.scale, memory.used.turn) == (TAPED.scale, TAPED.turn)
+    assert memory.used.yaw.value == yaw
+
+
+def test_what_is_left_of_a_taped_scale_is_learned_beside_it() -> None:
+    memory = CalibrationStore(SensorCalibration(), True, TAPED)
+    assert not memory.is_news()
+    latest = after(memory, scale=Learned(0.02, 0.004))
+    assert 1 - latest.scale.value == pytest.approx(0.7 * 0.98)
+    # it agrees with the tape and is sharper, so the next start begins with it
+    assert CalibrationStore(latest, True, TAPED).used.scale == latest.scale
+
+
 def test_a_start_that_learns_less_keeps_what_there_was() -> None:
     kept = math.hypot(0.03, CHANGED_BIAS_M)
     less, more = (Learned(0.1, factor * kept) for factor in (1.01, 0.99))

@@ -134,12 +134,13 @@ class Simulator:
         epochs: dict[int, int] | None = None,
         kept: SensorCalibration = UNLEARNED,
         dbc_text: str = "",
+        taped: SensorCalibration = UNLEARNED,
     ) -> Member:
         """Switch a robot on, now."""
 
         def renew(fresh: int) -> Robot:
             key, known = team_key(secret), dict(epochs or {})
-            return Robot(config, key, fresh, known, kept, dbc_text, self._tuning)
+            return Robot(config, key, fresh, known, kept, dbc_text, self._tuning, taped)
 
         member = Member(renew(epoch), renew, clock or Clock(), hardware, Traces())
         self.members[config.robot.id] = member

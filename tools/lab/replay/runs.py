@@ -18,7 +18,7 @@ from drslamd.recording.event_log import Damage, Entry, entries
 from drslamd.recording.records import Beginning, Opening, Record, Told
 from drslamd.robot import Robot
 from drslamd.slam.calibration import sensor_calibration
-from drslamd.slam.calibration.sensor_calibration import SensorCalibration
+from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
 from lab.recordings.recording import BadRecording
 
 
@@ -144,15 +144,27 @@ def is_recording(path: Path) -> bool:
 def make_robot(config: Config, run: Run, key: bytes, beginning: Beginning | None = None) -> Robot:
     """The robot that began then, or when the run began."""
     began = beginning or run.opening.beginning
-    kept = began.calibration if sensor_calibration.is_sound(began.calibration) else {}
     return Robot(
         config,
         key,
         began.epoch,
         dict(began.epochs),
-        SensorCalibration.of_state(kept),
+        calibration_of(began.calibration),
         run.opening.provenance.get("dbc", ""),
+        taped=taped_of(run, config),
     )
+
+
+def taped_of(run: Run, config: Config) -> SensorCalibration:
+    """What a tape said when the run was recorded, if this configuration still names a file."""
+    return calibration_of(run.opening.provenance.get("taped") if config.robot.calibration else {})
+
+
+def calibration_of(state: object) -> SensorCalibration:
+    """As it was recorded; nothing where that is damaged."""
+    if not isinstance(state, dict) or not sensor_calibration.is_sound(state):
+        return UNLEARNED
+    return SensorCalibration.of_state(state)
 
 
 def key_of(run: Run, key_file: str | None) -> bytes:

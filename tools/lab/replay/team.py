@@ -33,11 +33,9 @@ from drslamd.events import (
 )
 from drslamd.gossip import lc02
 from drslamd.recording.records import Marked, Record
-from drslamd.slam.calibration import sensor_calibration
-from drslamd.slam.calibration.sensor_calibration import SensorCalibration
 from lab.play.simulator import Clock, Network, Simulator
 from lab.replay import mail
-from lab.replay.runs import Run, key_of
+from lab.replay.runs import Run, calibration_of, key_of, taped_of
 
 FED = (SerialData, CanFrame, PortState, NetworkState)
 """Events that come from outside the team."""
@@ -188,15 +186,15 @@ class _Playing:
         if earlier is not None:
             self._simulator.kill(earlier)
         began = self._run.opening.beginning
-        state = began.calibration if sensor_calibration.is_sound(began.calibration) else {}
         self._member = self._simulator.add(
             self._config,
             self._clock,
             secret=None if self._config.team.insecure else self._key,
             epoch=began.epoch,
             epochs=dict(began.epochs),
-            kept=SensorCalibration.of_state(state),
+            kept=calibration_of(began.calibration),
             dbc_text=self._run.opening.provenance.get("dbc", ""),
+            taped=taped_of(self._run, self._config),
         )
         self._records = self._run.records()
         self._next()

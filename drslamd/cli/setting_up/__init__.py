@@ -1,0 +1,1 @@
+"""The verbs ``init`` and ``calibrate``, made of questions, choices, steps and files."""

@@ -1,0 +1,1 @@
+"""Serial ports before anybody knows what is plugged into them."""
