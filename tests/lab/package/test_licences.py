@@ -22,9 +22,12 @@ def libraries(tmp_path: Path) -> Path:
         folder = tmp_path / f"{name}.dist-info"
         (folder / "licenses").mkdir(parents=True)
         (folder / "METADATA").write_text(about)
+        (folder / "RECORD").write_text(f"{name}.dist-info/METADATA,,\n")
         if text:
             (folder / "licenses" / "LICENSE.txt").write_text(text)
     (tmp_path / "license.py").write_text("code")
+    (tmp_path / "some_lib").mkdir()
+    (tmp_path / "some_lib" / "LICENSE.md").write_text("of what it took over")
     return tmp_path
 
 
@@ -33,6 +36,7 @@ def test_each_library_is_named_with_its_licence(libraries: Path) -> None:
     assert text.startswith("drslamd\n\nMIT License\n")
     assert "some-lib 1.0, pypi.org\nLicence: MIT\n\nbe free" in text
     assert "old 3, pypi.org\nLicence: BSD License\n" in text
+    assert "some_lib/LICENSE.md\n\nof what it took over" in text
     assert "ours again" not in text
 
 

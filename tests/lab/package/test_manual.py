@@ -87,6 +87,12 @@ def test_what_is_special_to_the_formatter_is_read_as_it_was_written() -> None:
     assert "hidden" not in shown(pages["fly.1"]).partition("OPTIONS")[2]
 
 
+def test_a_paragraph_without_a_heading_is_one_of_the_section_before() -> None:
+    parser = Parser(prog="fly", epilog="files:\n  a.log\n\nNever written twice: once a day.")
+    text = shown(manual.pages(parser, "1", EPOCH)["fly.1"])
+    assert re.search(r"^FILES\n +a\.log\n\n +Never written twice: once a day\.$", text, re.M)
+
+
 def test_the_page_of_the_configuration_is_the_example() -> None:
     example = (REPOSITORY / "etc" / "drslamd.toml").read_text()
     text = shown(manual.configuration_page(example, "1", EPOCH))

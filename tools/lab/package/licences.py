@@ -24,6 +24,8 @@ def take_out(target: Path) -> str:
         if one.metadata["Name"] != "drslamd":
             parts.append(_of(one, target))
     for path in _texts(target):
+        if not any(folder.name.endswith(".dist-info") for folder in path.parents):
+            parts.append(f"{'=' * 78}\n{path.relative_to(target)}\n\n{_read(path)}")
         path.unlink()
     return "\n".join(parts)
 
@@ -37,10 +39,13 @@ def _of(one: Distribution, target: Path) -> str:
     named = licence or "; ".join(c.rpartition(" :: ")[2] for c in classified) or "see below"
     place = home.rpartition(", ")[2]
     head = f"{'=' * 78}\n{about['Name']} {one.version}, {place}\nLicence: {named}\n"
-    folder = target / f"{about['Name'].replace('-', '_')}-{one.version}.dist-info"
-    own = [path for path in _texts(target) if folder in path.parents]
-    texts = [path.read_text(errors="replace") for path in own]
-    return "\n".join([head, *(textwrap.dedent(text) for text in texts)])
+    folders = [target / str(path.parts[0]) for path in one.files or () if path.name == "METADATA"]
+    texts = [path for path in _texts(target) if any(f in path.parents for f in folders)]
+    return "\n".join([head, *(_read(path) for path in texts)])
+
+
+def _read(path: Path) -> str:
+    return textwrap.dedent(path.read_text(errors="replace"))
 
 
 def _texts(target: Path) -> list[Path]:

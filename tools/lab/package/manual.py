@@ -100,12 +100,13 @@ def _help(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
 def _ending(epilog: str) -> Iterator[str]:
     """Each paragraph with a heading becomes a section: ``examples:``, ``exit codes: ...``."""
     for paragraph in re.split(r"\n\s*\n", epilog.strip("\n")):
-        heading, _, rest = paragraph.partition(":")
-        if not rest.strip():
+        headed = re.match(r"([a-z][a-z ]+): *", paragraph)
+        if headed is None:
+            yield from [".PP", *_plain(paragraph.splitlines())]
             continue
-        title = heading.strip().upper().replace("EXIT CODES", "EXIT STATUS")
+        title = headed[1].upper().replace("EXIT CODES", "EXIT STATUS")
         yield f".SH {_escaped(title)}"
-        lines = rest.strip("\n").splitlines()
+        lines = paragraph[headed.end() :].strip("\n").splitlines()
         yield from _verbatim(lines) if lines[0].startswith("  ") else _plain(lines)
 
 
