@@ -28,7 +28,7 @@ GLIBC_MINOR = 36
 """Of Debian 12; wheels for it and everything older run there."""
 MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
 """What Debian and what wheels call a processor."""
-EXTRAS = ("can", "view")
+EXTRAS = ("can", "view", "export")
 """What a robot may want, of what the project file offers."""
 
 UNUSED_FOLDERS = ("tests", "__pycache__", "include")

@@ -87,7 +87,8 @@ def _headline(action: argparse.Action) -> str:
     values = ""
     if action.nargs != 0:
         chosen = "{" + ",".join(map(str, action.choices or ())) + "}" if action.choices else ""
-        word = action.metavar or chosen or action.dest
+        unnamed = action.dest.upper() if action.option_strings else action.dest
+        word = action.metavar or chosen or unnamed
         values = rf"\fI{_escaped(word if isinstance(word, str) else ' '.join(word))}\fR"
     names = ", ".join(rf"\fB{_escaped(option)}\fR" for option in action.option_strings)
     return " ".join(part for part in (names, values) if part)
