@@ -19,7 +19,7 @@ def add(verbs: Verbs) -> None:
         "make a team key, mode 0600",
         "  drslamd keygen /etc/drslamd/team.key       once; copy it to every robot",
     )
-    keygen.add_argument("file", metavar="FILE")
+    keygen.add_argument("file", metavar="FILE", help="where; nothing may be there yet")
 
 
 def _keygen(options: argparse.Namespace) -> int:

@@ -1,10 +1,11 @@
 #!/bin/bash
-# systemd as PID 1 on an overlay of this machine, in namespaces of its own: nothing outside changes.
+# systemd as PID 1 on an overlay, in namespaces of its own: nothing outside changes.
 #
-# usage: box.sh SHARE REPOSITORY PYTHON_PREFIX SITE_PACKAGES
+# usage: box.sh SHARE REPOSITORY PYTHON_PREFIX SITE_PACKAGES [TREE]
+# The overlay is of this machine, with a program that runs the repository, or of TREE as it is.
 # Runs SHARE/inside.sh as root in there and ends; SHARE is the only folder that both sides see.
 set -eu
-share=$1 repository=$2 python=$3 site=$4
+share=$1 repository=$2 python=$3 site=$4 tree=${5:-/}
 
 if [ "${BOX:-}" = "" ]; then
     # a control group below ours, so that systemd's groups vanish with the box
@@ -24,20 +25,22 @@ scratch=$share/scratch root=$share/scratch/root
 mkdir -p "$scratch"
 mount -t tmpfs box "$scratch"
 mkdir -p "$scratch/upper" "$scratch/work" "$root"
-mount -t overlay box -o "lowerdir=/,upperdir=$scratch/upper,workdir=$scratch/work" "$root"
+mount -t overlay box -o "lowerdir=$tree,upperdir=$scratch/upper,workdir=$scratch/work" "$root"
 
 # the service sees no home and no /tmp, where a Python under test may live
 for folder in share repository python site; do
     mkdir -p "$root/box/$folder"
     mount --bind "${!folder}" "$root/box/$folder"
 done
-mkdir -p "$root/opt/drslamd/bin"
-cat >"$root/opt/drslamd/bin/drslamd" <<'PROGRAM'
+if [ "$tree" = / ]; then
+    mkdir -p "$root/opt/drslamd/bin"
+    cat >"$root/opt/drslamd/bin/drslamd" <<'PROGRAM'
 #!/bin/sh
 PYTHONPATH=/box/repository:/box/site PYTHONDONTWRITEBYTECODE=1 exec /box/python/bin/python3 -m drslamd "$@"
 PROGRAM
-chmod 755 "$root/opt/drslamd/bin/drslamd"
-ln -s /opt/drslamd/bin/drslamd "$root/usr/local/bin/drslamd"
+    chmod 755 "$root/opt/drslamd/bin/drslamd"
+    ln -s /opt/drslamd/bin/drslamd "$root/usr/local/bin/drslamd"
+fi
 
 cat >"$root/etc/systemd/system/box.target" <<'UNIT'
 [Unit]
@@ -61,7 +64,7 @@ mount -t sysfs sysfs "$root/sys" -o ro # writable, it would promise an udev that
 mount -t cgroup2 cgroup2 "$root/sys/fs/cgroup"
 mount -t tmpfs run "$root/run" -o mode=755
 mount -t tmpfs dev "$root/dev" -o mode=755
-mkdir "$root/dev/pts" "$root/dev/shm" "$root/dev/net"
+mkdir -p "$root/dev/pts" "$root/dev/shm" "$root/dev/net"
 mount -t devpts devpts "$root/dev/pts" -o newinstance,ptmxmode=0666,gid=5
 mount -t tmpfs shm "$root/dev/shm"
 ln -s pts/ptmx "$root/dev/ptmx"

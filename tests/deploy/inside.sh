@@ -24,16 +24,14 @@ restarts() { systemctl show -P NRestarts "drslamd@$1"; }
 
 ip address add 10.9.8.7/24 dev lo
 
-# as the read-me says, but for its first line: the environment is there
-grep -E '^    sudo (install|systemctl)' systemd/README.md >$out/install
+# as the read-me says, but for the environment, which is there
 source $out/install >$out/install.log 2>&1
 systemctl is-active drslamd@3 >$out/active
 ls -la /run/drslamd /var/lib/drslamd >$out/folders
+stat -c '%n %a %U:%G' /etc/drslamd /etc/drslamd/* >$out/configuration
 
-# a second robot, and a third with a key as the read-me says
+# a second robot, and a third with the key
 robot 4 ''
-grep -E '^    sudo (drslamd keygen|chown)' systemd/README.md >$out/key
-source $out/key >>$out/install.log 2>&1
 robot 5 's/^insecure = true//; s/^#key_file/key_file/'
 systemctl start drslamd@4 drslamd@5 2>>$out/install.log
 systemctl is-active drslamd@4 drslamd@5 >$out/others

@@ -16,7 +16,7 @@ import sysconfig
 from pathlib import Path
 
 import pytest
-from deploy_helpers import REPOSITORY
+from deploy_helpers import REPOSITORY, lines_on_a_robot
 
 pytestmark = pytest.mark.slow
 
@@ -33,6 +33,8 @@ def traces(tmp_path_factory: pytest.TempPathFactory) -> Path:
         pytest.skip("no systemd or no unshare here")
     share = tmp_path_factory.mktemp("box")
     shutil.copy(HERE / "inside.sh", share)
+    packaged, cloned = lines_on_a_robot()
+    (share / "install").write_text("\n".join(cloned[3:] + packaged[2:]))
     done = subprocess.run(
         [HERE / "box.sh", share, REPOSITORY, sys.base_prefix, sysconfig.get_path("purelib")],
         capture_output=True,
@@ -51,7 +53,6 @@ def read(path: Path) -> str:
 
 
 def test_it_runs_after_the_steps_of_the_read_me(traces: Path) -> None:
-    assert len(read(traces / "install").splitlines()) == 4
     assert read(traces / "active") == "active", read(traces / "install.log")
     assert read(traces / "others").split() == ["active", "active"]
     assert "not localised" in read(traces / "systemctl_status")
@@ -61,6 +62,15 @@ def test_its_files_belong_to_its_user_and_no_one_else(traces: Path) -> None:
     text = read(traces / "folders")
     assert re.search(r"srw-rw---- .* drslamd drslamd .* drslamd-3\.sock", text)
     assert re.search(r"-rw------- .* drslamd drslamd .* robot-3\.json", text)
+
+
+def test_the_read_me_gives_the_key_to_the_service_alone(traces: Path) -> None:
+    lines = read(traces / "configuration").splitlines()
+    assert lines == [
+        "/etc/drslamd 750 root:drslamd",
+        "/etc/drslamd/3.toml 644 root:root",
+        "/etc/drslamd/team.key 600 drslamd:drslamd",
+    ]
 
 
 def test_status_finds_the_service_from_an_ordinary_shell(traces: Path) -> None:

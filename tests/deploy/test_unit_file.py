@@ -10,7 +10,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import pytest
-from deploy_helpers import EXAMPLE, LONGEST_STOP_S, REPOSITORY
+from deploy_helpers import EXAMPLE, LONGEST_STOP_S, REPOSITORY, lines_on_a_robot
 
 from drslamd.cli import exit_codes
 from drslamd.config import parse
@@ -18,6 +18,7 @@ from drslamd.machine import folders
 
 UNIT = REPOSITORY / "systemd" / "drslamd@.service"
 SYSUSERS = REPOSITORY / "systemd" / "drslamd.sysusers"
+RULES = REPOSITORY / "etc" / "udev" / "60-drslamd.rules"
 INSTALLED = "/opt/drslamd/bin/drslamd"
 MAX_EXPOSURE_TENTHS = 20
 
@@ -110,10 +111,16 @@ def test_the_serial_drivers_of_the_udev_rules_are_allowed_and_loaded_before() ->
         assert loaded == ["usbserial", "cdc_acm", "ch343"]
 
 
-def test_the_read_me_explains_every_exit_code_and_installs_every_file() -> None:
+def test_the_read_me_explains_every_exit_code() -> None:
     text = (UNIT.parent / "README.md").read_text()
     for code in (exit_codes.OK, exit_codes.USAGE, exit_codes.BAD_CONFIG, exit_codes.BUG):
         assert re.search(rf"^\| (\d+, )*{code} \|", text, re.MULTILINE), code
-    for path in (UNIT, SYSUSERS, EXAMPLE):
-        assert str(path.relative_to(REPOSITORY)) in text
     assert INSTALLED in text
+
+
+def test_the_lines_for_a_clone_install_every_file_and_the_program_that_the_unit_starts() -> None:
+    text = "\n".join(lines_on_a_robot()[1])
+    for path in (UNIT, SYSUSERS, EXAMPLE, RULES):
+        assert f" {path.relative_to(REPOSITORY)} " in text
+    assert f"ln -s {INSTALLED} " in text
+    assert f"{Path(INSTALLED).parent}/pip install" in text

@@ -20,6 +20,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+import pages
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 EXAMPLE = REPOSITORY / "etc" / "drslamd.toml"
 UWB = "/dev/serial/by-id/usb-1a86_USB_Single_Serial_LINKTRACK-if00"
@@ -31,6 +33,14 @@ LONGEST_STOP_S = 2.0
 NO_CAPABILITIES = ["setpriv", "--bounding-set", "-all", "--inh-caps", "-all"]
 ORDINARY = os.getuid() != 0 or shutil.which("setpriv") is not None
 """Whether file modes mean anything to the processes that are started here."""
+
+
+def lines_on_a_robot() -> tuple[list[str], list[str]]:
+    """What the first page has one type: with the package, and what stands in for it in a clone."""
+    page = pages.read("README.md", (REPOSITORY / "README.md").read_text())
+    (packaged,) = (block for block in page.blocks if "apt install ./drslamd" in block)
+    (cloned,) = (block for block in page.blocks if "-m venv /opt/drslamd" in block)
+    return packaged.splitlines(), cloned.splitlines()
 
 
 def local(text: str, folder: Path) -> str:
