@@ -65,7 +65,7 @@ drslamd status -c /etc/drslamd/3.toml --json >$out/status.json 2>$out/status.log
 systemctl status drslamd@3 --no-pager >$out/systemctl_status
 systemctl stop drslamd@4
 systemctl show -P Result drslamd@4 >$out/stop_result
-ls /run/drslamd >$out/sockets_after_stop
+(cd /run/drslamd && ls -- *.sock) >$out/sockets_after_stop
 for n in 6 7; do
     echo "$(systemctl is-active drslamd@$n) $(systemctl show -P ExecMainStatus drslamd@$n)" \
         "$(restarts $n)" >$out/refused$n

@@ -190,9 +190,9 @@ def test_the_service_runs_after_the_lines_of_the_first_page(traces: Path) -> Non
     assert read(traces / "status.log") == ""
 
 
-def test_the_program_runs_and_the_configuration_is_right(traces: Path) -> None:
+def test_the_program_runs_and_finds_that_the_service_will_start(traces: Path) -> None:
     assert read(traces / "version") == f"drslamd {__version__}"
-    assert "id = 3" in read(traces / "check")
+    assert "\nverdict: run starts" in read(traces / "install.log")
 
 
 def test_files_belong_to_whom_the_pages_say(traces: Path) -> None:
