@@ -116,9 +116,8 @@ class PairTracker:
         self.verdicts: Counter[str] = Counter()
         self.last_verdict = ""
         self.history: deque[WindowAnswer] = deque(maxlen=HISTORY)
-        self.closures_seen = 0
+        self.closures_seen, self.connected = 0, False
         self.kept: tuple[ClosureMeasurement, ...] = ()
-        self.connected = False
         self.search = MountingSearch()
         self._checked: Checked | None = None
         self._is_busy = False
@@ -166,10 +165,12 @@ class PairTracker:
         Args:
             way_m: how far the robot drove that drove less.
         """
+        before = self.search.found
         if self.search.on_costs(costs, len(request.window), way_m > MOVED_M):
-            # what was found with odometry as believed until now is worth nothing
-            self._withdrawn += [replace(m, kept=False) for m in self._told.values()]
-            self._told.clear()
+            if before is None or self.search.found is None:
+                # what was told with another mounting is worth nothing
+                self._withdrawn += [replace(m, kept=False) for m in self._told.values()]
+                self._told.clear()
             self._pending.clear()
             self._checked, self.connected, self.kept = None, False, ()
             self._is_obsolete = self._is_busy

@@ -292,3 +292,18 @@ def test_while_a_check_runs_a_correction_waits(monkeypatch: pytest.MonkeyPatch) 
     assert other is None
     pair.tracker.on_check(run())
     assert pair.kept() == [0]
+
+
+def test_a_mistake_that_is_a_little_more_or_less_takes_nothing_back() -> None:
+    """What was found nearly right still says where the peer is, and the pair stays in the graph."""
+    pair = OwnedPair(TWO)
+    search(pair, Case(b=TRACKS[0]))
+    pair.see(BESIDE, 2)
+    assert pair.told() == [(0, True), (1, True)]
+    finer = pair.tracker.search.cases
+    # (windows of these scenes are empty: they have fewer than no degrees of freedom)
+    costs = np.array([-10.0 if each == finer[1] else 1e4 for each in finer])
+    for n in range(FEWEST_ASKED):
+        pair.tracker.on_costs(asked_at(100 + 10 * n), costs, 10.0)
+    assert pair.tracker.search.found == finer[1]
+    assert pair.told() == []
