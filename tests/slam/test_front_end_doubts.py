@@ -156,6 +156,8 @@ def test_who_is_not_ranged_or_of_unknown_clock_or_not_in_our_graph_is_not_watche
 def test_who_may_move_though_its_wheels_stand_makes_keyframes() -> None:
     scene = FrontScene()
     scene.drive(5)
+    # where it began, and where it is
+    assert scene.front.make_keyframe() is not None
     assert scene.front.make_keyframe() is not None
     scene.front.on_motion(Motion(scene.utime + GRID_US, 0.0, 0.0))
     assert scene.front.make_keyframe() is None
