@@ -42,6 +42,7 @@ def export(socket: Path, to: Path, answers: dict[str, Any], *formats: str) -> in
         return cli.main(["export", "-c", str(config), "--to", str(to), "--format", *formats])
 
 
+@pytest.mark.slow
 def test_all_formats_at_once_print_each_file_once(
     socket: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

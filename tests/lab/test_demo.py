@@ -151,6 +151,7 @@ def test_a_recording_that_cannot_be_used_ends_with_66_before_anything_starts(
     assert not played.recordings
 
 
+@pytest.mark.slow
 def test_the_seed_the_robots_and_the_time_are_those_that_were_asked_for(
     played: Played, tmp_path: Path
 ) -> None:

@@ -81,6 +81,7 @@ def test_what_is_published_is_finite_and_says_in_whose_frame_it_is(clean: Virtua
             assert pose.covariance[0] > 0
 
 
+@pytest.mark.slow
 def test_the_same_seed_sends_the_same_bytes() -> None:
     def sent() -> list[list[tuple[int, str, bytes]]]:
         team = VirtualTeam(network=Network(loss=0.2))
@@ -93,7 +94,7 @@ def test_the_same_seed_sends_the_same_bytes() -> None:
 @pytest.mark.parametrize(
     "network",
     [
-        pytest.param(Network(loss=0.3), id="30 percent lost"),
+        pytest.param(Network(loss=0.3), id="30 percent lost", marks=pytest.mark.slow),
         pytest.param(Network(duplicate=0.5), id="half of it twice", marks=pytest.mark.slow),
         pytest.param(
             Network(delay_us=0, jitter_us=300_000),
@@ -112,6 +113,7 @@ def test_a_bad_radio_delays_the_answer_and_does_not_change_it(
     assert team.errors()["ate_rmse_m"] < clean.errors()["ate_rmse_m"] + 0.03
 
 
+@pytest.mark.slow
 def test_a_robot_that_restarts_joins_again_and_the_others_keep_their_map() -> None:
     team = VirtualTeam()
     team.run(25.0)

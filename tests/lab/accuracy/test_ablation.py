@@ -51,6 +51,7 @@ def with_everything() -> str:
     return said(played(ALL))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in PIECES if name != "gnc"])
 def test_without_a_piece_the_team_comes_to_another_answer(name: str) -> None:
     without = played(PIECES[name])

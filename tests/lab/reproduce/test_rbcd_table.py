@@ -91,6 +91,7 @@ def test_the_quick_table_is_reached_on_a_recording_and_on_a_certified_graph() ->
         assert made.is_reached, made.cells
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not (DATA / "posegraphs").exists(), reason="no pose graphs")
 def test_a_certified_graph_comes_to_its_optimum() -> None:
     graph = graphs.load("team3_400", folder=DATA / "posegraphs")

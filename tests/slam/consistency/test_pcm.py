@@ -54,7 +54,7 @@ def test_a_loop_without_errors_has_no_length() -> None:
     assert pair.kept() == list(range(10))
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_distances_are_those_of_the_loop_composed_step_by_step(seed: int) -> None:
     """The loop of equation 2 on matrices; its covariance by drawing every link of it."""
     drive = Drive(seed)
