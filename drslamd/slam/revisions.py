@@ -17,6 +17,7 @@ import numpy as np
 from drslamd.conventions import GRID_HZ, Segment
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate
+from drslamd.slam.odometry.track import RESOLUTION
 from drslamd.slam.se2 import Array
 
 REMEMBERED = 20 * GRID_HZ
@@ -75,4 +76,6 @@ def squared_move(claimed: Array, covariance: Array, later: Array) -> float:
     """Squared distance of two poses (3,) in units of a covariance (3, 3), per degree of freedom."""
     apart = later - claimed
     apart[2] = se2.wrap(apart[2])
-    return float(apart @ np.linalg.solve(covariance, apart)) / 3
+    # who stands where the frame begins is certain, but no pose is finer than a step of odometry
+    known = covariance + RESOLUTION**2 * np.eye(3)
+    return float(apart @ np.linalg.solve(known, apart)) / 3

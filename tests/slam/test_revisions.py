@@ -60,6 +60,14 @@ def test_a_robot_without_a_place_claims_nothing() -> None:
     assert revisions.boldness == 1.0
 
 
+def test_who_stands_where_the_frame_begins_is_certain_and_not_the_end_of_the_daemon() -> None:
+    parked = TeamEstimate(FRAME, solution([0]).trajectories, joint=np.zeros((3, 3)))
+    assert boldness(parked, parked) == 1.0
+    # odometry has steps of 0.1 mm, so less than that is no move
+    assert boldness(parked, solution([0], 1e-4)) == 1.0
+    assert boldness(parked, solution([0], 1e-2)) > 1.0
+
+
 def test_angles_are_compared_around_the_circle() -> None:
     covariance = np.diag([1.0, 1.0, 0.01])
     found = squared_move(
