@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from importlib.metadata import Distribution
+from importlib.metadata import Distribution, PackageMetadata
 from pathlib import Path
 
 from lab.package.environment import ROOT, installed
@@ -33,8 +33,8 @@ def take_out(target: Path) -> str:
 def _of(one: Distribution, target: Path) -> str:
     """Name, place, licence, and the texts that came with it."""
     about = one.metadata
-    home = about["Home-page"] or next(iter(about.get_all("Project-URL") or ()), "pypi.org")
-    licence = about["License-Expression"] or (about["License"] or "").split("\n")[0]
+    home = _first(about, "Home-page") or _first(about, "Project-URL") or "pypi.org"
+    licence = _first(about, "License-Expression") or _first(about, "License").split("\n")[0]
     classified = [c for c in about.get_all("Classifier") or () if c.startswith("License ::")]
     named = licence or "; ".join(c.rpartition(" :: ")[2] for c in classified) or "see below"
     place = home.rpartition(", ")[2]
@@ -42,6 +42,11 @@ def _of(one: Distribution, target: Path) -> str:
     folders = [target / str(path.parts[0]) for path in one.files or () if path.name == "METADATA"]
     texts = [path for path in _texts(target) if any(f in path.parents for f in folders)]
     return "\n".join([head, *(_read(path) for path in texts)])
+
+
+def _first(about: PackageMetadata, field: str) -> str:
+    """An absent field is empty: since Python 3.12 asking for one by brackets is a warning."""
+    return next(iter(about.get_all(field) or ()), "")
 
 
 def _read(path: Path) -> str:
