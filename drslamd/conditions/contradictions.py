@@ -6,6 +6,7 @@ with what may be the cause, and so are robots to which ranges do not fit.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from drslamd.slam.doubt import Doubt, Reason
@@ -59,6 +60,13 @@ def _of_one(robot: int, repair: Repair) -> str:
         return (
             f"the odometry of robot {robot} should be about {repair.way:.1f} times as long; set "
             "wheels.counts_per_metre (or the radius of its wheels); it is learned meanwhile"
+        )
+    if repair.fault is Fault.CURVE:
+        side, other = ("left", "right") if repair.bend < 0 else ("right", "left")
+        return (
+            f"the odometry of robot {robot} turns {side} by about "
+            f"{abs(math.degrees(repair.bend)):.0f} degrees a metre that it does not drive: its "
+            f"{other} wheel is smaller than the {side} one, or counts too much; look at both"
         )
     return f"the wheels of robot {robot} {CHECK[repair.fault]}"
 

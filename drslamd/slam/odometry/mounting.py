@@ -4,7 +4,7 @@ A counter says how far each side went. A side that counts backwards, sides that 
 track and a wrong number of counts per metre each change way d and turn t of a step as one matrix,
 with h half of the track:
 
-    d' = way d + cross h t        t' = turn t + cross d / h
+    d' = way d + cross h t        t' = turn t + cross d / h + bend |d|
 
 Wheels that both run backwards and sides that are swapped give the same path, mirrored, once from
 the front and once from the back of the robot. Ranges do not tell which.
@@ -12,6 +12,7 @@ the front and once from the back of the robot. Ranges do not tell which.
 
 from __future__ import annotations
 
+import math
 from enum import Enum
 from typing import NamedTuple
 
@@ -30,6 +31,7 @@ class Fault(Enum):
     RIGHT_REVERSED = "right reversed"
     TRACK = "track"
     SCALE = "scale"
+    CURVE = "curve"
 
 
 LEARNED = (Fault.TRACK, Fault.SCALE)
@@ -47,6 +49,7 @@ class Repair(NamedTuple):
     way: float = 1.0
     turn: float = 1.0
     cross: float = 0.0
+    bend: float = 0.0
 
     def path(self, poses: Array, half_track_m: float) -> Array:
         """(k, 3) of a 10 Hz track o_T_i, as they should have been, from the first of them on.
@@ -60,7 +63,7 @@ class Repair(NamedTuple):
         way = along[:, 0] / _chord(turn)
         cross = self.cross * np.array([half_track_m, 1 / half_track_m if self.cross else 0.0])
         d = self.way * way + cross[0] * turn
-        t = self.turn * turn + cross[1] * way
+        t = self.turn * turn + cross[1] * way + self.bend * np.abs(way)
         chord = np.stack([d * _chord(t), self.way * along[:, 1]], axis=-1)
         heading = poses[0, 2] + np.append(0.0, np.cumsum(t))
         moved = np.cumsum(se2.rotate(heading[:-1] + t / 2, chord), axis=0)
@@ -96,3 +99,7 @@ SCALES = tuple(Repair(Fault.SCALE, k, k) for k in (0.5, 0.58, 0.67, 0.8, 1.25, 1
 """See `TRACKS`; all counts are wrong by the same factor, those of turns too."""
 COARSE_SCALES = SCALES[::2]
 """Of a whole team that was configured from one file."""
+LEAST_BEND = math.radians(4.0)
+"""rad/m. A wheel a tenth larger than the other, 0.3 m beside it, makes five times as much."""
+CURVES = tuple(Repair(Fault.CURVE, bend=k * LEAST_BEND) for k in (-4, -2, -1, 1, 2, 4))
+"""One wheel is larger than the other. Backwards they turn the same way, as module 3 has it."""

@@ -51,11 +51,13 @@ the same robot must be worse. Of eighteen robots that count wrongly all begin ne
 24 to 72 s; of fifteen healthy pairs none begins elsewhere than configured, and of six whose sight
 is blocked half of the time one does."""
 FITS = 0.7
-"""Chi-squared per degree of freedom of windows that a track or a scale really explains: it is 0.2
-to 0.6, because noise is allowed for generously. Where sight is blocked it is more, whatever is
-tried."""
+"""Chi-squared per degree of freedom of windows that a track, a scale or a curve really explains: it
+is 0.2 to 0.6, because noise is allowed for generously. Where sight is blocked it is more, whatever
+is tried."""
 INDIFFERENT = -5.0
-"""Who drives straight for long is the same in a mirror: then what is configured is believed."""
+"""Who drives straight for long is the same in a mirror: then what is configured is believed. So is
+it against wheels of unlike size: healthy pairs are confirmed as soon as without, of six with bent
+ways none is."""
 
 _SAID = (Verdict.UNIQUE, Verdict.AMBIGUOUS, Verdict.POOR_FIT)
 
@@ -180,7 +182,9 @@ def is_as_configured(chi2: Array, is_mirror_told: bool) -> bool:
         chi2: (cases,) of up to three windows.
     """
     worse = chi2 - chi2[0]
-    return bool(worse.min() >= 0 and _backwards(worse, is_mirror_told) >= EXCLUDED)
+    # (short ways hardly tell a slight curve from none)
+    least = [INDIFFERENT if is_curve(case) else 0.0 for case in CASES]
+    return bool((worse >= least).all() and _backwards(worse, is_mirror_told) >= EXCLUDED)
 
 
 def _backwards(worse: Array, is_mirror_told: bool) -> float:
@@ -188,7 +192,7 @@ def _backwards(worse: Array, is_mirror_told: bool) -> float:
     return min(
         float(by)
         for by, case in zip(worse, CASES, strict=True)
-        if not is_learned(case) and (is_mirror_told or case != MIRROR)
+        if not (is_learned(case) or is_curve(case)) and (is_mirror_told or case != MIRROR)
     )
 
 
@@ -206,7 +210,9 @@ def winner(chi2: Array, freedom: float) -> tuple[Case | None, bool]:
     case = CASES[best]
     others = min(by for by, other in zip(worse, CASES, strict=True) if other.kind != case.kind)
     if not is_learned(case):
-        return (case, True) if worse[0] >= WRONG and others >= CLEAR else (None, False)
+        # sight that is blocked looks like a curve, and hardly like wheels that run backwards
+        fits = level <= FITS or not is_curve(case)
+        return (case, True) if fits and worse[0] >= WRONG and others >= CLEAR else (None, False)
     unlike = min(by for by, other in zip(worse, CASES, strict=True) if not _is_like(other, case))
     is_start = level <= FITS and worse[0] >= BETTER and unlike >= UNLIKE
     return (case, bool(others >= UNLIKE)) if is_start else (None, False)
@@ -215,6 +221,11 @@ def winner(chi2: Array, freedom: float) -> tuple[Case | None, bool]:
 def is_learned(case: Case) -> bool:
     """Are these mistakes that module 3 learns?"""
     return all(repair.fault in (Fault.NONE, *LEARNED) for repair in case)
+
+
+def is_curve(case: Case) -> bool:
+    """Is a wheel of one of the robots larger than the other?"""
+    return Fault.CURVE in (case.a.fault, case.b.fault)
 
 
 def _is_like(one: Case, other: Case) -> bool:

@@ -17,7 +17,9 @@ from drslamd.slam import se2
 from drslamd.slam.odometry.mounting import (
     AS_CONFIGURED,
     COARSE_SCALES,
+    CURVES,
     LEARNED,
+    LEAST_BEND,
     MIRRORED,
     SCALES,
     SIDES,
@@ -49,8 +51,8 @@ MIRROR = Case(b=MIRRORED)
 CASES = (
     Case(),
     MIRROR,
-    *(Case(a=repair) for repair in (*SIDES, *TRACKS, *SCALES)),
-    *(Case(b=repair) for repair in (*SIDES, *TRACKS, *SCALES)),
+    *(Case(a=repair) for repair in (*SIDES, *TRACKS, *SCALES, *CURVES)),
+    *(Case(b=repair) for repair in (*SIDES, *TRACKS, *SCALES, *CURVES)),
     # a team that was configured from one file is wrong in the same way
     *(Case(repair, repair) for repair in COARSE_SCALES),
 )
@@ -60,6 +62,9 @@ NEAR_FACTORS = (0.67, 0.8, 1.25, 1.5)
 
 
 def _is_outpost(case: Case) -> bool:
+    bends = [abs(repair.bend) for repair in case if repair.bend]
+    if bends:
+        return max(bends) == LEAST_BEND
     factors = [repair.turn for repair in case if repair.fault in LEARNED]
     return not factors or (len(factors) == 1 and factors[0] in NEAR_FACTORS)
 

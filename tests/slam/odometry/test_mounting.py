@@ -11,6 +11,7 @@ from slam_scenes import Array, inverted, product, same_pose, wander
 from drslamd.slam.odometry import mounting
 from drslamd.slam.odometry.mounting import (
     AS_CONFIGURED,
+    CURVES,
     LEARNED,
     MIRRORED,
     SCALES,
@@ -111,6 +112,15 @@ def test_headings_count_on() -> None:
     assert abs(turned) > 20
 
 
+@pytest.mark.parametrize("bend", [repair.bend for repair in CURVES])
+def test_a_curve_is_turning_by_the_way_forwards_and_backwards_alike(bend: float) -> None:
+    """What a counter of way and turn would have said, step by step."""
+    way = (LEFT + RIGHT) / 2
+    turned = bend * np.abs(way) * HALF_M
+    path = Repair(Fault.CURVE, bend=bend).path(TRUE, 0.0)
+    assert is_same(path, driven(LEFT - turned, RIGHT + turned))
+
+
 def test_no_half_track_is_needed_but_for_sides() -> None:
     for repair in (MIRRORED, *TRACKS, *SCALES):
         assert repair.cross == 0
@@ -120,5 +130,5 @@ def test_no_half_track_is_needed_but_for_sides() -> None:
 
 def test_what_is_learned_are_tracks_and_scales() -> None:
     assert set(LEARNED) == {TRACKS[0].fault, SCALES[0].fault}
-    known = {AS_CONFIGURED.fault, MIRRORED.fault, *(r.fault for r in (*SIDES, *TRACKS, *SCALES))}
-    assert known == set(mounting.Fault)
+    repairs = (AS_CONFIGURED, MIRRORED, *SIDES, *TRACKS, *SCALES, *CURVES)
+    assert {repair.fault for repair in repairs} == set(mounting.Fault)

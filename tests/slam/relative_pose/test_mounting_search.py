@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from slam_scenes import Array
 
-from drslamd.slam.odometry.mounting import COARSE_SCALES, MIRRORED, SCALES, SIDES, TRACKS
+from drslamd.slam.odometry.mounting import COARSE_SCALES, CURVES, MIRRORED, SCALES, SIDES, TRACKS
 from drslamd.slam.relative_pose.estimate import Verdict
 from drslamd.slam.relative_pose.mounting_search import (
     APART_US,
@@ -28,6 +28,7 @@ from drslamd.slam.relative_pose.mounting_search import (
     WRONG,
     MountingSearch,
     is_as_configured,
+    is_curve,
     is_learned,
     winner,
 )
@@ -132,12 +133,26 @@ def test_a_track_or_a_scale_must_fit_well_itself(level: float, is_begun: bool) -
     assert found == (SCALE if is_begun else None)
 
 
+@pytest.mark.parametrize(("level", "is_named"), [(FITS - 0.01, True), (FITS + 0.01, False)])
+def test_a_curve_must_fit_well_itself_to_be_named(level: float, is_named: bool) -> None:
+    case, is_clear = winner(costs({Case(b=CURVES[0]): level * FREEDOM}), FREEDOM)
+    assert (case == Case(b=CURVES[0]), is_clear) == (is_named, is_named)
+
+
+@pytest.mark.parametrize(("by", "confirms"), [(INDIFFERENT + 1, True), (INDIFFERENT - 1, False)])
+def test_a_pair_is_not_confirmed_where_a_curve_is_better_by_more_than_chance(
+    by: float, confirms: bool
+) -> None:
+    chi2 = costs({AS_IT_IS: FIT, Case(a=CURVES[2]): FIT + by})
+    assert is_as_configured(chi2, True) is confirms
+
+
 def test_what_is_configured_wins_nothing() -> None:
     assert winner(costs({AS_IT_IS: 10.0}), FREEDOM) == (None, False)
 
 
 def test_what_is_learned_are_tracks_and_scales_and_no_mistake_at_all() -> None:
-    learned = [case for case in CASES if is_learned(case)]
+    learned = [case for case in CASES if is_learned(case) or is_curve(case)]
     backwards = {MIRROR, *(Case(a=side) for side in SIDES), *(Case(b=side) for side in SIDES)}
     assert set(CASES) - set(learned) == backwards
     assert AS_IT_IS in learned

@@ -16,6 +16,7 @@ from drslamd.slam.graph.measurements import Keyframe
 from drslamd.slam.odometry.mounting import (
     AS_CONFIGURED,
     COARSE_SCALES,
+    CURVES,
     MIRRORED,
     SCALES,
     SIDES,
@@ -74,6 +75,9 @@ def counted(repair: Repair, left: Array, right: Array) -> Array:
         left, right = (-left, right) if repair.cross > 0 else (left, -right)
     elif repair.turn < 0:
         left, right = right, left
+    elif repair.bend:
+        turned = repair.bend * np.abs(left + right) / 2 * HALF_M
+        left, right = left + turned, right - turned
     else:
         left, right = left / repair.way, right / repair.way
     track = repair.turn / repair.way if repair.turn > 0 and not repair.cross else 1.0
@@ -146,6 +150,8 @@ def best(pair: Pair, cases: tuple[Case, ...]) -> tuple[Case, Array]:
         Case(b=TRACKS[-1]),
         Case(b=SCALES[0]),
         Case(SCALES[-1], SCALES[-1]),
+        Case(a=CURVES[0]),
+        Case(b=CURVES[-1]),
     ],
     ids=lambda case: "-".join(case.kind),
 )
@@ -259,7 +265,7 @@ def test_a_question_is_of_the_tracks_as_they_were_asked() -> None:
 def test_cases_begin_with_the_configuration_and_its_mirror_image_and_name_each_only_once() -> None:
     assert CASES[:2] == (Case(), MIRROR)
     assert len(set(CASES)) == len(CASES)
-    each = (*SIDES, *TRACKS, *SCALES)
+    each = (*SIDES, *TRACKS, *SCALES, *CURVES)
     for repair in each:
         assert Case(a=repair) in CASES
         assert Case(b=repair) in CASES
@@ -275,6 +281,8 @@ def test_the_cases_that_are_asked_first_lie_around_the_configuration() -> None:
         assert Case(b=repair) in outposts
     scales = {case.b.way for case in outposts if case.b.fault is Fault.SCALE}
     assert scales == {0.67, 0.8, 1.25, 1.5}
+    bends = {case.b.bend for case in outposts if case.b.fault is Fault.CURVE}
+    assert bends == {-math.radians(4), math.radians(4)}
     assert not any(AS_CONFIGURED not in case for case in outposts)
 
 
