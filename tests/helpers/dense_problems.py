@@ -107,16 +107,16 @@ def student_roots(own: Array, spread: float, dof: float) -> Array:
 
 
 def gaussian_residuals(problem: Problem, x: Array) -> list[float]:
-    """Of yaw rates, near-range bias and gauge."""
+    """Of near-range bias and gauge."""
     poses, c = unpacked(problem, x)
     moved = poses[problem.gauge] - problem.initial[problem.gauge]
     priors = problem.priors
-    parts = [c.yaw / priors.yaw, c.near_bias / priors.near_bias, moved / GAUGE_SIGMA]
+    parts = [c.near_bias / priors.near_bias, moved / GAUGE_SIGMA]
     return [float(v) for v in np.concatenate(parts)]
 
 
 def heavy_residuals(problem: Problem, x: Array) -> list[float]:
-    """Of biases and scales, whose priors have heavy tails."""
+    """Of biases, scales and yaw rates, whose priors have heavy tails."""
     _, c = unpacked(problem, x)
     prior, team = problem.priors.bias, float(c.team_bias[0])
     own = c.bias - team
@@ -124,6 +124,10 @@ def heavy_residuals(problem: Problem, x: Array) -> list[float]:
     out += [cauchy_root(team / prior.team, 1.0), team / prior.sigma]
     for value, sigma in zip(c.scale, problem.priors.scale, strict=True):
         out.append(cauchy_root(value * problem.priors.scale_tails / sigma, 1.0))
+    out += [
+        cauchy_root(value / sigma, 1.0)
+        for value, sigma in zip(c.yaw, problem.priors.yaw, strict=True)
+    ]
     return [float(v) for v in out]
 
 
@@ -174,7 +178,8 @@ def curvature_of(f: Callable[[Array], float], x: Array, h: float = 3e-5) -> Arra
 
 
 def heavy_curvature(problem: Problem, x: Array) -> Array:
-    """Of the priors of biases and scales, over all unknowns."""
+    """Of the priors of biases, scales and yaw rates, over all unknowns; where the cost of a yaw
+    rate bends by less than a tenth of the square that pulls as it does, by that."""
     first = 3 * len(problem.initial)
     sensors = np.arange(first, first + problem.pairs + 2 * len(problem.priors.scale) + 2)
 
@@ -186,6 +191,8 @@ def heavy_curvature(problem: Problem, x: Array) -> Array:
 
     out = np.zeros((len(x), len(x)))
     out[np.ix_(sensors, sensors)] = curvature_of(cost, x[sensors])
+    yaws = yaw_places(problem)
+    out[yaws, yaws] = np.maximum(out[yaws, yaws], 0.1 * yaw_weights(problem, x))
     return out
 
 
@@ -225,12 +232,14 @@ def range_weights(problem: Problem, x: Array, threshold: Array) -> Array:
 
 def claimed_information(problem: Problem, x: Array, threshold: Array, claims: Array) -> Array:
     """Ranges so many times less certain, and every prior as wide as configured; but those of
-    mountings are as they are believed."""
+    mountings are as they are believed, and a yaw rate is as uncertain as it is far off."""
     weights = range_weights(problem, x, threshold) / claims[problem.ranges.pair] ** 2
     information = information_of(problem, x, weights) + mounting_curvature(problem, x)
     biases, scales = bias_places(problem), scale_places(problem)
     information[biases, biases] += problem.priors.bias.sigma**-2
     information[scales, scales] += problem.priors.scale**-2.0
+    yaws = yaw_places(problem)
+    information[yaws, yaws] += yaw_weights(problem, x)
     return information
 
 
@@ -254,6 +263,15 @@ def bias_places(problem: Problem) -> Array:
 def scale_places(problem: Problem) -> Array:
     first = 3 * len(problem.initial) + problem.pairs
     return np.arange(first, first + len(problem.priors.scale))
+
+
+def yaw_places(problem: Problem) -> Array:
+    return scale_places(problem) + len(problem.priors.scale)
+
+
+def yaw_weights(problem: Problem, x: Array) -> Array:
+    """Of the square that pulls a yaw rate as Cauchy's cost does."""
+    return np.asarray(1 / (problem.priors.yaw**2 + x[yaw_places(problem)] ** 2))
 
 
 def link_misfit(problem: Problem, x: Array, threshold: Array) -> tuple[Array, Array]:

@@ -5,7 +5,8 @@ driving do. Module 3 carries the bias of each pair, the near-range bias of the t
 each robot's odometry as unknowns. Here a window is rid of what is known of them, and its noise says
 what is still unknown:
 
-    r' = r - bias - near_bias exp(-r / L)     p' = (1 - scale) p     theta' = (1 + turn) theta
+    r' = r - bias - near_bias exp(-r / L)     p' = (1 - scale) p
+    theta' = (1 + turn) theta - yaw |p|
     sigma'^2 = sigma_measured^2 + least^2
 
 Module 3's sigmas are those of all that it knows, its priors included. Nothing falls below what no
@@ -14,6 +15,7 @@ constant can describe, nor rises above what was believed before.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -30,6 +32,8 @@ from drslamd.slam.relative_pose.what_if import Case
 from drslamd.slam.relative_pose.window import Window
 from drslamd.slam.se2 import Array
 
+ODD_YAW = math.radians(0.6)
+"""rad/m. Wheels of unlike size; what is usual is noise of a long way."""
 LEAST_SCALE = 0.01
 """Floors and loads change wheels by so much."""
 
@@ -38,13 +42,15 @@ class EndCalibration(NamedTuple):
     """What is known of the sensors of one robot of a pair.
 
     Attributes:
-        scale: of its odometry, a fraction; turn: by which fraction turns are longer.
+        scale: of its odometry, a fraction; turn: by which fraction turns are longer; yaw: which
+            turn is not there, rad/m.
         antenna: (2,) of its antenna beside its place, m.
     """
 
     scale: Learned = Learned()
     turn: float = 0.0
     antenna: tuple[float, float] = (0.0, 0.0)
+    yaw: float = 0.0
 
     @staticmethod
     def of(estimate: TeamEstimate, robot: int) -> EndCalibration:
@@ -53,6 +59,7 @@ class EndCalibration(NamedTuple):
             estimate.scale.get(robot, Learned()),
             estimate.turn.get(robot, Learned()).value,
             (x.value, y.value),
+            estimate.yaw.get(robot, Learned()).value,
         )
 
     @staticmethod
@@ -65,7 +72,8 @@ class EndCalibration(NamedTuple):
     @property
     def correction(self) -> Correction:
         """Of a long way, where wheels are not as configured; a usual scale is noise."""
-        return Correction(scale=self.scale.value, turn=self.turn) if self.turn else Correction()
+        is_odd = self.turn or abs(self.yaw) > ODD_YAW
+        return Correction(self.scale.value, self.yaw, self.turn) if is_odd else Correction()
 
     def path(self, poses: Array, before: int) -> Array:
         """(n, 3) poses of a window, seen from its reference time, as they should have been.
@@ -74,7 +82,7 @@ class EndCalibration(NamedTuple):
             before: how many of them lie before the reference time.
         """
         whole = np.insert(poses, before, np.zeros(3), axis=0)
-        better = Correction(scale=self.scale.value, turn=self.turn).path(whole)
+        better = Correction(self.scale.value, self.yaw, self.turn).path(whole)
         return np.delete(se2.between(better[before], better), before, axis=0)
 
 

@@ -37,8 +37,8 @@ HISTORY = 2_000
 TELL_EVERY = 100
 """Grid samples between closures that are sent when the graph's edges are the ranges."""
 UNCORRECTED = (Correction(), Correction())
-ANOTHER_WAY = 0.03
-"""Of scale or turn: corrections that differ by more lead to ways that do not agree."""
+ANOTHER_WAY, OVER_A_WAY = 0.03, np.array(Correction(scale=1.0, yaw=10.0, turn=1.0))
+"""Corrections that differ by more lead to ways that do not agree; yaw rates act over ten metres."""
 SHRINK = 1e-4
 """Of correlations, before rounding: far above a rounding of 6e-8, far below what anyone knows."""
 
@@ -328,7 +328,7 @@ class PairTracker:
 
 
 def _differ(one: tuple[Correction, Correction], other: tuple[Correction, Correction]) -> bool:
-    apart = np.array(one) - np.array(other)
+    apart = (np.array(one) - np.array(other)) * OVER_A_WAY
     return bool(np.abs(apart).max() > ANOTHER_WAY)
 
 

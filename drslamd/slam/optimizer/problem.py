@@ -180,7 +180,8 @@ class Priors:
         scale: (robots,) sigmas as configured, a fraction.
         scale_tails: the cost of a scale is Cauchy's, log(1 + (s / width)^2), with a width so many
             times narrower than that.
-        yaw: (robots,) sigmas, rad/m.
+        yaw: (robots,) sigmas as configured, rad/m; the cost is Cauchy's with that half width, for
+            a worn or flat tyre bends a way by many times as much.
         near_bias: m, for the whole team: its modules are of one kind, and the near-range bias
             follows the power that is received.
     """
@@ -204,17 +205,28 @@ class Priors:
         """(robots,) half the second derivative, kept positive."""
         return cauchy_curvature(self.scale_width, scale, least)
 
+    def yaw_pull(self, yaw: Array) -> Array:
+        """(robots,) half the derivative of the cost by yaw rates."""
+        return np.asarray(yaw / (self.yaw**2 + yaw**2))
+
+    def yaw_curvature(self, yaw: Array, least: float = LEAST_CURVATURE) -> Array:
+        """(robots,) half the second derivative of the cost by yaw rates, kept positive."""
+        return cauchy_curvature(self.yaw, yaw, least)
+
+    def yaw_claim(self, yaw: Array) -> Array:
+        """(robots,) what may be claimed to be known of them: who is far off may be so elsewhere."""
+        return np.asarray(1 / (self.yaw**2 + yaw**2))
+
     def cost(self, calibration: Calibration) -> float:
         """Of all that is learned of the sensors."""
         team = float(calibration.team_bias[0])
         scale = calibration.scale / self.scale_width
-        gaussian = np.concatenate(
-            [calibration.yaw / self.yaw, calibration.near_bias / self.near_bias]
-        )
+        yaw = calibration.yaw / self.yaw
+        near_bias = calibration.near_bias / self.near_bias
         return (
             self.bias.cost(calibration.bias - team, team)
-            + float(np.log1p(scale**2).sum())
-            + float(gaussian @ gaussian)
+            + float(np.log1p(scale**2).sum() + np.log1p(yaw**2).sum())
+            + float(near_bias @ near_bias)
             + TRACK.cost(calibration.turn[:, None])
             + ANTENNA.cost(calibration.antenna)
         )

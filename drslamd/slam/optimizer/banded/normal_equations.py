@@ -206,6 +206,7 @@ class Equations:
         system.add_prior(layout.bias, priors.bias.sigma**-2)
         system.add_prior(layout.team_bias, priors.bias.sigma**-2)
         system.add_prior(layout.scale, priors.scale**-2.0)
+        system.add_prior(layout.yaw, priors.yaw_claim(point.calibration.yaw))
         self._add_mounting_priors(system, point.calibration, LEAST_CURVATURE)
         return system
 
@@ -249,6 +250,7 @@ class Equations:
         layout, priors = self.layout, self.problem.priors
         self._add_bias_prior(system, calibration, least)
         system.add_prior(layout.scale, priors.scale_curvature(calibration.scale, least))
+        system.add_prior(layout.yaw, priors.yaw_curvature(calibration.yaw, least))
         self._add_mounting_priors(system, calibration, least)
 
     def _add_bias_prior(self, system: System, calibration: Calibration, least: float) -> None:
@@ -268,7 +270,6 @@ class Equations:
 
     def _add_gaussian_priors(self, system: System) -> None:
         layout, priors = self.layout, self.problem.priors
-        system.add_prior(layout.yaw, priors.yaw**-2.0)
         system.add_prior(layout.near_bias, priors.near_bias**-2.0)
         system.add_prior(layout.poses[self.problem.gauge], GAUGE_SIGMA**-2)
 
@@ -287,7 +288,7 @@ class Equations:
         )
         gradient[layout.turn[doubted.track]] += turn[doubted.track]
         gradient[layout.antenna[doubted.antenna]] += antenna[doubted.antenna]
-        gradient[layout.yaw] += calibration.yaw / priors.yaw**2
+        gradient[layout.yaw] += priors.yaw_pull(calibration.yaw)
         gradient[layout.near_bias] += calibration.near_bias / priors.near_bias**2
         moved = point.poses[gauge] - problem.initial[gauge]
         gradient[layout.poses[gauge]] += moved / GAUGE_SIGMA**2

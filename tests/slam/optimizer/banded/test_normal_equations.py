@@ -151,6 +151,8 @@ def test_by_weights_the_matrix_is_nowhere_less_than_what_the_cost_can_bend() -> 
     expected[common, common] += 1 / (prior.team**2 + team**2) + prior.sigma**-2
     scales = first + 3 + np.arange(3)
     expected[scales, scales] += 1 / (0.03**2 + calibration.scale**2)
+    yaws = scales + 3
+    expected[yaws, yaws] += 1 / (0.01**2 + calibration.yaw**2)
     equations = Equations(problem)
     system, _ = equations.at(point_at(problem, poses, calibration, THRESHOLD), WEIGHT)
     assert close(dense(system, equations.layout), expected, 1e-5)
