@@ -5,7 +5,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable
 
+from drslamd.conventions import GRID_US, SECOND_US
 from drslamd.robot import Robot
+from lab.play.simulator import Member
+
+ON_THE_AIR_US = 5 * SECOND_US
+"""What was said since may not have come everywhere, at whatever moment one looks."""
 
 
 def held(robot: Robot) -> dict[int, tuple[int, frozenset[int]]]:
@@ -29,3 +34,20 @@ def compared(robots: Iterable[Robot]) -> tuple[int, list[tuple[int, int]]]:
             if whole_digest(one) != whole_digest(other):
                 unequal.append((one.own.robot, other.own.robot))
     return same, unequal
+
+
+def is_everywhere(members: list[Member], now_us: int) -> bool:
+    """Has each of these robots the same keyframes of all of them, but for the last seconds?"""
+    for owner in members:
+        chain = owner.robot.own
+        last = owner.clock.local(now_us - ON_THE_AIR_US) // GRID_US
+        told = set()
+        for member in members:
+            data = member.robot.back.graph.chains.get(chain.robot)
+            if data is None or data.chain != chain:
+                return False
+            n = data.keyframes.n
+            told.add(n[n <= last].tobytes())
+        if len(told) > 1:
+            return False
+    return True

@@ -58,8 +58,12 @@ def _one_way(stage: Stage, dose: float) -> None:
     stage.during(radio.one_way([(a, b)] if dose == 1 else [(a, b), (b, a)]))
 
 
-def _stranger(stage: Stage, per_s: float) -> None:
-    """Random bytes, damaged messages, and messages under another key."""
+def stranger(stage: Stage, per_s: float, until_s: float | None = None) -> None:
+    """Random bytes, damaged messages, and messages under another key.
+
+    Args:
+        until_s: when it falls silent, by default when the faults end.
+    """
 
     def speak(bench: Bench) -> None:
         for member in [m for m in bench.members.values() if m.running]:
@@ -73,7 +77,7 @@ def _stranger(stage: Stage, per_s: float) -> None:
                 data = seen[-1][:-9] + bench.rng.bytes(9)
             bench.arrive(member, data, STRANGER)
 
-    _often(stage, per_s, speak)
+    _often(stage, per_s, speak, until_s)
 
 
 def _replay(stage: Stage, per_s: float) -> None:
@@ -88,8 +92,11 @@ def _replay(stage: Stage, per_s: float) -> None:
     _often(stage, per_s, speak)
 
 
-def _often(stage: Stage, per_s: float, act: Callable[[Bench], None]) -> None:
-    for t_s in np.arange(stage.begin_s, stage.end_s, 1 / per_s).tolist():
+def _often(
+    stage: Stage, per_s: float, act: Callable[[Bench], None], until_s: float | None = None
+) -> None:
+    end_s = stage.end_s if until_s is None else until_s
+    for t_s in np.arange(stage.begin_s, end_s, 1 / per_s).tolist():
         stage.at(t_s, act)
 
 
@@ -342,7 +349,7 @@ FAULTS: dict[str, Fault] = {
         (0.05, 0.5),
         lambda s, dose: s.during(s.radio.corrupting(dose)),
     ),
-    "stranger": Fault(("N7", "S1"), "a stranger says {:.0f} things a second", (2, 20), _stranger),
+    "stranger": Fault(("N7", "S1"), "a stranger says {:.0f} things a second", (2, 20), stranger),
     "replay": Fault(("S3",), "{:.0f} replays a second", (2, 20), _replay),
     "oversize": Fault(("N9",), "datagrams of {:.0f} bytes", (1_401, 9_000), _oversize),
     "blocked": Fault(("M3",), "a pair's ranges up to {:.1f} m too long", (0.3, 3.0), _blocked),

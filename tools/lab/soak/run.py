@@ -185,13 +185,10 @@ def _peak(sent: list[int], stage: Stage) -> float:
 def is_well(bench: Bench) -> bool:
     """Has everybody the same graph and a pose of now, in one frame?"""
     members = [member for member in bench.members.values() if member.running]
-    robots = [member.robot for member in members]
-    estimates = [robot.back.estimate for robot in robots]
+    estimates = [member.robot.back.estimate for member in members]
     frames = {estimate.frame for estimate in estimates if estimate is not None}
-    if len(frames) != 1 or None in estimates or len(robots) < len(bench.hardware):
+    if len(frames) != 1 or None in estimates or len(members) < len(bench.hardware):
         return False
     states = {member.robot.whereabouts(member.clock.local(bench.now)).state for member in members}
-    return (
-        not states & {PoseState.NOT_LOCALISED, PoseState.STALE}
-        and len({agreement.whole_digest(robot) for robot in robots}) == 1
-    )
+    is_placed = not states & {PoseState.NOT_LOCALISED, PoseState.STALE}
+    return is_placed and agreement.is_everywhere(members, bench.now)
