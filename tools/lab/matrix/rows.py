@@ -43,20 +43,20 @@ ROWS: dict[str, Row] = {
         "named in 1 s, read again in 3 s, no descriptor leaks",
     ),
     "D6": Row(
-        "a port that is missing, busy or forbidden",
-        "named with a remedy, tried again at most every 5 s",
+        "a device that gets another number",
+        "found again by its lasting name",
     ),
     "D7": Row(
-        "the wrong baud rate or device",
-        "named within 5 s",
+        "the wrong baud rate",
+        "named with rate and port within 5 s, no sample",
     ),
     "D8": Row(
-        "a CAN bus that is off, silent or full of errors",
-        "named; read again by itself",
+        "a port that is busy, forbidden or missing",
+        "one sentence, read again 5 s after it is put right",
     ),
     "D9": Row(
-        "a computer too busy to read on time",
-        "stamps stay within 20 ms, what is dropped is counted",
+        "a CAN bus that is silent, off or flooded",
+        "stale in half a second, the loop lags less than 20 ms",
     ),
     "D10": Row(
         "counters and times that overflow",

@@ -27,7 +27,7 @@ PAGE = Path(__file__).with_name("results.md")
 
 EXAMPLES = """\
 examples:
-  tools/soak                              every scenario, 1,000 mixtures, a day; goes on where it was
+  tools/soak                              all scenarios, 1,000 mixtures, a day; goes on where it was
   tools/soak parted outliers-0.3 --seeds 5
   tools/soak mixed --seed 17              one mixture, and nothing is written down
   tools/soak mixed --seed 17 --until 61.3   only so far
@@ -118,7 +118,7 @@ def _day(hours: float, path: Path) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="tools/soak",
-        description="Play faults to a team in virtual time; are all promises kept after each event?",
+        description="Play faults to a team in virtual time: are all promises kept, always?",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -1,8 +1,9 @@
 """A day of a team: every half hour a robot loses its power, three in ten datagrams are lost.
 
 What makes a day fit into two hours of a core are means of the scenario, none of the product: robots
-drive for two of every ten minutes and stand for the rest, as robots with work to do; wheels speak at
-10 Hz, a pair is ranged at 2 Hz by one of its modules, and the three modules run every ten seconds.
+drive for two of every ten minutes and stand for the rest, as robots with work to do; wheels speak
+at 10 Hz, a pair is ranged at 2 Hz by one of its modules, and the three modules run every ten
+seconds.
 """
 
 from __future__ import annotations
