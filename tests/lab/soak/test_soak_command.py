@@ -66,7 +66,13 @@ def test_the_page_says_how_many_runs_failed_and_what_every_hour_was_like() -> No
     ran = {"scenario": "parted", "seed": 1, "commit": "abc", "fault": "", "figures": {}}
     figures = {"healed_s": 9.0, "liars": 0}
     rows = [{**ran, "figures": figures}, {**ran, "fault": "P4", "figures": figures}]
-    hour = {"hour": 1, "took_s": 9.5, "rss_mb": 80.0, "descriptors": 4, "solve_ms": 2.0}
+    hour: dict[str, object] = {
+        "hour": 1,
+        "took_s": 9.5,
+        "rss_mb": 80.0,
+        "descriptors": 4,
+        "solve_ms": 2.0,
+    }
     hour |= {"pair_rms_m": 0.1, "entries": 7, "commit": "abc"}
     page = "\n".join(results.page(json.loads(json.dumps([*rows, hour]))))
     assert "| parted | one robot cut off | 2 | 1 | 9 | 0 |" in page

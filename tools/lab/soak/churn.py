@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from drslamd.conventions import grid_utime
+from drslamd.conventions import SECOND_US, grid_utime
 from lab.play.playback import Chunk, Hardware
 from lab.recordings import world
 from lab.recordings.recording import Array, Recording
@@ -30,6 +30,7 @@ ROBOTS = 5
 BLOCK_S, DRIVEN_S = 600, 120
 RESTART_S = 1_800
 """Between two restarts; the robots take turns."""
+OFF_US = 2 * SECOND_US
 LOSS, STRANGE_PER_S = 0.3, 0.1
 """Of the radio, and what a stranger says (1 % of what is on the air)."""
 LOOK_S = 10
@@ -171,7 +172,11 @@ def hours(seed: int, count: float, progress: Callable[[float], None]) -> Iterato
 
 def _restart(bench: Bench, robot: int) -> None:
     bench.kill(bench.members[robot])
-    bench.at(bench.now + 2_000_000, lambda: bench.switch_on(robot) and None)
+
+    def begin() -> None:
+        bench.switch_on(robot)
+
+    bench.at(bench.now + OFF_US, begin)
 
 
 class _Measured:

@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drslamd.gossip import lc02
+from lab.play.playback import Wiring
 from lab.play.simulator import Clock
 from lab.recordings.recording import Array
 from lab.score import metrics
 from lab.soak import radio
-from lab.soak.stage import STRANGER, Bench, Stage
+from lab.soak.stage import STRANGER, Act, Bench, Stage
 from lab.trust import mountings, sensor_faults
 
 Put = Callable[[Stage, float], None]
@@ -92,9 +93,7 @@ def _replay(stage: Stage, per_s: float) -> None:
     _often(stage, per_s, speak)
 
 
-def _often(
-    stage: Stage, per_s: float, act: Callable[[Bench], None], until_s: float | None = None
-) -> None:
+def _often(stage: Stage, per_s: float, act: Act, until_s: float | None = None) -> None:
     end_s = stage.end_s if until_s is None else until_s
     for t_s in np.arange(stage.begin_s, end_s, 1 / per_s).tolist():
         stage.at(t_s, act)
@@ -224,7 +223,7 @@ def _counter_reset(stage: Stage, _: float) -> None:
     _wire(stage, wiring)
 
 
-def _wire(stage: Stage, wiring: mountings.Wiring) -> None:
+def _wire(stage: Stage, wiring: Wiring) -> None:
     stage.wirings.setdefault(stage.one(), []).append(wiring)
 
 
@@ -255,7 +254,7 @@ def _disk(fault: str) -> Put:
     def put(stage: Stage, _: float) -> None:
         robot = stage.one()
 
-        def set_fault(what: str) -> Callable[[Bench], None]:
+        def set_fault(what: str) -> Act:
             return lambda bench: setattr(bench.disk(robot), "fault", what)
 
         stage.at(stage.begin_s, set_fault(fault))
@@ -271,7 +270,7 @@ def _restarts(stage: Stage, times: float) -> None:
     for k in range(int(times)):
         at_s = stage.begin_s + k * apart
         stage.at(at_s, lambda bench: bench.kill(bench.members[robot]))
-        stage.at(at_s + 2.0, lambda bench: bench.switch_on(robot) and None)
+        stage.at(at_s + 2.0, lambda bench: bench.switch_on(robot))
 
 
 def _wiped(stage: Stage, _: float) -> None:
@@ -283,14 +282,14 @@ def _wiped(stage: Stage, _: float) -> None:
         bench.disk(robot).state = {}
 
     stage.at(stage.begin_s, kill)
-    stage.at(stage.begin_s + 2.0, lambda bench: bench.switch_on(robot) and None)
+    stage.at(stage.begin_s + 2.0, lambda bench: bench.switch_on(robot))
 
 
 def _left(stage: Stage, _: float) -> None:
     """A robot leaves in order and comes back."""
     robot = stage.one()
     stage.at(stage.begin_s, lambda bench: bench.stop(bench.members[robot]))
-    stage.at(stage.end_s, lambda bench: bench.switch_on(robot) and None)
+    stage.at(stage.end_s, lambda bench: bench.switch_on(robot))
 
 
 FAULTS: dict[str, Fault] = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -26,6 +26,8 @@ WALL_S = 1_800_000_000
 REMEMBERED = 200
 """Datagrams of each robot that somebody might replay to it."""
 
+Act = Callable[["Bench"], object]
+"""Something that happens to a team."""
 Line = Callable[[float, str, bytes], bytes]
 """What becomes at a time, s, of bytes on the way from a port's device."""
 
@@ -49,7 +51,10 @@ class Bench(Simulator):
         for robot in self.hardware:
             self.switch_on(robot)
         for at_s, act in stage.acts:
-            self.at(round(at_s * 1e6), partial(act, self))
+            self.at(round(at_s * 1e6), partial(self._happen, act))
+
+    def _happen(self, act: Act) -> None:
+        act(self)
 
     def disk(self, robot: int) -> Disk:
         return self._disks[robot]
@@ -116,7 +121,7 @@ class Stage:
     clocks: dict[int, Clock] = field(default_factory=dict)
     wirings: dict[int, list[Wiring]] = field(default_factory=dict)
     lines: dict[int, list[Line]] = field(default_factory=dict)
-    acts: list[tuple[float, Callable[[Bench], None]]] = field(default_factory=list)
+    acts: list[tuple[float, Act]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.clocks = {robot: skewed_clock(self.rng) for robot in self.robots}
@@ -134,7 +139,7 @@ class Stage:
         trouble = Trouble(round(self.begin_s * 1e6), round(self.end_s * 1e6), change)
         self.radio.troubles.append(trouble)
 
-    def at(self, t_s: float, act: Callable[[Bench], None]) -> None:
+    def at(self, t_s: float, act: Act) -> None:
         self.acts.append((t_s, act))
 
     def is_wrong(self, t_s: float) -> bool:
@@ -147,7 +152,7 @@ class Stage:
             devices[robot].wiring = partial(_wired, wirings)
         return devices
 
-    def chunks(self, device: Hardware, since_s: float) -> list[Chunk]:
+    def chunks(self, device: Hardware, since_s: float) -> Iterable[Chunk]:
         """What devices print from a time on."""
         return [chunk for chunk in device.chunks() if chunk.t >= since_s]
 
