@@ -188,7 +188,7 @@ class Simulator:
 
         member = Member(renew(epoch), renew, clock or Clock(), hardware, Traces(), disk or Disk())
         self.members[config.robot.id] = member
-        self._everyone = [other for other in self._everyone if other.running] + [member]
+        self._everyone.append(member)
         self._tick(member)
         return member
 
@@ -233,6 +233,10 @@ class Simulator:
     def kill(self, member: Member) -> None:
         """The robot's power is cut."""
         member.running = False
+
+    def forget_ended(self) -> None:
+        """Starts that are over leave the memory of this computer."""
+        self._everyone = [member for member in self._everyone if member.running]
 
     def sleep(self, member: Member, seconds: float) -> None:
         """Suspend a robot's computer: nothing reaches it, and its clock stands meanwhile."""

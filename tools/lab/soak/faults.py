@@ -68,7 +68,7 @@ def stranger(stage: Stage, per_s: float, until_s: float | None = None) -> None:
 
     def speak(bench: Bench) -> None:
         for member in [m for m in bench.members.values() if m.running]:
-            seen = bench.seen.get(id(member))
+            seen = bench.seen[member.robot.own.robot]
             kind = int(bench.rng.integers(3))
             if kind == 0 or not seen:
                 data = bench.rng.bytes(int(bench.rng.integers(0, 1500)))
@@ -86,7 +86,7 @@ def _replay(stage: Stage, per_s: float) -> None:
 
     def speak(bench: Bench) -> None:
         for member in [m for m in bench.members.values() if m.running]:
-            seen = bench.seen.get(id(member))
+            seen = bench.seen[member.robot.own.robot]
             if seen:
                 bench.arrive(member, seen[int(bench.rng.integers(len(seen)))], STRANGER)
 

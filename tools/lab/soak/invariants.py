@@ -160,7 +160,7 @@ class Invariants:
         """An event was handled."""
         robot = member.robot
         if isinstance(event, Datagram):
-            self._count(member, robot)
+            self._count(robot)
         for effect in effects:
             if isinstance(effect, Send):
                 self._on_send(robot, event.utime, effect)
@@ -172,11 +172,11 @@ class Invariants:
             if id(member) in self.journals:
                 self.journals[id(member)][1].add(event, effects)
 
-    def _count(self, member: Member, robot: Robot) -> None:
+    def _count(self, robot: Robot) -> None:
         team = robot.team
-        known, count = self._received.get(id(member), (robot, 0))
+        known, count = self._received.get(robot.own.robot, (robot, 0))
         count = count + 1 if known is robot else 1
-        self._received[id(member)] = robot, count
+        self._received[robot.own.robot] = robot, count
         counted = team.accepted + team.repeats_heard + team.own_echoes + sum(team.refused.values())
         if counted != count:
             raise Broken("P3", robot.own.robot, f"{count} datagrams came, {counted} were counted")

@@ -61,6 +61,8 @@ class Bench(Simulator):
 
     def switch_on(self, robot: int) -> Member:
         """A new start of a robot, with what its disk still says."""
+        self.forget_ended()
+        self.seen[robot] = deque(maxlen=REMEMBERED)
         device, disk = self.hardware[robot], self._disks[robot]
         now_s = self.now / 1e6
         epoch = next_epoch(
@@ -90,8 +92,7 @@ class Bench(Simulator):
 
     def _remember(self, member: Member, event: Event, effects: list[Effect]) -> None:
         if isinstance(event, Datagram) and event.sender != STRANGER:
-            seen = self.seen.setdefault(id(member), deque(maxlen=REMEMBERED))
-            seen.append(event.data)
+            self.seen[member.robot.own.robot].append(event.data)
 
     def arrive(self, member: Member, data: bytes, sender: str) -> None:
         is_foreign = sender == STRANGER or data in self.stage.radio.damaged
