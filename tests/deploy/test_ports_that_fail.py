@@ -69,6 +69,7 @@ def test_a_port_that_may_not_be_opened(tmp_path: Path) -> None:
             wait_until_open(daemon)
 
 
+@pytest.mark.row("D8")
 def test_a_port_that_appears_later(tmp_path: Path) -> None:
     """As a name below /dev/serial/by-id does when the module is plugged in."""
     name = tmp_path / "usb-LINKTRACK"

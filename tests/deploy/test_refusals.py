@@ -99,6 +99,7 @@ def test_a_wrong_configuration_is_named_before_anything_is_opened(
     assert not (tmp_path / "state").exists()
 
 
+@pytest.mark.row("S11")
 @pytest.mark.parametrize(
     ("content", "mode", "sentence"),
     [
@@ -124,6 +125,7 @@ def test_a_team_key_that_is_none_or_no_secret_is_refused(
     assert SECRET[:8] not in said
 
 
+@pytest.mark.row("S12")
 @slow
 def test_a_key_from_keygen_is_accepted_and_never_shown(tmp_path: Path) -> None:
     path = tmp_path / "team.key"

@@ -71,6 +71,7 @@ def test_a_watchdog_that_is_meant_for_another_process_gets_nothing_special(tmp_p
     assert not daemon.manager.times("WATCHDOG=1")
 
 
+@pytest.mark.row("O4")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_it_in_order(tmp_path: Path, number: signal.Signals) -> None:
     with Daemon(example_in(tmp_path)) as daemon:
@@ -110,6 +111,7 @@ def test_a_solver_that_does_not_end_does_not_hold_it_up(tmp_path: Path) -> None:
         assert stopped(daemon, signal.SIGTERM) == OK
 
 
+@pytest.mark.row("O6")
 def test_a_hang_starves_the_watchdog_and_shows_where_it_was(tmp_path: Path) -> None:
     """systemd ends a hang with SIGABRT; the service file sets PYTHONFAULTHANDLER for that."""
     config = example_in(tmp_path)
@@ -134,6 +136,8 @@ def test_a_bug_of_ours_ends_with_70_and_its_traceback(tmp_path: Path) -> None:
     assert "own_bug" in daemon.log
 
 
+@pytest.mark.row("S6")
+@pytest.mark.row("O5")
 def test_epochs_grow_over_restarts_and_survive_kill_9(tmp_path: Path) -> None:
     config, epochs = example_in(tmp_path), []
     for number in (signal.SIGTERM, signal.SIGKILL, signal.SIGKILL, signal.SIGTERM):
@@ -199,6 +203,7 @@ def test_a_state_folder_that_cannot_be_made_is_a_warning(tmp_path: Path) -> None
     check_it_runs_without_state(config, f"{tmp_path}/file/state")
 
 
+@pytest.mark.row("S7")
 @pytest.mark.skipif(not ORDINARY, reason="root may write anywhere")
 def test_a_state_folder_that_is_read_only_is_a_warning(tmp_path: Path) -> None:
     folder = tmp_path / "state"

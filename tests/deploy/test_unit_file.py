@@ -56,6 +56,7 @@ def test_verify_would_have_found_a_misspelt_key(tmp_path: Path) -> None:
     assert "WatchDogSec" in analyze("verify", "--man=no", str(copy)).stderr
 
 
+@pytest.mark.row("O14")
 def test_the_exposure_is_at_most_two() -> None:
     options = ("security", "--offline=true", "--no-pager")
     done = analyze(*options, f"--threshold={MAX_EXPOSURE_TENTHS}", str(UNIT))

@@ -108,6 +108,7 @@ def test_a_robot_that_is_no_longer_woken_does_not_feed_it(scene: Scene) -> None:
     assert asyncio.run(scene.play(sleep_for_ever, 2.0)) > 0.5
 
 
+@pytest.mark.row("O6")
 @pytest.mark.slow
 def test_a_solver_that_is_stuck_does_not_feed_it(
     scene: Scene, monkeypatch: pytest.MonkeyPatch

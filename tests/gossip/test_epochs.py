@@ -19,6 +19,7 @@ def test_a_start_is_a_second_of_the_wall_clock_and_a_random_part() -> None:
     assert next_epoch(0, NOW_S, 999_999) == 1_764_000_000_999_999
 
 
+@pytest.mark.row("T1")
 @pytest.mark.parametrize("wall_s", [NOW_S, NOW_S - 1, 0, -5, 2**40])
 def test_an_epoch_is_above_the_last_even_when_the_wall_clock_went_wrong(wall_s: int) -> None:
     last = 1_764_000_000_999_999
@@ -41,6 +42,7 @@ def test_starts_of_one_and_the_same_second_are_told_apart_by_chance() -> None:
     assert len({next_epoch(0, 0, draw.randrange(10**6)) for _ in range(100)}) == 100
 
 
+@pytest.mark.row("T5")
 @pytest.mark.parametrize(
     ("wall_s", "is_set"), [(YEAR_2255 // 10**6 - 1, True), (YEAR_2255 // 10**6, False)]
 )

@@ -91,6 +91,7 @@ def test_a_stranger_changes_nothing_but_counters() -> None:
     assert team.refused.total() == count > 4500
 
 
+@pytest.mark.row("S3")
 def test_a_replay_of_the_whole_conversation_changes_nothing_but_counters() -> None:
     team, events = a_busy_team()
     before = snapshot(team)
@@ -117,6 +118,7 @@ def test_a_replayed_entry_counts_as_on_the_air_and_changes_nothing_else() -> Non
     assert aired == ({0: T0, 1: T0, 2: T0}, {0: T0 + SECOND, 1: T0 + SECOND, 2: T0 + SECOND})
 
 
+@pytest.mark.row("S4")
 def test_a_recording_of_an_absent_robot_does_not_bring_it_back_to_a_robot_that_restarted() -> None:
     """The replay window is empty after a start, but no recording can name this very start."""
     _, events = a_busy_team()
@@ -137,6 +139,7 @@ def test_a_recording_from_before_the_last_known_start_is_refused_as_a_whole() ->
     assert dict(restarted.refused) == {"from before a restart of its origin": len(events)}
 
 
+@pytest.mark.row("N7")
 def test_everything_that_comes_in_is_counted_exactly_once() -> None:
     team, events = a_busy_team()
     received = len(events)
@@ -218,6 +221,7 @@ def test_a_message_on_the_channel_of_another_robot_is_refused() -> None:
     assert team.peers == {}
 
 
+@pytest.mark.row("S10")
 def test_a_relay_cannot_alter_an_entry() -> None:
     event = ChannelMessage(T0, *sealed(a_seal(3), kinds()["GRAPH"]))
     team = Team(a_seal(*OWN))

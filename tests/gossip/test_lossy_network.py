@@ -47,6 +47,7 @@ def test_one_entry_reaches_a_team_of_five(loss: float, mean: float, worst: int) 
     assert max(rounds) <= worst
 
 
+@pytest.mark.row("N1")
 def test_ten_robots_at_30_percent_loss_do_not_crowd_the_channel() -> None:
     """On the average 2.85 transmissions reach all nine others, if none is wasted."""
     air = Air(10, 0.3, seed=1)
@@ -70,6 +71,7 @@ def test_what_was_added_in_silence_is_told_on_request() -> None:
     assert air.rounds_until_equal(3) <= 3
 
 
+@pytest.mark.row("N6")
 @pytest.mark.parametrize("loss", [0.0, 0.3])
 def test_a_partition_heals(loss: float) -> None:
     air = Air(5, loss, seed=3)
@@ -83,6 +85,7 @@ def test_a_partition_heals(loss: float) -> None:
     assert air.rounds_until_equal(20) <= 20
 
 
+@pytest.mark.row("N5")
 @pytest.mark.parametrize(("loss", "rounds"), [(0.0, 4), (0.3, 20)])
 def test_two_robots_that_do_not_hear_each_other_agree_through_a_third(
     loss: float, rounds: int

@@ -23,6 +23,7 @@ def fits(send: Send) -> bool:
     return len(send.payload) <= 1400
 
 
+@pytest.mark.row("N9")
 def test_a_full_status_has_1361_bytes() -> None:
     """8 + 31 + 34 of frame, 28 peers of 22, 28 ids of 2 and 28 logs of 22."""
     status = a_status((Heard(1, 1, 1),) * 28, (LogState(1, 1, 0, 0, 0),) * 28, ranged=(1,) * 28)

@@ -108,6 +108,7 @@ def test_a_window_takes_no_more_memory_however_far_it_leaps() -> None:
     assert len(window._ahead) <= MAX_LEAPS
 
 
+@pytest.mark.row("S3")
 def test_the_window_takes_nothing_twice_wherever_counters_leap() -> None:
     draw, window = random.Random(6), ReplayWindow()
     taken: set[int] = set()

@@ -52,6 +52,7 @@ def test_without_a_team_key_the_tag_still_finds_damage() -> None:
     assert opened(a_seal(1, secret=None), (channel, damaged)) is SealFault.WRONG_TAG
 
 
+@pytest.mark.row("S2")
 def test_another_team_key_and_no_team_key_do_not_fit() -> None:
     message = sealed(a_seal(3), a_status())
     assert opened(a_seal(1, secret=OTHER_SECRET), message) is SealFault.WRONG_TAG
@@ -114,6 +115,7 @@ def test_a_type_that_does_not_belong_to_the_channel_is_refused() -> None:
     assert opened(a_seal(1), sealed(a_seal(3), kinds()["POSE"])) is SealFault.UNKNOWN_TYPE
 
 
+@pytest.mark.row("N12")
 @pytest.mark.parametrize("version", [1, 3, 0, -2])
 def test_another_version_is_refused(version: int) -> None:
     assert opened(a_seal(1), forged(a_status(), version=version)) is SealFault.WRONG_VERSION
@@ -133,6 +135,7 @@ LAST_TIME = 100_000 * (2**31 - 2)
 """us; of the last sample of a 10 Hz grid whose numbers have 32 bits."""
 
 
+@pytest.mark.row("T5")
 @pytest.mark.parametrize(
     ("utime", "heard"), [(-1, False), (0, True), (LAST_TIME, True), (LAST_TIME + 1, False)]
 )
@@ -235,6 +238,7 @@ def test_the_largest_counter_is_the_last_one() -> None:
 # nothing is remembered of what is not proven
 
 
+@pytest.mark.row("S3")
 def test_a_forged_huge_counter_does_not_move_the_window() -> None:
     receiver = a_seal(1)
     opened(receiver, forged(a_status(), counter=10))
@@ -251,6 +255,7 @@ def test_a_forged_counter_is_still_new_when_the_true_message_comes() -> None:
     assert isinstance(opened(receiver, forged(a_status(), counter=10)), Header)
 
 
+@pytest.mark.row("S1")
 def test_a_forged_later_epoch_does_not_lock_the_robot_out() -> None:
     receiver = a_seal(1)
     fake = forged(a_status(), epoch=HUGE, secret=OTHER_SECRET)
@@ -275,6 +280,7 @@ def test_a_new_epoch_begins_a_new_window_and_ends_the_old_one() -> None:
     assert isinstance(opened(receiver, forged(a_status(), epoch=5, counter=2)), Header)
 
 
+@pytest.mark.row("S5")
 def test_epochs_are_remembered_over_a_restart() -> None:
     receiver = Seal(team_key(SECRET), 1, 1, {3: 5})
     assert opened(receiver, forged(a_status(), epoch=4)) is SealFault.OLD_EPOCH

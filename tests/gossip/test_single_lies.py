@@ -127,6 +127,7 @@ def test_a_robot_that_is_not_heard_is_not_well() -> None:
     assert not trio.is_well()
 
 
+@pytest.mark.row("S9")
 @pytest.mark.parametrize("to", [(0, 1), (0,), (2,)], ids=["both", "one", "itself"])
 def test_no_single_lie_mutes_anybody(to: tuple[int, ...]) -> None:
     header, like = spoken()

@@ -115,6 +115,7 @@ def test_an_odrive_pair_on_a_bus_becomes_motion() -> None:
     assert turns == pytest.approx(0.19, abs=0.015)
 
 
+@pytest.mark.row("D8")
 def test_a_bus_that_cannot_be_opened_is_named_and_tried_again() -> None:
     async def run() -> list[Event]:
         events: list[Event] = []
@@ -133,6 +134,7 @@ def test_a_bus_that_cannot_be_opened_is_named_and_tried_again() -> None:
     assert "nocan7" in events[0].detail
 
 
+@pytest.mark.row("D9")
 def test_a_bus_whose_reader_dies_is_opened_again(monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[Any] = []
 

@@ -130,6 +130,7 @@ async def test_a_full_buffer_costs_a_message_and_a_lost_network_is_left(
     assert ear.is_down() == is_down
 
 
+@pytest.mark.row("N7")
 @in_a_loop
 async def test_malformed_datagrams_of_every_length_are_handed_on_to_be_judged() -> None:
     where = section()
@@ -201,6 +202,7 @@ def join_nothing(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return joined
 
 
+@pytest.mark.row("N11")
 @in_a_loop
 async def test_the_network_is_up_when_our_own_message_came_back_and_that_is_said_once() -> None:
     where = section()
@@ -324,6 +326,7 @@ async def test_a_group_that_can_be_joined_and_does_not_work_is_tried_ever_less_o
     assert all(gap >= wait for gap, wait in zip(gaps, (0.2, 0.4, 0.8), strict=True))
 
 
+@pytest.mark.row("N10")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "scenario",
@@ -353,6 +356,7 @@ for number in range(count):
 """
 
 
+@pytest.mark.row("N8")
 @pytest.mark.slow
 @in_a_loop
 async def test_a_flood_of_ten_thousand_datagrams_leaves_the_loop_its_turns() -> None:

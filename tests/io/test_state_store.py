@@ -67,6 +67,7 @@ def test_a_key_is_made_private_and_never_twice(tmp_path: Path) -> None:
         write_key(path)
 
 
+@pytest.mark.row("S11")
 @pytest.mark.parametrize(
     ("text", "mode", "word"),
     [

@@ -31,6 +31,7 @@ def error(extra: str) -> float:
     return team.errors()["ate_rmse_m"]
 
 
+@pytest.mark.row("M3")
 @pytest.mark.slow
 def test_blocked_ranges_hurt_less_when_the_first_path_is_looked_at() -> None:
     with_it = error("")

@@ -9,6 +9,7 @@ from teams import EASY, VirtualTeam
 from drslamd.conventions import SECOND_US
 
 
+@pytest.mark.row("O9")
 @pytest.mark.parametrize(
     ("solve_ms", "cycle_s", "said"),
     [

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from lab.play.simulator import Member, Network
 from lab.recordings import world
+from lab.soak import agreement
 from teams import EASY, VirtualTeam
 
-from drslamd.robot import Robot
 from drslamd.slam.tuning import Tuning
 
 SECONDS = 100.0
@@ -24,24 +24,11 @@ RARELY = "[relative_pose]\nrate_hz = 0.5\n[optimizer]\nrate_hz = 0.5\n"
 LOOK_S = 0.5
 
 
-def held(robot: Robot) -> dict[int, tuple[int, frozenset[int]]]:
-    """Which entries of which logs a robot holds; those in which nothing is are left out."""
-    logs = robot.team.logs._logs
-    return {k: (log.epoch, frozenset(log.sealed)) for k, log in logs.items() if log.sealed}
-
-
-def whole_digest(robot: Robot) -> int:
-    return robot.back.graph.digest(set(robot.back.graph.chains))
-
-
 def compare(members: list[Member]) -> int:
     """How many pairs of robots hold the same; these have the same graph."""
-    found = 0
-    for one, other in itertools.combinations([member.robot for member in members], 2):
-        if held(one) == held(other):
-            assert whole_digest(one) == whole_digest(other)
-            found += 1
-    return found
+    same, unequal = agreement.compared(member.robot for member in members)
+    assert not unequal
+    return same
 
 
 def parted(chance: random.Random) -> Callable[[int, int, int], bool]:
@@ -80,6 +67,8 @@ def played(seed: int) -> tuple[VirtualTeam, int]:
     return team, same
 
 
+@pytest.mark.row("N3")
+@pytest.mark.row("N4")
 @pytest.mark.parametrize(
     "seed", [pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 8)]
 )

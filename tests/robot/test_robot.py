@@ -124,6 +124,7 @@ def test_a_base_that_must_be_asked_is_asked_and_no_other_wakes_the_robot_for_it(
     assert scene.robot.next_tick == scene.utime + sleep_us
 
 
+@pytest.mark.row("O4")
 def test_an_orderly_stop_says_goodbye_three_times_and_keeps_the_state() -> None:
     scene = RobotScene(epoch=9, epochs={4: 7})
     *said, last = scene.robot.handle(Stop(scene.utime))

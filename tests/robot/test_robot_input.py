@@ -29,6 +29,8 @@ def pair() -> VirtualTeam:
     return team
 
 
+@pytest.mark.row("D1")
+@pytest.mark.row("N7")
 def test_random_bytes_on_every_port_and_on_the_network_never_raise(pair: VirtualTeam) -> None:
     member = pair.member(0)
     rng = np.random.default_rng(1)
@@ -67,6 +69,7 @@ def test_messages_of_peers_with_any_byte_changed_leave_no_trace_but_a_count(
         assert after[part] == before[part]
 
 
+@pytest.mark.row("S4")
 def test_a_replayed_recording_of_an_absent_robot_does_not_bring_it_back(
     pair: VirtualTeam,
 ) -> None:
@@ -80,6 +83,7 @@ def test_a_replayed_recording_of_an_absent_robot_does_not_bring_it_back(
     assert not fresh.robot.team.living(utime + 60_000)
 
 
+@pytest.mark.row("T3")
 def test_a_long_stall_is_followed_by_one_round_of_timers_not_by_a_burst(
     pair: VirtualTeam,
 ) -> None:
@@ -105,6 +109,7 @@ def test_port_and_network_states_are_reported_with_their_detail(pair: VirtualTea
     assert "wlan7" not in "\n".join(robot.health.sentences().values())
 
 
+@pytest.mark.row("O11")
 def test_a_condition_is_noted_when_it_begins_once_a_minute_and_when_it_ends(
     pair: VirtualTeam,
 ) -> None:

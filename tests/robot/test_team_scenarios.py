@@ -51,6 +51,7 @@ def test_all_robots_hold_the_same_graph_and_reach_the_same_answer(clean: Virtual
         assert np.abs(paths[0] - paths[2]).max() < 2e-3
 
 
+@pytest.mark.row("T4")
 def test_clocks_that_are_hours_apart_are_measured_within_what_is_claimed(
     clean: VirtualTeam,
 ) -> None:
@@ -113,6 +114,7 @@ def test_a_bad_radio_delays_the_answer_and_does_not_change_it(
     assert team.errors()["ate_rmse_m"] < clean.errors()["ate_rmse_m"] + 0.03
 
 
+@pytest.mark.row("S6")
 @pytest.mark.slow
 def test_a_robot_that_restarts_joins_again_and_the_others_keep_their_map() -> None:
     team = VirtualTeam()
@@ -144,6 +146,7 @@ def test_a_robot_that_leaves_in_order_is_gone_within_two_heartbeats() -> None:
     assert team.frames() == {1: 1, 2: 1}
 
 
+@pytest.mark.row("N6")
 def test_a_partition_heals() -> None:
     def connected(a: int, b: int, t_us: int) -> bool:
         return not (25e6 < t_us < 45e6 and 2 in (a, b))
@@ -157,6 +160,7 @@ def test_a_partition_heals() -> None:
     assert team.errors()["ate_rmse_m"] < 0.10
 
 
+@pytest.mark.row("N5")
 @pytest.mark.slow
 def test_robots_that_hear_each_other_only_through_a_third_hold_the_same_graph() -> None:
     team = VirtualTeam(network=Network(connected=lambda a, b, _: {a, b} != {0, 2}))
@@ -183,6 +187,7 @@ def test_robots_out_of_uwb_range_of_everybody_send_only_their_heartbeat() -> Non
     assert "no ranges to robots 1" in team.problems(0)
 
 
+@pytest.mark.row("M5")
 def test_robots_that_stand_still_do_not_invent_poses() -> None:
     team = VirtualTeam(world.Scene(robots=2, seconds=30.0, speed=0.0, odometry_hz=20, range_hz=10))
     team.run(30.0)
@@ -191,6 +196,7 @@ def test_robots_that_stand_still_do_not_invent_poses() -> None:
     assert "made by robots 0; ask them" in team.problems(1)
 
 
+@pytest.mark.row("D5")
 @pytest.mark.slow
 def test_a_pulled_uwb_cable_is_named_and_the_team_goes_on_when_it_is_back() -> None:
     team = VirtualTeam(on=())
@@ -221,6 +227,7 @@ def test_after_silent_wheels_the_path_is_a_new_piece_that_finds_its_place() -> N
     assert team.errors()["ate_rmse_m"] < 0.15
 
 
+@pytest.mark.row("S2")
 def test_another_team_key_does_not_merge_and_both_sides_say_so() -> None:
     team = VirtualTeam(secrets={0: bytes(32), 1: bytes(32), 2: bytes([1] * 32)})
     team.run(45.0)
@@ -230,6 +237,7 @@ def test_another_team_key_does_not_merge_and_both_sides_say_so() -> None:
     assert not team.member(2).robot.team.peers
 
 
+@pytest.mark.row("S8")
 def test_two_robots_with_one_id_both_say_so() -> None:
     team = VirtualTeam(on=(0, 1))
     team.run(3.0)
@@ -239,6 +247,7 @@ def test_two_robots_with_one_id_both_say_so() -> None:
     assert "another robot uses id 1" in sentences
 
 
+@pytest.mark.row("S7")
 def test_a_robot_whose_memory_was_lost_begins_above_what_its_peers_know() -> None:
     team = VirtualTeam(on=(0, 1))
     team.run(5.0)

@@ -145,6 +145,7 @@ def test_every_source_of_the_configuration_is_here() -> None:
     assert {type(section(base.toml)) for base in BASES.values()} == set(SOURCES.values())
 
 
+@pytest.mark.row("M9")
 @pytest.mark.parametrize("name", BASES)
 @settings(derandomize=True, max_examples=60, deadline=None)
 @given(said=st.lists(st.tuples(st.integers(1, 800), NUMBERS, NUMBERS), min_size=3, max_size=20))
@@ -260,6 +261,7 @@ def a_module(uwb_id: int = OWN, max_range_m: float = 120.0) -> LinkTrackInput:
     return LinkTrackInput(uwb_id, max_range_m)
 
 
+@pytest.mark.row("M9")
 @settings(derandomize=True, max_examples=100, deadline=None)
 @given(
     st.sampled_from([node_frame3, node_frame5]),

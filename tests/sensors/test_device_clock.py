@@ -97,6 +97,7 @@ def test_an_offset_does_not_outlive_a_silence_of_the_window(silence_ms: int, kno
     assert clock.to_host(100_000 + silence_ms, due + 70 * MS) == due + (0 if known else 70 * MS)
 
 
+@pytest.mark.row("D10")
 @pytest.mark.parametrize("bits", [16, 32])
 def test_time_goes_on_over_the_wrap(bits: int) -> None:
     clock = started((1 << bits) - 10, 50 * SECOND_US, bits)
@@ -167,6 +168,7 @@ def test_damaged_readings_with_a_good_one_between_them_change_nothing() -> None:
     assert clock.restarts == 0
 
 
+@pytest.mark.row("D11")
 def test_a_restarted_device_costs_one_reading() -> None:
     clock = started(reading=10_000_000)
     assert clock.to_host(3, 52 * SECOND_US) is None
@@ -174,6 +176,7 @@ def test_a_restarted_device_costs_one_reading() -> None:
     assert clock.restarts == 1
 
 
+@pytest.mark.row("D11")
 @pytest.mark.parametrize("jump_s", [-10, 10])
 def test_a_jump_of_ten_seconds_is_a_restart(jump_s: int) -> None:
     clock = started(reading=100_000)

@@ -54,6 +54,7 @@ def test_an_empty_read_changes_nothing() -> None:
     assert scanned([b"", ranging_stream(1)[0], b""]) == (ranging_stream(1), 0, 0, 0)
 
 
+@pytest.mark.row("D4")
 @pytest.mark.parametrize("seed", range(30))
 def test_whole_and_byte_by_byte_and_random_reads_give_the_same(seed: int) -> None:
     stream = noisy_stream(seed, ranging_stream(40, peers=3))
@@ -62,6 +63,7 @@ def test_whole_and_byte_by_byte_and_random_reads_give_the_same(seed: int) -> Non
     assert scanned(list(cut(stream, seed))) == whole
 
 
+@pytest.mark.row("D4")
 @settings(derandomize=True, max_examples=150, deadline=None)
 @given(st.binary(max_size=400), st.lists(st.integers(0, 400), max_size=8))
 def test_any_bytes_cut_anywhere_give_the_same(noise: bytes, cuts: list[int]) -> None:
@@ -105,6 +107,7 @@ def test_a_large_read_is_worked_on_in_pieces_of_the_buffer() -> None:
     assert spy.longest == MAX_BUFFER_BYTES
 
 
+@pytest.mark.row("D3")
 @pytest.mark.parametrize("value", range(256))
 def test_one_poisoned_byte_costs_no_intact_frame(value: int) -> None:
     before, after = ranging_stream(1), ranging_stream(3, start_ms=1020)
@@ -194,6 +197,7 @@ def test_a_bad_checksum_is_counted_once() -> None:
     assert scanned([frame[:-1] + bytes([frame[-1] ^ 1])])[1:] == (29, 1, 0)
 
 
+@pytest.mark.row("D2")
 @pytest.mark.parametrize("flip", range(29 * 8))
 def test_no_single_bit_flip_passes_as_a_frame(flip: int) -> None:
     frame = bytearray(node_frame3(5, [Peer(10, 1234)]))

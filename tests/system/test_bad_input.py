@@ -72,6 +72,7 @@ async def print_frames(robot: RealRobot, count: int, start: int = 0, junk: bytes
         await asyncio.sleep(0.01)
 
 
+@pytest.mark.row("D1")
 def test_garbage_between_frames_costs_no_frame() -> None:
     async def test(team: RealTeam, robot: RealRobot) -> None:
         await print_frames(robot, 300, junk=os.urandom(40))
@@ -113,6 +114,7 @@ def test_the_wrong_baud_rate_is_asked_about(baud: int) -> None:
     with_daemon(test)
 
 
+@pytest.mark.row("D5")
 def test_a_cable_pulled_in_mid_frame_and_put_back_is_read_again() -> None:
     async def test(team: RealTeam, robot: RealRobot) -> None:
         for round_ in range(3):
@@ -132,6 +134,7 @@ def test_a_cable_pulled_in_mid_frame_and_put_back_is_read_again() -> None:
     with_daemon(test)
 
 
+@pytest.mark.row("D5")
 def test_descriptors_do_not_pile_up_when_a_cable_is_pulled_often() -> None:
     async def test(team: RealTeam, robot: RealRobot) -> None:
         assert robot.process is not None
@@ -170,6 +173,7 @@ MALFORMED = {
 }
 
 
+@pytest.mark.row("N7")
 def test_malformed_datagrams_of_every_kind_are_counted_and_nothing_else() -> None:
     async def test(team: RealTeam, robot: RealRobot) -> None:
         before = (await status(robot))["network"]["refused"]
@@ -225,6 +229,7 @@ def test_no_member_can_end_it_by_what_it_says(epoch: int) -> None:
     with_daemon(test)
 
 
+@pytest.mark.row("N8")
 def test_a_flood_of_junk_does_not_keep_it_from_reading_its_sensors() -> None:
     async def test(team: RealTeam, robot: RealRobot) -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:

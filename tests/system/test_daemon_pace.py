@@ -40,6 +40,7 @@ def long_solve() -> int:
     return count
 
 
+@pytest.mark.row("O9")
 def test_bytes_are_stamped_on_time_while_a_solve_runs(tmp_path: Path) -> None:
     async def run() -> tuple[list[float], int]:
         hardware = equip(world.simulate(world.Scene(robots=1, seconds=1.0), 0))[0]

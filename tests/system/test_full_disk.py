@@ -66,6 +66,7 @@ def status(socket: Path, wanted: Any) -> dict[str, Any]:
     return said
 
 
+@pytest.mark.row("O2")
 def test_a_disk_that_is_full_ends_the_recording_and_not_the_daemon(tmp_path: Path) -> None:
     if hindrance():
         pytest.skip(hindrance())

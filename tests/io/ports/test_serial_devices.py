@@ -44,6 +44,7 @@ def host(tmp_path: Path) -> tuple[Path, Path]:
     return sysfs, devices
 
 
+@pytest.mark.row("D6")
 def test_ports_with_hardware_are_listed_by_the_name_that_survives_replugging(
     host: tuple[Path, Path],
 ) -> None:

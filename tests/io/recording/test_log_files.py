@@ -69,6 +69,7 @@ def test_a_file_is_a_share_of_the_quota_and_not_endless(
     assert LogFiles(tmp_path, 3, quota).file_bytes == size
 
 
+@pytest.mark.row("O3")
 @pytest.mark.parametrize(("spare", "stay"), [(0, 15), (-1, 14)])
 def test_the_oldest_go_when_another_one_does_not_fit(tmp_path: Path, spare: int, stay: int) -> None:
     size = QUOTA // FILES

@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 import scipy
 from daemon_scenes import Stepped, configured
 
@@ -31,6 +32,7 @@ def test_it_names_versions_host_and_the_whole_configuration(tmp_path: Path) -> N
     assert said["host"]
 
 
+@pytest.mark.row("S12")
 def test_the_team_key_is_not_in_it_but_can_be_told_from_others(tmp_path: Path) -> None:
     text = json.dumps(provenance(configured(tmp_path), "", KEY))
     assert KEY.hex() not in text

@@ -142,6 +142,7 @@ def test_a_disk_that_hangs_costs_a_gap_that_is_counted_and_never_waits(
     files.close()
 
 
+@pytest.mark.row("O2")
 def test_a_disk_that_is_full_ends_the_recording_and_says_so(files: LogFiles) -> None:
     def scene(recorder: Recorder) -> None:
         files.fault = "disk full"

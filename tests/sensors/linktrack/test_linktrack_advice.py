@@ -64,6 +64,7 @@ def test_silence_is_reported_with_its_length(age: int, silent: bool) -> None:
     assert advice == (expected if silent else None)
 
 
+@pytest.mark.row("D7")
 @pytest.mark.parametrize(("after_s", "asked"), [(4.9, False), (5.0, True)])
 def test_bytes_without_frames_lead_to_the_baud_rate_within_5_seconds(
     after_s: float, asked: bool

@@ -131,6 +131,7 @@ def test_a_refused_frame_leaves_no_trace_but_its_count() -> None:
     assert len(one_frame(uwb, Peer(9, 1500))) == 1
 
 
+@pytest.mark.row("D11")
 def test_a_restarted_module_is_believed_at_its_second_frame() -> None:
     uwb = trusting()
     for k, local_ms in enumerate((4, 24, 44)):
@@ -139,6 +140,7 @@ def test_a_restarted_module_is_believed_at_its_second_frame() -> None:
     assert uwb.counters()["module_restarts"] == 1
 
 
+@pytest.mark.row("D10")
 def test_ranges_go_on_over_the_wrap_of_both_clocks() -> None:
     uwb = an_input()
     start_ms = (1 << 32) - 90
@@ -358,6 +360,7 @@ def outcome(reads: list[bytes]) -> tuple[object, ...]:
     return samples, uwb.counters(), uwb.advice(T0), uwb.foreign_id, uwb.wrong_mode
 
 
+@pytest.mark.row("D4")
 @pytest.mark.parametrize("seed", range(10))
 def test_whole_and_byte_by_byte_and_random_reads_give_the_same(seed: int) -> None:
     draw = random.Random(seed)
@@ -370,6 +373,7 @@ def test_whole_and_byte_by_byte_and_random_reads_give_the_same(seed: int) -> Non
     assert outcome(list(cut(stream, seed))) == whole
 
 
+@pytest.mark.row("D3")
 @pytest.mark.parametrize("value", range(256))
 def test_one_poisoned_byte_costs_no_range(value: int) -> None:
     uwb = trusting()
@@ -377,6 +381,7 @@ def test_one_poisoned_byte_costs_no_range(value: int) -> None:
     assert len(uwb.feed(bytes([value]) + frame, T0 + 20 * MS)) == 1
 
 
+@pytest.mark.row("D1")
 def test_a_million_random_bytes_give_no_range() -> None:
     uwb = an_input()
     noise = random.Random(1).randbytes(1_000_000)

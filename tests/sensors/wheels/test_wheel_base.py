@@ -88,6 +88,7 @@ def test_a_reversed_side_counts_backwards(left: bool, right: bool) -> None:
     assert reversed_ == motions(counts(0, 0, 0), signed)
 
 
+@pytest.mark.row("D10")
 @pytest.mark.parametrize("bits", [16, 32, 64])
 def test_counters_go_on_over_their_wrap(bits: int) -> None:
     top = (1 << bits) - 10
@@ -198,6 +199,7 @@ def test_odd_readings_in_a_row_that_do_not_agree_lose_nothing() -> None:
     assert is_like(base.add(counts(80, 1040, 1040)), 80, 0.04, 0.0)
 
 
+@pytest.mark.row("D11")
 @pytest.mark.parametrize(("silence_ms", "gap"), [(500, False), (501, True)])
 def test_after_a_silence_counters_near_zero_have_restarted(silence_ms: int, gap: bool) -> None:
     base = WheelBase(BASE)
@@ -337,6 +339,7 @@ def test_a_sample_older_than_the_last_is_refused() -> None:
     assert base.tally.refused == {ReadingRefusal.OUT_OF_ORDER: 1}
 
 
+@pytest.mark.row("M9")
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("kind", [WheelSpeeds, WheelTurns, Twist])
 def test_values_that_are_not_finite_are_refused(kind: type, value: float) -> None:

@@ -113,6 +113,7 @@ def test_closures_far_apart_in_time_may_differ_by_what_odometry_lost_between() -
     assert lengths[1] < quantile3(1 - EPSILON) < lengths[0]
 
 
+@pytest.mark.row("M10")
 @pytest.mark.parametrize(("factor", "agree"), [(0.99, True), (1.01, False)])
 @pytest.mark.parametrize("epsilon", [0.1, 0.01])
 def test_a_closure_agrees_just_inside_the_gate(factor: float, agree: bool, epsilon: float) -> None:

@@ -118,6 +118,7 @@ def mirrored(pose: Array) -> Array:
     return pose * [1, -1, -1]
 
 
+@pytest.mark.row("M6")
 def test_straight_paths_leave_the_mirror_image() -> None:
     window, true = window_of(straight((0, 0, 0), 60, 0.25), straight((3, 4, 2.0), 60, 0.2))
     estimate = solved(window)
@@ -173,6 +174,7 @@ STANDS = straight((1, 3, 0), 60, 0.0)
 CURVE = wander(np.random.default_rng(5), 60, 0.25)
 
 
+@pytest.mark.row("M5")
 @pytest.mark.parametrize(
     ("a", "b"),
     [
@@ -221,6 +223,7 @@ def chi2_per_degree(window: Window, monkeypatch: pytest.MonkeyPatch) -> float:
     return solved(window).hypotheses[0].chi2 / (len(window) - 3)
 
 
+@pytest.mark.row("M10")
 @pytest.mark.parametrize(("factor", "poor"), [(0.999, True), (1.001, False)])
 def test_the_fit_is_poor_just_above_its_threshold(
     factor: float, poor: bool, monkeypatch: pytest.MonkeyPatch

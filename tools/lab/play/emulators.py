@@ -40,6 +40,10 @@ class LinkTrackEmulator:
         self.gap_db: Callable[[float, int], float] = lambda t, peer: 3.0
         """How much weaker the first path from a peer is than all that is received, at time t."""
 
+    def reboot(self, t: float) -> None:
+        """It begins anew at time t: its own clock is zero."""
+        self._power_up_ms = -round(t * 1000)
+
     def frame(self, t: float, ranges: Sequence[tuple[int, float]]) -> bytes:
         """What it prints at time t (s of the common radio clock) for (peer, range m) blocks."""
         system = round(t * 1000) & U32

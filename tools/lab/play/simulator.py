@@ -11,8 +11,9 @@ import heapq
 import itertools
 import time
 from collections import defaultdict
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from drslamd.events import (
     Note,
     Restart,
     Save,
+    SaveDone,
     Send,
     SerialData,
     Solve,
@@ -70,6 +72,14 @@ class Network:
     connected: Callable[[int, int, int], bool] = lambda a, b, t: True
     """Does a message from a reach b at time t?"""
 
+    def deliveries(
+        self, rng: np.random.Generator, way: tuple[int, int], t_us: int, data: bytes
+    ) -> list[tuple[int, bytes]]:
+        """When a datagram of the first robot of `way` reaches the second, and as what."""
+        if not self.connected(*way, t_us):
+            return []
+        return [(arrival, data) for arrival in self.arrivals(rng, t_us)]
+
     def arrivals(self, rng: np.random.Generator, t_us: int) -> list[int]:
         copies = 2 if rng.random() < self.duplicate else 1
         return [
@@ -77,6 +87,31 @@ class Network:
             for _ in range(copies)
             if rng.random() >= self.loss
         ]
+
+
+Wire = Callable[[str, bytes], bytes]
+
+Watcher = Callable[["Member", Event, list[Effect]], None]
+"""Is told every event of every robot and what it led to, when that was carried out."""
+
+
+class Disk:
+    """What a robot keeps over its restarts.
+
+    Attributes:
+        fault: why nothing can be written now, empty while it can.
+        state: what was written last.
+    """
+
+    def __init__(self) -> None:
+        self.fault = ""
+        self.state: Mapping[str, Any] = {}
+
+    def keep(self, state: Mapping[str, Any]) -> str:
+        """Write; why it was not possible."""
+        if not self.fault:
+            self.state = state
+        return self.fault
 
 
 @dataclass
@@ -98,8 +133,15 @@ class Member:
     clock: Clock
     hardware: Hardware | None
     traces: Traces
+    disk: Disk = field(default_factory=Disk)
+    hears: Wire = lambda port, data: data
+    """What becomes of the bytes that its devices print."""
     running: bool = True
     tick_at: int = -1
+    asleep_until: int = 0
+    """Its computer is suspended until then, us."""
+    stalled_until: int = 0
+    """Its process does nothing until then, us; what came meanwhile it finds afterwards."""
 
 
 class Simulator:
@@ -114,6 +156,7 @@ class Simulator:
     ) -> None:
         self.now = 0
         self.network = network or Network()
+        self.watchers: list[Watcher] = []
         self.members: dict[int, Member] = {}
         """By robot id, the latest start of each."""
         self._everyone: list[Member] = []
@@ -135,6 +178,7 @@ class Simulator:
         kept: SensorCalibration = UNLEARNED,
         dbc_text: str = "",
         taped: SensorCalibration = UNLEARNED,
+        disk: Disk | None = None,
     ) -> Member:
         """Switch a robot on, now."""
 
@@ -142,13 +186,13 @@ class Simulator:
             key, known = team_key(secret), dict(epochs or {})
             return Robot(config, key, fresh, known, kept, dbc_text, self._tuning, taped)
 
-        member = Member(renew(epoch), renew, clock or Clock(), hardware, Traces())
+        member = Member(renew(epoch), renew, clock or Clock(), hardware, Traces(), disk or Disk())
         self.members[config.robot.id] = member
         self._everyone.append(member)
         self._tick(member)
         return member
 
-    def play(self, member: Member, chunks: Sequence[Chunk]) -> None:
+    def play(self, member: Member, chunks: Iterable[Chunk]) -> None:
         """Let a robot's devices print."""
         iterator = iter(chunks)
 
@@ -158,7 +202,7 @@ class Simulator:
                 return
 
             def deliver() -> None:
-                self.feed(member, chunk.port, chunk.printed())
+                self.feed(member, chunk.port, member.hears(chunk.port, chunk.printed()))
                 step()
 
             self.at(round(chunk.t * 1e6), deliver)
@@ -190,17 +234,34 @@ class Simulator:
         """The robot's power is cut."""
         member.running = False
 
+    def forget_ended(self) -> None:
+        """Starts that are over leave the memory of this computer."""
+        self._everyone = [member for member in self._everyone if member.running]
+
+    def sleep(self, member: Member, seconds: float) -> None:
+        """Suspend a robot's computer: nothing reaches it, and its clock stands meanwhile."""
+        lost_us = round(seconds * 1e6)
+        member.asleep_until = self.now + lost_us
+        member.clock = replace(member.clock, offset_us=member.clock.offset_us - lost_us)
+        self._tick(member)
+
     def handle(self, member: Member, make: Callable[[int], Event]) -> None:
-        if not member.running:
+        if not member.running or self.now < member.asleep_until:
             return
-        effects = member.robot.handle(make(member.clock.local(self.now)))
+        if self.now < member.stalled_until:
+            self.at(member.stalled_until, lambda: self.handle(member, make))
+            return
+        event = make(member.clock.local(self.now))
+        effects = member.robot.handle(event)
         for effect in effects:
             self._carry_out(member, effect)
+        for watcher in self.watchers:
+            watcher(member, event, effects)
         self._tick(member)
 
     def _tick(self, member: Member) -> None:
         """Wake the robot when it wants to be woken."""
-        due = max(member.clock.world(member.robot.next_tick), self.now)
+        due = max(member.clock.world(member.robot.next_tick), self.now, member.asleep_until)
         if self.now < member.tick_at <= due:
             return
         member.tick_at = due
@@ -224,6 +285,8 @@ class Simulator:
             member.traces.notes.append((self.now, effect))
         elif isinstance(effect, Save):
             member.traces.saved.append(effect)
+            fault = member.disk.keep(effect.state)
+            self.at(self.now, lambda: self.handle(member, lambda utime: SaveDone(utime, fault)))
         elif isinstance(effect, Restart):
             member.robot = member.renew(effect.above + 1)
 
@@ -233,12 +296,14 @@ class Simulator:
         source = sender.robot.own.robot
         for member in self._everyone:
             target = member.robot.own.robot
-            if member is not sender and self.network.connected(source, target, self.now):
-                for arrival in self.network.arrivals(self._rng, self.now):
-                    self.at(arrival, lambda m=member: self._arrive(m, data, source))  # type: ignore[misc]
+            if member is not sender:
+                way = source, target
+                for arrival, heard in self.network.deliveries(self._rng, way, self.now, data):
+                    self.at(arrival, partial(self.arrive, member, heard, f"robot {source}"))
 
-    def _arrive(self, member: Member, data: bytes, source: int) -> None:
-        self.handle(member, lambda utime: Datagram(utime, data, f"robot {source}"))
+    def arrive(self, member: Member, data: bytes, sender: str) -> None:
+        """A datagram reaches a robot, now."""
+        self.handle(member, lambda utime: Datagram(utime, data, sender))
 
     def _solve(self, member: Member, effect: Solve) -> None:
         robot, start = member.robot, time.perf_counter()
@@ -252,5 +317,7 @@ class Simulator:
         )
 
     def _done(self, member: Member, robot: Robot, job: int, result: Any, took: int) -> None:
-        if member.robot is robot:
+        if self.now < member.asleep_until:
+            self.at(member.asleep_until, partial(self._done, member, robot, job, result, took))
+        elif member.robot is robot:
             self.handle(member, lambda utime: JobDone(utime, job, result, took))

@@ -84,12 +84,17 @@ def recorded(name: str, rng: np.random.Generator, scene: Scene, truths: list[Arr
     return Recording(name, trails, table[np.lexsort((table[:, 2], table[:, 1], table[:, 0]))])
 
 
-def drive(rng: np.random.Generator, scene: Scene) -> Array:
-    """(n, 3) true poses: towards random goals, with turns, curves, straight lines and stops."""
+def drive(rng: np.random.Generator, scene: Scene, start: Array | None = None) -> Array:
+    """(n, 3) true poses: towards random goals, with turns, curves, straight lines and stops.
+
+    Args:
+        start: (3,) pose to start from, by default anywhere.
+    """
     count = round(scene.seconds / STEP_S)
     margin = np.array([1.0, 1.0])
     room = np.array([scene.width, scene.height])
     pose = np.array([*rng.uniform(margin, room - margin), rng.uniform(-np.pi, np.pi)])
+    pose = pose if start is None else start
     goal = rng.uniform(margin, room - margin)
     speed = turn = 0.0
     stop_at, stop_for = rng.uniform(12, 30), 0.0

@@ -88,7 +88,7 @@ def watch(
     run = Run()
     for second in range(1, int(recording.duration) + 1):
         simulator.run(second)
-        _look(run, recording, simulator)
+        look(run, recording, simulator)
         if progress:
             progress(second)
     run.connected = _is_connected(simulator)
@@ -113,11 +113,13 @@ def _is_connected(simulator: Simulator) -> bool:
     return len(frames) == 1 and None not in frames
 
 
-def _look(run: Run, recording: Recording, simulator: Simulator) -> None:
-    """Ask every robot now."""
+def look(run: Run, recording: Recording, simulator: Simulator) -> None:
+    """Ask every robot that is awake now."""
     t = simulator.now / 1e6
     called: dict[int, str] = {}
     for robot, member in simulator.members.items():
+        if not member.running or simulator.now < member.asleep_until:
+            continue
         status = report.status(member.robot, member.clock.local(simulator.now))
         called[robot] = status["pose"]["state"]
         run.states[called[robot]] += 1

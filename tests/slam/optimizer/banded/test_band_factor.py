@@ -149,6 +149,7 @@ def test_the_inverse_is_selected_however_many_poses_there_are(poses: int, reach:
 # where there is no solution
 
 
+@pytest.mark.row("O12")
 def test_a_band_that_is_not_positive_definite_has_no_factor() -> None:
     system = a_system(4, 1, 2)
     system.band[0, 5] = -1.0
@@ -171,6 +172,7 @@ def test_numbers_that_are_none_have_no_factor() -> None:
     assert BandFactor.of(system) is None
 
 
+@pytest.mark.row("O12")
 def test_a_border_that_cannot_be_told_apart_has_neither_solution_nor_covariance() -> None:
     """Two unknowns that are only known together."""
     band = np.zeros((3, 3))

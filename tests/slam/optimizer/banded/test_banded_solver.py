@@ -222,6 +222,7 @@ def test_what_is_claimed_is_the_dense_inverse_with_odometry_as_bad_as_it_looks()
     assert solution.is_explained
 
 
+@pytest.mark.row("M2")
 def test_where_somebody_slipped_the_solution_is_the_one_that_explains_it() -> None:
     problem, truth = team_problem(3, robots=4, count=45, closures=6)
     problem = slipping(held_at(problem, truth), 1, 25, 31)
@@ -267,6 +268,7 @@ def test_where_nobody_can_say_who_is_wrong_poses_stay_and_their_covariances_grow
 # calibration and robustness
 
 
+@pytest.mark.row("M8")
 def test_bias_scale_and_yaw_rate_are_found() -> None:
     problem, truth = team_problem(
         8,

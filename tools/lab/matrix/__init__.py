@@ -1,0 +1,1 @@
+"""The fault matrix: 64 rows, the tests that name them, and the page of both."""
