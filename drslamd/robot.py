@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import chain
 from typing import Any
 
 from drslamd.broadcast import Broadcast
@@ -236,14 +237,13 @@ class Robot:
             return []
         if self.team.is_spent or (keyframe and not is_sayable(keyframe)):
             return [Restart(self.own.epoch, "it has used up the numbers of its messages")]
-        sends: list[Effect] = []
         keyframes = (keyframe,) if keyframe else ()
-        for entry in self.team.entries(self.front.model, keyframes, ranges, closures):
-            decoded, sealed = self.team.append(entry, utime)
+        measured = self.team.entries(self.front.model, keyframes, ranges, closures)
+        entries = chain(measured, self.team.next_chapter())
+        said = [self.team.append(entry, utime) for entry in entries]
+        for decoded, _ in said:
             self.back.insert(self.own, decoded)
-            if neighbours:
-                sends.append(self.team.send_sealed(self.own.robot, sealed))
-        return sends
+        return [self.team.send_sealed(self.own.robot, s) for _, s in said] if neighbours else []
 
     # the three modules
 

@@ -9,17 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass
-from itertools import islice
 from typing import NamedTuple
 
 from drslamd.conventions import MILLISECOND_US, SECOND_US
 from drslamd.gossip.message_types import LogState
 from drslamd.gossip.replicated_log import ReplicatedLog
+from drslamd.slam.graph.chapters import SPAN
 
 REPEATS_AT_ONCE = 12
 """Entries of one log that one status of a lagging peer asks for, and all that one call of
 `take_due` hands out: a robot that comes back after an hour catches up in five minutes without
 crowding the channel."""
+FAR = 2 * SPAN
+"""A peer that lags by more entries is first told the latest chapter."""
 MAX_PLANNED = 20 * REPEATS_AT_ONCE
 """Repeats that wait for their time; what finds no room is asked for by the next status."""
 QUIET_US = 800 * MILLISECOND_US
@@ -116,8 +118,11 @@ class LogRepeats:
                 start = max(log.first, theirs.complete)
             else:
                 continue
-            held = (seq for seq in range(start, log.end) if log.is_held(seq))
-            for seq in islice(held, REPEATS_AT_ONCE):
+            lacked = log.held_from(start)[:REPEATS_AT_ONCE]
+            if log.latest > start + FAR and log.is_held(log.latest):
+                # by this one a peer knows what it need not wait for
+                lacked = [log.latest, *lacked[: REPEATS_AT_ONCE - 1]]
+            for seq in lacked:
                 yield Place(robot, log.epoch, seq)
 
     def _plan(self, place: Place, times: int, utime: int) -> None:

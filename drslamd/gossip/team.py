@@ -10,6 +10,7 @@ from drslamd.conventions import SECOND_US, Chain
 from drslamd.events import ChannelMessage, Datagram, Send
 from drslamd.gossip import lc02, messages
 from drslamd.gossip.bounds import LAST_SEQ, Measurement, is_sayable
+from drslamd.gossip.entries.chapter_writer import ChapterWriter
 from drslamd.gossip.lc02 import MAX_PAYLOAD
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.messages import UNKNOWN_CLOCK, Heard, Message, OdometryBatch, Pose, Status
@@ -82,6 +83,7 @@ class Team:
         self.own_echoes = 0
         self.last_echo: int | None = None
         self._next_seq = 0
+        self._chapters = ChapterWriter()
         self._named_last = -1
         """The robot after which the next status goes on, when it cannot name all that are heard."""
         self.starts = Starts(self.own, seal.epochs)
@@ -113,7 +115,8 @@ class Team:
         decoded = messages.decode("GRAPH", sealed)
         if not isinstance(decoded, GraphEntry):
             raise AssertionError(f"own graph entry does not decode: {decoded}")
-        self.logs.add(self.own, decoded.seq, sealed, utime)
+        self.logs.add(self.own, decoded.seq, sealed, utime, decoded.chapter)
+        self._chapters.take(decoded)
         self._next_seq = decoded.seq + 1
         return decoded, sealed
 
@@ -141,6 +144,10 @@ class Team:
                 tuple(i for i in part if isinstance(i, RangeMeasurement)),
                 tuple(i for i in part if isinstance(i, ClosureMeasurement)),
             )
+
+    def next_chapter(self) -> Iterator[GraphEntry]:
+        """The next entries of our log where a chapter is due, none where it is not."""
+        yield from self._chapters.due(self._next_seq)
 
     def send_sealed(self, owner: int, sealed: bytes) -> Send:
         """A log entry as it was sealed, ours or another's."""
@@ -237,7 +244,7 @@ class Team:
         if isinstance(message, GraphEntry):
             # may come from a relay and long after it was made: says nothing about its origin's
             # clock or whether it lives
-            if not self.logs.add(origin, message.seq, sealed, utime):
+            if not self.logs.add(origin, message.seq, sealed, utime, message.chapter):
                 self.repeats_heard += 1
                 return None
             self.accepted += 1
