@@ -13,7 +13,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import chain
 from typing import Any
 
 from drslamd.broadcast import Broadcast
@@ -238,10 +237,10 @@ class Robot:
         if self.team.is_spent or (keyframe and not is_sayable(keyframe)):
             return [Restart(self.own.epoch, "it has used up the numbers of its messages")]
         keyframes = (keyframe,) if keyframe else ()
-        measured = self.team.entries(self.front.model, keyframes, ranges, closures)
-        entries = chain(measured, self.team.next_chapter())
+        entries = self.team.entries(self.front.model, keyframes, ranges, closures)
         said = [self.team.append(entry, utime) for entry in entries]
-        for decoded, _ in said:
+        chapter = self.team.write_chapter(utime, aloud=bool(neighbours))
+        for decoded in [*(decoded for decoded, _ in said), *chapter]:
             self.back.insert(self.own, decoded)
         return [self.team.send_sealed(self.own.robot, s) for _, s in said] if neighbours else []
 

@@ -7,7 +7,7 @@ others a little later, in groups by their ids, and only if nobody else did.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -37,6 +37,55 @@ OVERDUE_US = 3_500 * MILLISECOND_US
 """A status that is so late was lost; its sender then still lacks what it lacked before ..."""
 BELIEVED_US = 5 * SECOND_US
 """... for so long."""
+
+
+LEAST_RATE = 1_000
+"""Bytes a second that repeats may have where hardly anything else is said."""
+MOST_LOSS = 0.8
+"""That is reckoned with."""
+LOOK_BACK_S = 5.0
+"""Over which it is counted what else is said."""
+
+
+class Pace:
+    """How many bytes of repeats a team sends together: as many as it says anyhow.
+
+    Everybody counts what is on the air, its own messages and what it hears, so that those who heal
+    a partition or fill a newcomer share one allowance. Where messages are lost it grows: entries
+    then need several repeats.
+
+    Attributes:
+        loss: share of the messages that are lost, 0 to 1.
+    """
+
+    def __init__(self) -> None:
+        self.loss = 0.0
+        self._rate, self._level, self._utime = 0.0, 0.0, 0
+
+    def _pass(self, utime: int) -> None:
+        passed = max(0, utime - self._utime) / SECOND_US
+        self._utime = max(utime, self._utime)
+        allowed = max(self._rate, LEAST_RATE) * (1 + 3 * self.loss) / (1 - self.loss)
+        self._level = min(self._level + allowed * passed, allowed / 4)
+        self._rate *= max(0.0, 1 - passed / LOOK_BACK_S)
+
+    def reckon(self, losses: Sequence[float]) -> None:
+        """How much of what each peer says is lost."""
+        self.loss = min(sum(losses) / max(1, len(losses)), MOST_LOSS)
+
+    def on_air(self, size: int, utime: int, *, repeated: bool = False, heard: bool = False) -> None:
+        """A message of so many bytes; of what is heard others were not."""
+        self._pass(utime)
+        bytes_sent = size / (1 - self.loss) if heard else size
+        if repeated:
+            self._level -= bytes_sent
+        else:
+            self._rate += bytes_sent / LOOK_BACK_S
+
+    def has_room(self, utime: int) -> bool:
+        """May another repeat go out?"""
+        self._pass(utime)
+        return self._level > 0
 
 
 class Place(NamedTuple):
@@ -70,6 +119,7 @@ class LogRepeats:
 
     Attributes:
         repeated: how many entries it has sent again.
+        pace: of all that are sent again in the team.
     """
 
     def __init__(self, robot: int, logs: Mapping[int, ReplicatedLog]) -> None:
@@ -82,6 +132,7 @@ class LogRepeats:
         self._questions: dict[int, _Question] = {}
         """By the peer that asks."""
         self.repeated = 0
+        self.pace = Pace()
 
     def on_status(
         self, sender: int, named: Mapping[int, LogState], left_out: Set[int], utime: int
@@ -131,6 +182,10 @@ class LogRepeats:
         if len(self._planned) < MAX_PLANNED:
             self._planned.setdefault(place, _Repeat(utime, utime + wait))
 
+    def say_when_there_is_room(self, place: Place, utime: int) -> None:
+        """An entry of ours that nobody waits for: said in its turn, as if it was asked for."""
+        self._planned[place] = _Repeat(utime + QUIET_US, utime)
+
     def _answer_again(self, utime: int) -> None:
         """Our own entries to those whose next status is overdue."""
         for sender, question in list(self._questions.items()):
@@ -147,7 +202,9 @@ class LogRepeats:
         self._answer_again(utime)
         out: list[tuple[int, bytes]] = []
         for place, repeat in list(self._planned.items()):
-            if repeat.due > utime or len(out) == REPEATS_AT_ONCE:
+            if len(out) == REPEATS_AT_ONCE or not self.pace.has_room(utime):
+                break
+            if repeat.due > utime:
                 continue
             del self._planned[place]
             log = self._logs[place.robot]
@@ -156,5 +213,6 @@ class LogRepeats:
             if log.aired[place.seq] <= repeat.asked - QUIET_US:
                 log.aired[place.seq] = utime
                 self.repeated += 1
+                self.pace.on_air(len(log.sealed[place.seq]), utime, repeated=True)
                 out.append((place.robot, log.sealed[place.seq]))
         return out

@@ -77,6 +77,21 @@ class LogSync:
         log = self._logs.get(robot)
         return log.epoch if log else None
 
+    def end(self, origin: Chain) -> int:
+        """One past the last entry that is held of a start."""
+        log = self._logs.get(origin.robot)
+        return log.end if log is not None and log.epoch == origin.epoch else 0
+
+    def known_below(self, origin: Chain) -> int:
+        """The first entry of a start that is lacked, or one past the last."""
+        log = self._logs.get(origin.robot)
+        return log.complete if log is not None and log.epoch == origin.epoch else 0
+
+    @property
+    def bytes_held(self) -> int:
+        """Of all logs."""
+        return sum(len(sealed) for log in self._logs.values() for sealed in log.sealed.values())
+
     def lacking(self, robot: int) -> int:
         """Entries of a robot's log that we know of and do not hold."""
         log = self._logs.get(robot)

@@ -11,6 +11,9 @@ from drslamd.slam.graph.measurements import Chapter, GraphEntry
 
 ENVELOPE_BYTES = 64
 """What a graph_t needs besides what it packs."""
+FEWEST = 16
+"""Entries of which a chapter is made early when somebody lacks them: it has a third of their
+bytes."""
 NOT_LAST = (0, 0, 0)
 
 
@@ -20,11 +23,17 @@ class ChapterWriter:
     def __init__(self) -> None:
         self._entries: list[GraphEntry] = []
         self._sorter = Sorter()
+        self._is_asked = False
 
     def take(self, entry: GraphEntry) -> None:
         """An entry that was said, in order."""
         if entry.chapter is None:
             self._entries.append(entry)
+
+    def asked(self, complete: int) -> None:
+        """Somebody lacks our log from entry `complete` on: many entries are better said at once."""
+        entries = self._entries
+        self._is_asked |= len(entries) >= FEWEST and complete <= entries[-FEWEST].seq
 
     def due(self, seq: int) -> list[GraphEntry]:
         """The entries that follow now, from number `seq` on: those of a chapter, most often none.
@@ -32,8 +41,9 @@ class ChapterWriter:
         Their layers come in the order in which they cease to count; the last one says how many
         there are.
         """
-        if len(self._entries) < SPAN:
+        if len(self._entries) < (FEWEST if self._is_asked else SPAN):
             return []
+        self._is_asked = False
         entries, self._entries = self._entries, []
         first = entries[0].seq
         lasting, longer, rest = self._sorter.layers(entries)

@@ -1,7 +1,7 @@
 """Chapters: what a robot says again of its older log entries, together and with less.
 
 A log is said twice. Its entries come one by one; of 64 of them the owner then makes a chapter, in
-three layers: what lasts, what counts for twenty minutes, and what counts for ten. All keyframes
+three layers: what lasts, what counts for forty minutes, and what counts for ten. All keyframes
 last, and whatever was said of a closure after its first word; of ranges and closures as many as the
 graph still uses when it is thinned (`thinning`). A layer that no longer counts is not kept, not
 sent and not asked for, and a graph drops what only that layer said.
@@ -33,13 +33,13 @@ PER_ENTRY = 4_096
 """Above the number of measurements that any one entry of a log can hold."""
 SPAN = 64
 """Entries of which one chapter is made: a minute."""
-COUNTS_FOR = (1 << 31, 1_344, 704)
-"""Entries after which each layer counts no more: cells of time are 64 s long after twenty minutes,
+COUNTS_FOR = (1 << 31, 2_688, 704)
+"""Entries after which each layer counts no more: cells of time are 256 s long after forty minutes,
 16 s after ten (`thinning.time_cells`), and there may be a little more than one entry a second."""
 RAW = len(COUNTS_FOR) - 1
 """Layer of what no chapter has said yet."""
-FEW_RANGES = (4, 4)
-"""Of one pair: so many last of a span, so many more of a quarter of it count for twenty minutes."""
+FEW_RANGES = (1, 4)
+"""Of one pair: so many last of a span, so many more of a quarter of it count for forty minutes."""
 FEW_CLOSURES = (1, 2)
 """The same of closures."""
 GOLDEN = 2_654_435_769
