@@ -39,7 +39,7 @@ BELIEVED_US = 5 * SECOND_US
 """... for so long."""
 
 
-LEAST_RATE = 1_000
+LEAST_RATE = 1_500
 """Bytes a second that repeats may have where hardly anything else is said."""
 MOST_LOSS = 0.8
 """That is reckoned with."""
@@ -61,12 +61,15 @@ class Pace:
     def __init__(self) -> None:
         self.loss = 0.0
         self._rate, self._level, self._utime = 0.0, 0.0, 0
+        self._own_utime = 0
+        """When a repeat of ours went out last."""
 
     def _pass(self, utime: int) -> None:
         passed = max(0, utime - self._utime) / SECOND_US
         self._utime = max(utime, self._utime)
         allowed = max(self._rate, LEAST_RATE) * (1 + 3 * self.loss) / (1 - self.loss)
-        self._level = min(self._level + allowed * passed, allowed / 4)
+        # the debt ends: whoever floods the channel with repeats silences nobody for long
+        self._level = min(max(self._level, -allowed) + allowed * passed, allowed / 4)
         self._rate *= max(0.0, 1 - passed / LOOK_BACK_S)
 
     def reckon(self, losses: Sequence[float]) -> None:
@@ -77,15 +80,17 @@ class Pace:
         """A message of so many bytes; of what is heard others were not."""
         self._pass(utime)
         bytes_sent = size / (1 - self.loss) if heard else size
+        if repeated and not heard:
+            self._own_utime = utime
         if repeated:
             self._level -= bytes_sent
         else:
             self._rate += bytes_sent / LOOK_BACK_S
 
     def has_room(self, utime: int) -> bool:
-        """May another repeat go out?"""
+        """May another repeat go out? One of ours each second always may."""
         self._pass(utime)
-        return self._level > 0
+        return self._level > 0 or utime - self._own_utime >= SECOND_US
 
 
 class Place(NamedTuple):

@@ -210,6 +210,9 @@ def heal(talk: Conversation, fault: Callable[[Conversation], None], limit: int) 
             seconds = second
             break
     after = talk.bytes[before:]
+    talk.seconds(30)
+    # a newcomer speaks too
+    steady = max(steady, sum(talk.bytes[-15:]) / 15)
     kilobytes = (sum(after) - steady * len(after)) / 1e3
     talk.settle()
     return Healed(seconds, max(after) / steady, kilobytes, len(talk.digests()))
