@@ -77,8 +77,7 @@ class Broadcast:
         estimate, team = self._back.estimate, self._team
         frame = None if estimate is None else estimate.frame.robot
         news = frame, state, self._ranged(utime), team.audible(utime)
-        lacks = team.lacks_odometry() or team.logs.lacks_any()
-        quiet = estimate is not None and not lacks and news == self._news
+        quiet = estimate is not None and not team.is_asking(utime) and news == self._news
         if quiet and utime - self._status_said < QUIET_US - SOONER_US:
             return []
         self._news, self._status_said = news, utime

@@ -236,14 +236,13 @@ class Robot:
             return []
         if self.team.is_spent or (keyframe and not is_sayable(keyframe)):
             return [Restart(self.own.epoch, "it has used up the numbers of its messages")]
-        sends: list[Effect] = []
         keyframes = (keyframe,) if keyframe else ()
-        for entry in self.team.entries(self.front.model, keyframes, ranges, closures):
-            decoded, sealed = self.team.append(entry, utime)
+        entries = self.team.entries(self.front.model, keyframes, ranges, closures)
+        said = [self.team.append(entry, utime) for entry in entries]
+        chapter = self.team.write_chapter(utime, aloud=bool(neighbours))
+        for decoded in [*(decoded for decoded, _ in said), *chapter]:
             self.back.insert(self.own, decoded)
-            if neighbours:
-                sends.append(self.team.send_sealed(self.own.robot, sealed))
-        return sends
+        return [self.team.send_sealed(self.own.robot, s) for _, s in said] if neighbours else []
 
     # the three modules
 

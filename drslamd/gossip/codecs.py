@@ -15,12 +15,23 @@ from drslamd import lcmtypes
 from drslamd.conventions import (
     LAST_N,
     LAST_UTIME,
-    ROTATION_STEP_RAD,
-    TRANSLATION_STEP_M,
-    Chain,
 )
 from drslamd.gossip import bounds
-from drslamd.gossip.bounds import LEAST_SIGMA, LONGEST_STEP, MAX_TRAIT, TRAITS, bounded
+from drslamd.gossip.bounds import LONGEST_STEP, bounded
+from drslamd.gossip.entries.chapter_packing import packed, unpacked
+from drslamd.gossip.entries.measurement_codecs import (
+    filled,
+    filled_closure,
+    filled_peer,
+    filled_range,
+    peers_of,
+    read_closure,
+    read_keyframe,
+    read_model,
+    read_peer,
+    read_range,
+    traits_of,
+)
 from drslamd.gossip.message_types import (
     MAX_BATCH,
     MAX_HEARD,
@@ -32,20 +43,8 @@ from drslamd.gossip.message_types import (
     Pose,
     Status,
 )
-from drslamd.slam.graph.measurements import (
-    ClosureMeasurement,
-    GraphEntry,
-    Keyframe,
-    RangeMeasurement,
-)
+from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.public_poses import MAX_HELD, MAX_PUBLIC, PublicPoses
-from drslamd.slam.robot_model import RobotModel
-
-MILLIMETRE_M = 1e-3
-CORRECTION_STEP = 1 / 50
-"""Of the scale and turn with which a closure was found."""
-MOST_STEPS = 127
-"""Of a correction: 2.5 times."""
 
 
 class Codec(NamedTuple):
@@ -63,8 +62,8 @@ class Codec(NamedTuple):
 def _fill_status(out: Any, m: Status) -> None:
     out.state, out.frame, out.leaving = m.state, m.frame, int(m.leaving)
     out.uwb_id, out.uwb_clock_us, out.graph_hash = m.uwb_id, m.uwb_clock_us, m.graph_hash
-    out.heard = [_filled(lcmtypes.heard_t, h) for h in m.heard]
-    out.logs = [_filled(lcmtypes.log_t, log) for log in m.logs]
+    out.heard = [filled(lcmtypes.heard_t, h) for h in m.heard]
+    out.logs = [filled(lcmtypes.log_t, log) for log in m.logs]
     out.ranged = list(m.ranged)
     out.n_heard, out.n_logs, out.n_ranged = len(m.heard), len(m.logs), len(m.ranged)
 
@@ -131,130 +130,39 @@ def _read_odometry(raw: Any) -> OdometryBatch:
 
 
 def _fill_graph(out: Any, m: GraphEntry) -> None:
-    peers = _peers(m)
+    peers = peers_of(m)
     number = {peer: k for k, peer in enumerate(peers)}
-    traits = _traits(m.model) if m.model else ()
+    traits = traits_of(m.model) if m.model else ()
     out.seq, out.traits, out.n_traits = m.seq, list(traits), len(traits)
-    out.peers = [_filled_peer(chain) for chain in peers]
-    out.keyframes = [_filled(lcmtypes.keyframe_t, k) for k in m.keyframes]
-    out.ranges = [_filled_range(item, number[item.peer]) for item in m.ranges]
-    out.closures = [_filled_closure(item, number[item.peer]) for item in m.closures]
+    out.peers = [filled_peer(chain) for chain in peers]
+    out.keyframes = [filled(lcmtypes.keyframe_t, k) for k in m.keyframes]
+    out.ranges = [filled_range(item, number[item.peer]) for item in m.ranges]
+    out.closures = [filled_closure(item, number[item.peer]) for item in m.closures]
     out.n_keyframes, out.n_peers = len(m.keyframes), len(peers)
     out.n_ranges, out.n_closures = len(m.ranges), len(m.closures)
+    out.packed = packed(m.chapter) if m.chapter else b""
+    out.n_packed = len(out.packed)
 
 
 def _read_graph(raw: Any) -> GraphEntry:
     # their upper bound is that all of them fit one datagram
-    if min(raw.n_keyframes, raw.n_peers, raw.n_ranges, raw.n_closures) < 0:
+    counts = raw.n_keyframes, raw.n_peers, raw.n_ranges, raw.n_closures
+    if min(*counts, raw.n_packed) < 0:
         raise ValueError("negative number")
-    if raw.n_traits not in (0, TRAITS):
-        raise ValueError(f"{raw.n_traits} traits, allowed are {TRAITS} or none")
-    sigmas, antenna, half_track = raw.traits[:4], raw.traits[4:7], raw.traits[7:]
-    if not all(LEAST_SIGMA <= v < MAX_TRAIT for v in sigmas):
-        raise ValueError("sigma out of range")
-    if not all(abs(v) < MAX_TRAIT for v in antenna):
-        raise ValueError("antenna out of range")
-    if not all(0 <= v < MAX_TRAIT for v in half_track):
-        raise ValueError("track out of range")
-    model = RobotModel.of_numbers(tuple(raw.traits)) if raw.n_traits else None
-    peers = [Chain(bounds.robot(p.id), bounds.epoch(p.epoch)) for p in raw.peers]
-    keyframes = tuple(_read_keyframe(k) for k in raw.keyframes)
-    ranges = tuple(_read_range(r, peers) for r in raw.ranges)
-    closures = tuple(_read_closure(c, peers) for c in raw.closures)
     seq = bounded("entry", raw.seq, 0, bounds.LAST_SEQ)
+    if raw.n_packed:
+        if any(counts) or raw.n_traits:
+            raise ValueError("chapter that says something beside it")
+        return GraphEntry(seq, chapter=unpacked(raw.packed, seq))
+    model = read_model(raw.traits) if raw.n_traits else None
+    peers = [read_peer(p) for p in raw.peers]
+    keyframes = tuple(read_keyframe(k) for k in raw.keyframes)
+    ranges = tuple(read_range(r, peers) for r in raw.ranges)
+    closures = tuple(read_closure(c, peers) for c in raw.closures)
     entry = GraphEntry(seq, model, keyframes, ranges, closures)
-    if peers != _peers(entry):
+    if peers != peers_of(entry):
         raise ValueError("peers that are not those of the measurements")
     return entry
-
-
-def _traits(model: RobotModel) -> tuple[float, ...]:
-    numbers = model.numbers()
-    return (*(max(sigma, LEAST_SIGMA) for sigma in numbers[:4]), *numbers[4:])
-
-
-def _peers(entry: GraphEntry) -> list[Chain]:
-    """Whom the measurements of an entry refer to, each named once."""
-    return sorted({*(r.peer for r in entry.ranges), *(c.peer for c in entry.closures)})
-
-
-def _filled_peer(chain: Chain) -> Any:
-    out = lcmtypes.peer_t()
-    out.id, out.epoch = chain
-    return out
-
-
-def _read_keyframe(k: Any) -> Keyframe:
-    segment = bounded("segment", k.segment, 0, bounds.LAST_SEGMENT)
-    return Keyframe(bounds.sample(k.n), segment, k.x, k.y, k.theta)
-
-
-def _filled_range(item: RangeMeasurement, peer: int) -> Any:
-    out = lcmtypes.range_t()
-    out.a_n, out.peer, out.b_n = item.a_n, peer, item.b_n
-    out.qa, out.qb = ([round(v / MILLIMETRE_M) for v in q] for q in (item.q_a, item.q_b))
-    out.range = round(item.range_m / TRANSLATION_STEP_M)
-    out.sigma = max(1, round(item.sigma_m / MILLIMETRE_M))
-    out.turn = [round(turn / ROTATION_STEP_RAD) for turn in (item.turn_a, item.turn_b)]
-    return out
-
-
-def _read_range(r: Any, peers: list[Chain]) -> RangeMeasurement:
-    if r.peer < 0 or r.sigma < 1:
-        raise ValueError("range without peer or sigma")
-    range_m = r.range * TRANSLATION_STEP_M
-    if not bounds.is_range(range_m):
-        raise ValueError(f"range of {range_m} m")
-    q_a, q_b = ((q[0] * MILLIMETRE_M, q[1] * MILLIMETRE_M) for q in (r.qa, r.qb))
-    turn_a, turn_b = (turn * ROTATION_STEP_RAD for turn in r.turn)
-    if max(abs(turn_a), abs(turn_b)) > bounds.MAX_ANGLE:
-        raise ValueError("robots turned by more than half a turn")
-    return RangeMeasurement(
-        a_n=bounds.sample(r.a_n),
-        peer=peers[r.peer],
-        b_n=bounds.sample(r.b_n),
-        q_a=q_a,
-        q_b=q_b,
-        range_m=range_m,
-        sigma_m=r.sigma * MILLIMETRE_M,
-        turn_a=turn_a,
-        turn_b=turn_b,
-    )
-
-
-def _filled_closure(item: ClosureMeasurement, peer: int) -> Any:
-    out = lcmtypes.closure_t()
-    out.number, out.kept = item.number, int(item.kept)
-    out.a_n, out.peer, out.b_n = item.a_n, peer, item.b_n
-    out.x, out.y = (round(v / TRANSLATION_STEP_M) for v in item.a_T_b[:2])
-    out.theta = round(item.a_T_b[2] / ROTATION_STEP_RAD)
-    out.covariance = list(item.covariance)
-    steps = (round(part / CORRECTION_STEP) for part in item.corrected)
-    out.corrected = [max(-MOST_STEPS, min(MOST_STEPS, step)) for step in steps]
-    return out
-
-
-def _read_closure(c: Any, peers: list[Chain]) -> ClosureMeasurement:
-    if min(c.peer, c.number) < 0:
-        raise ValueError("closure without peer or number")
-    pose = (c.x * TRANSLATION_STEP_M, c.y * TRANSLATION_STEP_M, c.theta * ROTATION_STEP_RAD)
-    covariance = tuple(c.covariance)
-    if not bounds.is_closure(pose, covariance):
-        raise ValueError("closure with a pose or a covariance that is none")
-    for steps in c.corrected:
-        bounded("correction", steps, -MOST_STEPS, MOST_STEPS)
-    a_scale, a_turn, b_scale, b_turn = (steps * CORRECTION_STEP for steps in c.corrected)
-    corrected = a_scale, a_turn, b_scale, b_turn
-    return ClosureMeasurement(
-        number=c.number,
-        kept=bool(bounds.flag(c.kept)),
-        a_n=bounds.sample(c.a_n),
-        peer=peers[c.peer],
-        b_n=bounds.sample(c.b_n),
-        a_T_b=pose,
-        covariance=covariance,
-        corrected=corrected,
-    )
 
 
 # poses
@@ -328,17 +236,6 @@ def _read_public(raw: Any) -> PublicPoses:
 
 def _read_held(raw: Any) -> tuple[int, int]:
     return bounds.robot(raw.id), bounded("move", raw.round, 0, bounds.LAST_ROUND)
-
-
-# parts
-
-
-def _filled(kind: type[Any], values: Any) -> Any:
-    """An LCM struct whose fields carry the names of the dataclass `values`."""
-    out = kind()
-    for name in kind.__slots__:
-        setattr(out, name, getattr(values, name))
-    return out
 
 
 CODECS = {

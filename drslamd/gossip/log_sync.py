@@ -11,6 +11,7 @@ from drslamd.conventions import Chain
 from drslamd.gossip.log_repeats import LogRepeats
 from drslamd.gossip.message_types import MAX_LOGS, LogState
 from drslamd.gossip.replicated_log import AHEAD, ReplicatedLog
+from drslamd.slam.graph.measurements import Chapter
 
 
 class LogSync:
@@ -36,22 +37,26 @@ class LogSync:
         known = log.newest if log is not None and log.epoch == origin.epoch else 0
         return seq < known + AHEAD
 
-    def add(self, origin: Chain, seq: int, sealed: bytes, utime: int) -> bool:
+    def add(
+        self, origin: Chain, seq: int, sealed: bytes, utime: int, chapter: Chapter | None = None
+    ) -> bool:
         """Take one entry; False when it is not new.
 
         Args:
             origin: robot and epoch that made it.
             sealed: the message as it came, to be repeated unchanged.
+            chapter: what it says, if it is part of one.
         """
         if not self.begin(origin):
             return False
         log = self._logs[origin.robot]
         if seq < log.first:
             return False
-        new = not log.is_held(seq)
+        new = not log.is_known(seq)
         if new:
-            log.put(seq, sealed)
-        log.aired[seq] = utime
+            log.put(seq, sealed, chapter)
+        if log.is_held(seq):
+            log.aired[seq] = utime
         return new
 
     def next_states(self) -> tuple[LogState, ...]:
@@ -71,6 +76,21 @@ class LogSync:
     def epoch(self, robot: int) -> int | None:
         log = self._logs.get(robot)
         return log.epoch if log else None
+
+    def end(self, origin: Chain) -> int:
+        """One past the last entry that is held of a start."""
+        log = self._logs.get(origin.robot)
+        return log.end if log is not None and log.epoch == origin.epoch else 0
+
+    def known_below(self, origin: Chain) -> int:
+        """The first entry of a start that is lacked, or one past the last."""
+        log = self._logs.get(origin.robot)
+        return log.complete if log is not None and log.epoch == origin.epoch else 0
+
+    @property
+    def bytes_held(self) -> int:
+        """Of all logs."""
+        return sum(len(sealed) for log in self._logs.values() for sealed in log.sealed.values())
 
     def lacking(self, robot: int) -> int:
         """Entries of a robot's log that we know of and do not hold."""

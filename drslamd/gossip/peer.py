@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Collection, Set
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
 
 from drslamd.conventions import GRID_HZ, GRID_US, SECOND_US, Chain
 from drslamd.gossip.message_types import (
@@ -35,10 +37,19 @@ REORDERED = 64
 behind is not late: a false message was ahead of it."""
 LOSS_STATUSES = 30
 """Heartbeats over which the loss is counted: the last half minute or so."""
+LATEST_STATUSES = 10
+"""Of which it is taken how much is usually lost."""
 REMEMBERED_US = 40 * SECOND_US
 """How long it counts that a peer named a robot, when it hears too many for one status: 254 take ten
 heartbeats, which come every three seconds at the slowest; a few may be lost. In such a crowd it
 also takes so long until it is known that a peer no longer hears a robot."""
+
+
+class _Tally(NamedTuple):
+    """Messages that a peer had sent at one of its statuses, and those of them that had come."""
+
+    sent: int
+    came: int
 
 
 @dataclass(frozen=True)
@@ -66,8 +77,7 @@ class Peer:
         self._status_counter = self._pose_counter = 0
         self._named: dict[int, _Named] = {}
         self._gap_since: int | None = None
-        self._tallies: deque[tuple[int, int]] = deque(maxlen=LOSS_STATUSES)
-        """(messages that it had sent, those of them that had come) at each of its statuses."""
+        self._tallies: deque[_Tally] = deque(maxlen=LOSS_STATUSES)
 
     def on_message(self, sent: int, utime: int) -> None:
         """Any message straight from the peer."""
@@ -84,6 +94,15 @@ class Peer:
         (sent_before, came_before), (sent, came) = self._tallies[0], self._tallies[-1]
         return max(0.0, 1 - (came - came_before) / max(1, sent - sent_before))
 
+    @property
+    def usual_loss(self) -> float:
+        """The same between most of its latest statuses: silence that has ended does not count."""
+        latest = list(self._tallies)[-LATEST_STATUSES:]
+        losses = sorted(
+            1 - (b.came - a.came) / max(1, b.sent - a.sent) for a, b in pairwise(latest)
+        )
+        return max(0.0, losses[len(losses) // 2]) if losses else 0.0
+
     def take_status(self, status: Status, counter: int, own: Chain, utime: int) -> bool:
         """Keep the latest status; False when this one was overtaken by a later one."""
         if _is_overtaken(counter, self._status_counter):
@@ -91,7 +110,7 @@ class Peer:
         self._status_counter, self.status = counter, status
         # entries of its log have counters too, but are not heard from the peer alone
         entries = max((log.newest for log in status.logs if log.id == self.chain.robot), default=0)
-        self._tallies.append((counter - entries, self.received))
+        self._tallies.append(_Tally(counter - entries, self.received))
         self._remember(status, utime)
         of_us = self._named_as(own)
         self.clock.echoed((of_us.heard.delay_us, of_us.utime) if of_us else None)

@@ -10,7 +10,9 @@ from drslamd.conventions import SECOND_US, Chain
 from drslamd.events import ChannelMessage, Datagram, Send
 from drslamd.gossip import lc02, messages
 from drslamd.gossip.bounds import LAST_SEQ, Measurement, is_sayable
+from drslamd.gossip.entries.chapter_writer import ChapterWriter
 from drslamd.gossip.lc02 import MAX_PAYLOAD
+from drslamd.gossip.log_repeats import Place
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.messages import UNKNOWN_CLOCK, Heard, Message, OdometryBatch, Pose, Status
 from drslamd.gossip.peer import Peer, carrier, shared_module
@@ -82,6 +84,7 @@ class Team:
         self.own_echoes = 0
         self.last_echo: int | None = None
         self._next_seq = 0
+        self._chapters = ChapterWriter()
         self._named_last = -1
         """The robot after which the next status goes on, when it cannot name all that are heard."""
         self.starts = Starts(self.own, seal.epochs)
@@ -93,6 +96,7 @@ class Team:
         """Seal a message."""
         channel = messages.channel(messages.kind_of(message), self.own.robot)
         payload = messages.encode(self.seal.header(utime), message)
+        self.logs.repeats.pace.on_air(len(payload), utime)
         return Send(channel, self.seal.close(channel, payload))
 
     def send_public(self, public: PublicPoses, utime: int) -> list[Send]:
@@ -113,7 +117,10 @@ class Team:
         decoded = messages.decode("GRAPH", sealed)
         if not isinstance(decoded, GraphEntry):
             raise AssertionError(f"own graph entry does not decode: {decoded}")
-        self.logs.add(self.own, decoded.seq, sealed, utime)
+        self.logs.add(self.own, decoded.seq, sealed, utime, decoded.chapter)
+        if decoded.chapter is None:
+            self.logs.repeats.pace.on_air(len(sealed), utime)
+        self._chapters.take(decoded)
         self._next_seq = decoded.seq + 1
         return decoded, sealed
 
@@ -124,10 +131,8 @@ class Team:
         ranges: Sequence[RangeMeasurement],
         closures: Sequence[ClosureMeasurement],
     ) -> Iterator[GraphEntry]:
-        """The next entries of our log, each small enough for one datagram.
-
-        What no reader would take is left out and counted.
-        """
+        """The next entries of our log, each small enough for one datagram; what no reader would
+        take is left out and counted."""
         measured: list[Measurement] = [*keyframes, *ranges, *closures]
         measurements = [item for item in measured if is_sayable(item)]
         self.unsayable += len(measured) - len(measurements)
@@ -142,15 +147,25 @@ class Team:
                 tuple(i for i in part if isinstance(i, ClosureMeasurement)),
             )
 
+    def write_chapter(self, utime: int, *, aloud: bool) -> list[GraphEntry]:
+        """Entries that follow where a chapter is due; they are said later, if `aloud`."""
+        entries = [self.append(e, utime)[0] for e in self._chapters.due(self._next_seq)]
+        for entry in entries if aloud else ():
+            self.logs.repeats.say_when_there_is_room(Place(*self.own, entry.seq), utime)
+        return entries
+
+    def is_asking(self, utime: int) -> bool:
+        """Do we lack odometry that may still come, or entries that the channel has room for?"""
+        lacks_entries = self.logs.lacks_any() and self.logs.repeats.pace.has_room(utime)
+        return lacks_entries or any(peer.lacks_odometry for peer in self.peers.values())
+
     def send_sealed(self, owner: int, sealed: bytes) -> Send:
         """A log entry as it was sealed, ours or another's."""
         return Send(messages.channel("GRAPH", owner), sealed)
 
     def repeats(self, utime: int) -> list[Send]:
         """Log entries that somebody lacks; ask several times a second."""
-        return [
-            self.send_sealed(owner, sealed) for owner, sealed in self.logs.repeats.take_due(utime)
-        ]
+        return [self.send_sealed(*repeat) for repeat in self.logs.repeats.take_due(utime)]
 
     def audible(self, utime: int) -> Set[Chain]:
         """Whom we hear."""
@@ -215,7 +230,7 @@ class Team:
         return self._sort(header, message, payload, event.utime)
 
     def _is_near(self, origin: Chain, seq: int) -> bool:
-        """Is an entry near the end of its log as we, or the latest status of any peer, know it?"""
+        """Is it near the end of its log as we, or the latest status of any peer, know it?"""
         statuses = (peer.status for peer in self.peers.values() if peer.status is not None)
         return self.logs.is_near(origin, seq) or any(
             (log.id, log.epoch) == origin and seq < log.newest + AHEAD
@@ -234,10 +249,12 @@ class Team:
 
     def _sort(self, header: Header, message: Message, sealed: bytes, utime: int) -> Received | None:
         origin = Chain(header.origin, header.epoch)
+        is_late = isinstance(message, GraphEntry) and message.seq < self.logs.end(origin)
+        self.logs.repeats.pace.on_air(len(sealed), utime, repeated=is_late, heard=True)
         if isinstance(message, GraphEntry):
             # may come from a relay and long after it was made: says nothing about its origin's
             # clock or whether it lives
-            if not self.logs.add(origin, message.seq, sealed, utime):
+            if not self.logs.add(origin, message.seq, sealed, utime, message.chapter):
                 self.repeats_heard += 1
                 return None
             self.accepted += 1
@@ -259,12 +276,11 @@ class Team:
     def _status(self, peer: Peer, status: Status, counter: int, utime: int) -> None:
         if not peer.take_status(status, counter, self.own, utime):
             return
+        self.logs.repeats.pace.reckon([p.usual_loss for p in self.living(utime).values()])
         self.logs.on_states(status.logs, peer.chain.robot, utime)
+        for complete in (s.complete for s in status.logs if (s.id, s.epoch) == self.own):
+            self._chapters.asked(complete)
         self.starts.on_status(peer.chain.robot, status, self._next_seq, utime)
-
-    def lacks_odometry(self) -> bool:
-        """Was odometry lost that may still come?"""
-        return any(peer.lacks_odometry for peer in self.peers.values())
 
     @property
     def superseded_by(self) -> int | None:

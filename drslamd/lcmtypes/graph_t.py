@@ -15,11 +15,11 @@ class graph_t(object):
     from 0; whoever misses one gets it again, from anybody who has it.
     """
 
-    __slots__ = ["header", "seq", "n_traits", "traits", "n_keyframes", "keyframes", "n_peers", "peers", "n_ranges", "ranges", "n_closures", "closures"]
+    __slots__ = ["header", "seq", "n_traits", "traits", "n_keyframes", "keyframes", "n_peers", "peers", "n_ranges", "ranges", "n_closures", "closures", "n_packed", "packed"]
 
-    __typenames__ = ["drslamd.lcmtypes.header_t", "int32_t", "int8_t", "float", "int16_t", "drslamd.lcmtypes.keyframe_t", "int16_t", "drslamd.lcmtypes.peer_t", "int16_t", "drslamd.lcmtypes.range_t", "int16_t", "drslamd.lcmtypes.closure_t"]
+    __typenames__ = ["drslamd.lcmtypes.header_t", "int32_t", "int8_t", "float", "int16_t", "drslamd.lcmtypes.keyframe_t", "int16_t", "drslamd.lcmtypes.peer_t", "int16_t", "drslamd.lcmtypes.range_t", "int16_t", "drslamd.lcmtypes.closure_t", "int16_t", "byte"]
 
-    __dimensions__ = [None, None, None, ["n_traits"], None, ["n_keyframes"], None, ["n_peers"], None, ["n_ranges"], None, ["n_closures"]]
+    __dimensions__ = [None, None, None, ["n_traits"], None, ["n_keyframes"], None, ["n_peers"], None, ["n_ranges"], None, ["n_closures"], None, ["n_packed"]]
 
     def __init__(self):
         self.header = drslamd.lcmtypes.header_t()
@@ -52,6 +52,15 @@ class graph_t(object):
         """ LCM Type: int16_t """
         self.closures = []
         """ LCM Type: drslamd.lcmtypes.closure_t[n_closures] """
+        self.n_packed = 0
+        """
+        of a chapter, which says earlier entries again and nothing else: the packed columns of
+        drslamd/gossip/entries/chapter_packing.py
+        LCM Type: int16_t
+        """
+
+        self.packed = b""
+        """ LCM Type: byte[n_packed] """
 
     def encode(self):
         buf = BytesIO()
@@ -80,6 +89,8 @@ class graph_t(object):
         for i0 in range(self.n_closures):
             assert self.closures[i0]._get_packed_fingerprint() == drslamd.lcmtypes.closure_t._get_packed_fingerprint()
             self.closures[i0]._encode_one(buf)
+        buf.write(struct.pack(">h", self.n_packed))
+        buf.write(bytearray(self.packed[:self.n_packed]))
 
     @staticmethod
     def decode(data: bytes):
@@ -113,13 +124,15 @@ class graph_t(object):
         self.closures = []
         for i0 in range(self.n_closures):
             self.closures.append(drslamd.lcmtypes.closure_t._decode_one(buf))
+        self.n_packed = struct.unpack(">h", buf.read(2))[0]
+        self.packed = buf.read(self.n_packed)
         return self
 
     @staticmethod
     def _get_hash_recursive(parents):
         if graph_t in parents: return 0
         newparents = parents + [graph_t]
-        tmphash = (0xabe17e5747c206de+ drslamd.lcmtypes.header_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.keyframe_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.peer_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.range_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.closure_t._get_hash_recursive(newparents)) & 0xffffffffffffffff
+        tmphash = (0xa104b7da3c30f2e4+ drslamd.lcmtypes.header_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.keyframe_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.peer_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.range_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.closure_t._get_hash_recursive(newparents)) & 0xffffffffffffffff
         tmphash  = (((tmphash<<1)&0xffffffffffffffff) + (tmphash>>63)) & 0xffffffffffffffff
         return tmphash
     _packed_fingerprint = None

@@ -97,7 +97,10 @@ def test_a_replay_of_the_whole_conversation_changes_nothing_but_counters() -> No
     before = snapshot(team)
     for event in events * 3:
         assert team.receive(event) is None
-    assert snapshot(team) == before
+    after = snapshot(team)
+    for s in (before, after):
+        del s["logs"]["repeats"]["pace"]  # it counts what is on the air
+    assert after == before
     assert dict(team.refused) == {"already seen": 3 * 5}
     assert team.repeats_heard == 3 * 3
 
@@ -114,6 +117,7 @@ def test_a_replayed_entry_counts_as_on_the_air_and_changes_nothing_else() -> Non
     aired = tuple(s["logs"]["_logs"][3].pop("aired") for s in (before, after))
     for s in (before, after):
         del s["logs"]["repeats"]["_logs"]  # the same logs once more
+        del s["logs"]["repeats"]["pace"]
     assert after == before
     assert aired == ({0: T0, 1: T0, 2: T0}, {0: T0 + SECOND, 1: T0 + SECOND, 2: T0 + SECOND})
 

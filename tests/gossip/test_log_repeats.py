@@ -7,8 +7,10 @@ from log_scenes import OTHER, OWNER, PEER, T0, holding, repeated, said, state
 from message_builders import MS, SECOND
 
 from drslamd.conventions import Chain
+from drslamd.gossip.log_repeats import Pace
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.message_types import LogState
+from drslamd.slam.graph.measurements import Chapter
 
 
 def test_the_owner_repeats_what_a_peer_lacks_at_once_and_in_order() -> None:
@@ -210,3 +212,68 @@ def test_no_more_than_240_repeats_are_planned() -> None:
             logs.add(Chain(robot, 1), seq, b"", 0)
     logs.on_states((), OTHER.robot, T0)
     assert sum(len(logs.repeats.take_due(T0 + ms * MS)) for ms in range(0, 10_000, 100)) == 240
+
+
+# their pace
+
+
+def repeated_in(seconds: int, pace: Pace, size: int = 500) -> int:
+    """Bytes of repeats that go out when somebody always has one."""
+    sent = 0
+    for ms in range(0, 1000 * seconds, 10):
+        if pace.has_room(T0 + ms * MS):
+            pace.on_air(size, T0 + ms * MS, repeated=True)
+            sent += size
+    return sent
+
+
+def test_repeats_have_a_least_rate_where_nothing_else_is_said() -> None:
+    assert 14_500 <= repeated_in(10, Pace()) <= 16_500
+
+
+def test_repeats_have_as_many_bytes_as_everything_else() -> None:
+    pace, sent = Pace(), 0
+    for ms in range(0, 30_000, 10):
+        pace.on_air(40, T0 + ms * MS)
+        if ms >= 20_000 and pace.has_room(T0 + ms * MS):
+            pace.on_air(500, T0 + ms * MS, repeated=True)
+            sent += 500
+    assert 36_000 <= sent <= 44_000
+
+
+def test_they_may_be_more_where_messages_are_lost() -> None:
+    lossy = Pace()
+    lossy.reckon([0.5, 0.5])
+    assert repeated_in(10, lossy) > 3 * repeated_in(10, Pace())
+    hopeless = Pace()
+    hopeless.reckon([1.0])
+    assert hopeless.loss == 0.8
+
+
+def test_whoever_floods_the_channel_with_repeats_leaves_each_robot_one_a_second() -> None:
+    pace, sent = Pace(), 0
+    for ms in range(0, 10_000, 10):
+        pace.on_air(1_000, T0 + ms * MS, repeated=True, heard=True)
+        if pace.has_room(T0 + ms * MS):
+            pace.on_air(500, T0 + ms * MS, repeated=True)
+            sent += 1
+    assert 9 <= sent <= 11
+    assert pace.has_room(T0 + 12 * SECOND)
+
+
+# chapters
+
+
+def test_a_peer_that_lags_far_is_first_told_the_latest_chapter() -> None:
+    logs = LogSync(3)
+    for seq in range(200):
+        logs.add(OWNER, seq, said(OWNER, seq), 0)
+    logs.add(OWNER, 200, said(OWNER, 200), 0, Chapter(0, 190, (0, 0, 1)))
+    logs.on_states(state(OWNER, 71), PEER.robot, T0)
+    assert repeated(logs, T0)[:2] == [said(OWNER, 200), said(OWNER, 71)]
+    logs = LogSync(3)
+    for seq in range(200):
+        logs.add(OWNER, seq, said(OWNER, seq), 0)
+    logs.add(OWNER, 200, said(OWNER, 200), 0, Chapter(0, 190, (0, 0, 1)))
+    logs.on_states(state(OWNER, 72), PEER.robot, T0)
+    assert repeated(logs, T0)[0] == said(OWNER, 72)

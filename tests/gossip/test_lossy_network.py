@@ -82,7 +82,7 @@ def test_a_partition_heals(loss: float) -> None:
     assert air.rounds_until_equal(10, robots=(2, 3, 4)) <= 10
     assert not air.is_equal()
     air.hears = lambda a, b: True
-    assert air.rounds_until_equal(20) <= 20
+    assert air.rounds_until_equal(25) <= 25
 
 
 @pytest.mark.row("N5")

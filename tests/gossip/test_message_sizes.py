@@ -49,8 +49,8 @@ def test_a_pose_has_94_bytes() -> None:
     assert len(messages.encode(HEADER, pose)) == 8 + 31 + 19 + 12 + 24 == 94
 
 
-def test_an_entry_with_one_keyframe_has_70_bytes() -> None:
-    assert len(messages.encode(HEADER, an_entry(0, 5))) == 8 + 31 + 5 + 8 + 18 == 70
+def test_an_entry_with_one_keyframe_has_72_bytes() -> None:
+    assert len(messages.encode(HEADER, an_entry(0, 5))) == 8 + 31 + 5 + 10 + 18 == 72
 
 
 KEYFRAMES = tuple(Keyframe(n, 0, n, n, n) for n in range(50))
@@ -80,10 +80,10 @@ def test_items_of_every_kind_are_said_completely_in_entries_that_fit(
     assert sum(len(e.closures) for e, _ in entries) == len(closures)
 
 
-def test_twenty_closures_with_twenty_peers_and_the_traits_have_1364_bytes() -> None:
+def test_twenty_closures_with_twenty_peers_and_the_traits_have_1366_bytes() -> None:
     team = Team(a_seal(3))
     (entry,) = team.entries(UNTOLD, (), (), CLOSURES[:MEASUREMENTS_PER_ENTRY])
-    assert len(messages.encode(HEADER, entry)) == 52 + 32 + 20 * (10 + 54) == 1364
+    assert len(messages.encode(HEADER, entry)) == 54 + 32 + 20 * (10 + 54) == 1366
 
 
 def test_the_largest_rank_that_can_be_configured_is_20() -> None:

@@ -22,11 +22,13 @@ class ChainData:
 
     Attributes:
         model: of its sensors, as it last said.
+        latest_chapter: entry with which its latest chapter ends, -1 before the first.
     """
 
     def __init__(self, chain: Chain) -> None:
         self.chain = chain
         self.model = UNTOLD
+        self.latest_chapter = -1
         self._model_seq = -1
         self._said = TimedRows(5, identity=1, most=MAX_KEYFRAMES)
         self._table = KeyframeTable(np.empty((0, 5)))

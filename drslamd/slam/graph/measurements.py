@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 from drslamd.conventions import Chain
 from drslamd.slam.robot_model import RobotModel
@@ -58,6 +59,33 @@ class ClosureMeasurement:
     corrected: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
 
+Item = TypeVar("Item")
+Placed = tuple[int, Item]
+"""A measurement and its place in the log: which entry said it, and where in there."""
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """Part of what a robot says again of earlier entries (`chapters`).
+
+    Attributes:
+        layer: 0 lasts, 1 and 2 count for a while.
+        first: entry with which the chapter begins; it ends with its last part.
+        parts: of the last part, how many there are of each layer, itself among them: they are the
+            entries up to it, those of layer 2 first; of another part all 0.
+        models: of its sensors, with the entry that said so.
+        ranges, closures: by their peer, then by their place.
+    """
+
+    layer: int
+    first: int
+    parts: tuple[int, int, int]
+    models: tuple[tuple[int, RobotModel], ...] = ()
+    keyframes: tuple[Keyframe, ...] = ()
+    ranges: tuple[Placed[RangeMeasurement], ...] = ()
+    closures: tuple[Placed[ClosureMeasurement], ...] = ()
+
+
 @dataclass(frozen=True)
 class GraphEntry:
     """One message of a robot's log."""
@@ -68,3 +96,5 @@ class GraphEntry:
     keyframes: tuple[Keyframe, ...] = ()
     ranges: tuple[RangeMeasurement, ...] = ()
     closures: tuple[ClosureMeasurement, ...] = ()
+    chapter: Chapter | None = None
+    """Said again; such an entry says nothing else."""

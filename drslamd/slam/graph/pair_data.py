@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from drslamd.conventions import Chain
+from drslamd.slam.graph.chapters import PER_ENTRY, RAW
 from drslamd.slam.graph.clocks import Ahead, ClockDifferences
+from drslamd.slam.graph.fading_rows import FadingRows
 from drslamd.slam.graph.measurements import ClosureMeasurement, RangeMeasurement
 from drslamd.slam.graph.tables import CLOSURE_COLUMNS, RANGE_COLUMNS, ClosureTable, RangeTable
-from drslamd.slam.graph.timed_rows import TimedRows
 
 MAX_RANGES = 40_000
 """Of one pair, 3.5 MB: more than one a second for all the time that is held
@@ -16,8 +17,6 @@ MAX_RANGES = 40_000
 MAX_CLOSURES = 40_000
 """Of one pair, 5.8 MB, likewise; those that were withdrawn are among them, because a withdrawal may
 come before what it withdraws."""
-PER_ENTRY = 4_096
-"""Above the number of measurements that any one entry of a log can hold."""
 
 FARTHEST_M = 10_000.0
 """No radio of this kind reaches so far."""
@@ -33,24 +32,41 @@ class PairData:
 
     a: Chain
     b: Chain
-    said_ranges: TimedRows = field(
-        default_factory=lambda: TimedRows(RANGE_COLUMNS, identity=2, most=MAX_RANGES)
+    said_ranges: FadingRows = field(
+        default_factory=lambda: FadingRows(
+            RANGE_COLUMNS, 2, MAX_RANGES, lambda rows: RangeTable(rows).place
+        )
     )
-    said_closures: TimedRows = field(
-        default_factory=lambda: TimedRows(CLOSURE_COLUMNS, identity=2, most=MAX_CLOSURES)
+    said_closures: FadingRows = field(
+        default_factory=lambda: FadingRows(
+            CLOSURE_COLUMNS, 2, MAX_CLOSURES, lambda rows: ClosureTable(rows).place
+        )
     )
     _clocks_of_ranges: ClockDifferences = field(default_factory=ClockDifferences)
     _clocks_of_closures: ClockDifferences = field(default_factory=ClockDifferences)
 
     def add_range(self, seq: int, place: int, r: RangeMeasurement) -> None:
-        """A range at some place in the log of its owner."""
-        if abs(r.range_m) < FARTHEST_M and r.sigma_m > 0:
-            self.said_ranges.add(RangeTable.row(seq * PER_ENTRY + place, r))
+        """A range at some place in an entry of its owner's log."""
+        self.take_range(seq * PER_ENTRY + place, r, RAW)
 
     def add_closure(self, seq: int, place: int, c: ClosureMeasurement) -> None:
         """A closure, or its withdrawal; of one number the latest word counts."""
+        self.take_closure(seq * PER_ENTRY + place, c, RAW)
+
+    def take_range(self, place: int, r: RangeMeasurement, layer: int) -> None:
+        """A range at some place in the log, as a layer of a chapter says it."""
+        if abs(r.range_m) < FARTHEST_M and r.sigma_m > 0:
+            self.said_ranges.say(RangeTable.row(place, r), place, layer)
+
+    def take_closure(self, place: int, c: ClosureMeasurement, layer: int) -> None:
+        """The same of a closure."""
         if _is_believable(c):
-            self.said_closures.add(ClosureTable.row(seq * PER_ENTRY + place, c))
+            self.said_closures.say(ClosureTable.row(place, c), place, layer)
+
+    def fade(self, latest: int) -> None:
+        """The owner's latest chapter is entry `latest` of its log."""
+        self.said_ranges.fade(latest)
+        self.said_closures.fade(latest)
 
     @property
     def ranges(self) -> RangeTable:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from drslamd.conventions import Chain
 from drslamd.slam.graph.chain_data import ChainData
-from drslamd.slam.graph.measurements import GraphEntry
+from drslamd.slam.graph.measurements import Chapter, GraphEntry
 from drslamd.slam.graph.pair_data import PairData
 from drslamd.slam.graph.thinning.graph_view import GraphView, Thinning
 from drslamd.slam.graph.thinning.time_cells import RECENT_S
@@ -31,6 +31,8 @@ class PoseGraph:
         self.pairs: dict[tuple[int, int], PairData] = {}
         self._thinning = Thinning(recent_s)
         self._view: GraphView | None = None
+        self._forgets = recent_s <= RECENT_S
+        """What chapters leave out is needed where times are recent for longer than usual."""
 
     @property
     def view(self) -> GraphView:
@@ -60,6 +62,28 @@ class PoseGraph:
             pair = self._pair(origin, c.peer)
             if pair:
                 pair.add_closure(entry.seq, place, c)
+        if entry.chapter:
+            self._take_chapter(data, entry.seq, entry.chapter)
+
+    def _take_chapter(self, data: ChainData, seq: int, chapter: Chapter) -> None:
+        """Take part of what a robot says again."""
+        for said, model in chapter.models:
+            data.take_model(said, model)
+        for k in chapter.keyframes:
+            data.add(k)
+        for place, r in chapter.ranges:
+            pair = self._pair(data.chain, r.peer)
+            if pair:
+                pair.take_range(place, r, chapter.layer)
+        for place, c in chapter.closures:
+            pair = self._pair(data.chain, c.peer)
+            if pair:
+                pair.take_closure(place, c, chapter.layer)
+        if any(chapter.parts) and seq > data.latest_chapter and self._forgets:
+            data.latest_chapter = seq
+            for pair in self.pairs.values():
+                if pair.a == data.chain:
+                    pair.fade(seq)
 
     def _pair(self, a: Chain, b: Chain) -> PairData | None:
         """The pair's data; None for a start of b that is already past, and for a pair of one."""
@@ -68,8 +92,9 @@ class PoseGraph:
             return pair
         if a.robot == b.robot or (pair and pair.b.epoch > b.epoch):
             return None
-        self.pairs[a.robot, b.robot] = PairData(a, b)
-        return self.pairs[a.robot, b.robot]
+        pair = self.pairs[a.robot, b.robot] = PairData(a, b)
+        pair.fade(self.chains[a.robot].latest_chapter)
+        return pair
 
     def forget(self, robot: int) -> None:
         """Drop a robot's chain and what was measured by it."""

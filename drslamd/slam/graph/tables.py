@@ -179,6 +179,11 @@ class ClosureTable:
         return self.rows[:, 1]
 
     @property
+    def place(self) -> Array:
+        """(k,) where the owner's log says so."""
+        return -self.rows[:, 2]
+
+    @property
     def b_n(self) -> Array:
         """(k,) keyframes of the peer."""
         return self.rows[:, self.B_N]

@@ -8,6 +8,7 @@ blocks, from the oldest on: what is left of a block is then all that was said of
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drslamd.conventions import GRID_HZ
 from drslamd.slam.se2 import Array
@@ -102,6 +103,21 @@ class TimedRows:
         """(k, width) rows of one block that is held."""
         self._settle()
         return self._blocks[block]
+
+    def holds(self, block: int) -> bool:
+        """Is there any row of it?"""
+        self._settle()
+        return block in self._blocks
+
+    def keep(self, block: int, which: NDArray[np.bool_]) -> None:
+        """Give up all rows (k,) of a block that is held but these."""
+        rows = self.of_block(block)
+        self._blocks[block] = rows[which]
+        self._held -= len(rows) - len(self._blocks[block])
+        self._changes += 1
+        self._changed.pop(block, None)
+        self._changed[block] = self._changes
+        self._all = None
 
     def between(self, first: int, end: int) -> Array:
         """(k, width) rows of samples first .. end - 1, in an array of its own."""

@@ -1,0 +1,1 @@
+"""What the entries of a log are made of, and the chapters that say them again."""

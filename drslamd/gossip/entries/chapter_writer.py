@@ -1,0 +1,77 @@
+"""A robot makes chapters of its own log: of 64 entries one, in as many messages as it takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from drslamd.gossip.entries.chapter_packing import packed
+from drslamd.gossip.lc02 import MAX_PAYLOAD
+from drslamd.slam.graph.chapters import SPAN, Layer, Sorter, part
+from drslamd.slam.graph.measurements import Chapter, GraphEntry
+
+ENVELOPE_BYTES = 64
+"""What a graph_t needs besides what it packs."""
+FEWEST = 16
+"""Entries of which a chapter is made early when somebody lacks them: it has a third of their
+bytes."""
+NOT_LAST = (0, 0, 0)
+
+
+class ChapterWriter:
+    """Of one start of one robot."""
+
+    def __init__(self) -> None:
+        self._entries: list[GraphEntry] = []
+        self._sorter = Sorter()
+        self._is_asked = False
+
+    def take(self, entry: GraphEntry) -> None:
+        """An entry that was said, in order."""
+        if entry.chapter is None:
+            self._entries.append(entry)
+
+    def asked(self, complete: int) -> None:
+        """Somebody lacks our log from entry `complete` on: many entries are better said at once."""
+        entries = self._entries
+        self._is_asked |= len(entries) >= FEWEST and complete <= entries[-FEWEST].seq
+
+    def due(self, seq: int) -> list[GraphEntry]:
+        """The entries that follow now, from number `seq` on: those of a chapter, most often none.
+
+        Their layers come in the order in which they cease to count; the last one says how many
+        there are.
+        """
+        if len(self._entries) < (FEWEST if self._is_asked else SPAN):
+            return []
+        self._is_asked = False
+        entries, self._entries = self._entries, []
+        first = entries[0].seq
+        lasting, longer, rest = self._sorter.layers(entries)
+        chapters: list[Chapter] = []
+        parts: list[int] = []
+        for number, layer in ((2, rest), (1, longer), (0, lasting)):
+            pieces = list(_pieces(layer, number, first)) if layer or not number else []
+            chapters += [part(piece, number, first, NOT_LAST) for piece in pieces]
+            parts.append(len(pieces))
+        last = chapters[-1]
+        two, one, zero = parts
+        chapters[-1] = Chapter(
+            last.layer,
+            last.first,
+            (two, one, zero),
+            last.models,
+            last.keyframes,
+            last.ranges,
+            last.closures,
+        )
+        return [GraphEntry(seq + k, chapter=chapter) for k, chapter in enumerate(chapters)]
+
+
+def _pieces(layer: Layer, number: int, first: int) -> Iterator[Layer]:
+    """A layer in pieces that each fit a message."""
+    size = len(packed(part(layer, number, first, NOT_LAST)))
+    if size <= MAX_PAYLOAD - ENVELOPE_BYTES:
+        yield layer
+        return
+    for half in layer.halves():
+        yield from _pieces(half, number, first)

@@ -1,0 +1,155 @@
+"""Chapters as bytes: what is packed comes back, and nothing else is taken for a chapter."""
+
+from __future__ import annotations
+
+import random
+import zlib
+from dataclasses import replace
+
+import pytest
+from message_builders import CORRECTED, COVARIANCE
+
+from drslamd.conventions import Chain
+from drslamd.gossip.entries import chapter_packing
+from drslamd.gossip.entries.chapter_packing import packed, unpacked
+from drslamd.slam.graph.measurements import (
+    Chapter,
+    ClosureMeasurement,
+    Keyframe,
+    Placed,
+    RangeMeasurement,
+)
+from drslamd.slam.robot_model import UNTOLD
+
+A, B = Chain(4, 12), Chain(7, 2**62)
+SEQ = 70
+
+
+def ranged(n: int, peer: Chain, metres: float) -> RangeMeasurement:
+    return RangeMeasurement(n, peer, n + 3, (0.125, -0.5), (0.25, 0.0), metres, 0.125, 0.25, -0.5)
+
+
+def seen(number: int, peer: Chain, *, kept: bool = True) -> ClosureMeasurement:
+    pose = (1.5, -2.5, 0.25)
+    return ClosureMeasurement(number, kept, 40, peer, 41, pose, COVARIANCE, CORRECTED)
+
+
+def place(seq: int, at: int = 0) -> int:
+    return 4096 * seq + at
+
+
+SAMPLE = Chapter(
+    layer=0,
+    first=3,
+    parts=(2, 1, 1),
+    models=((5, UNTOLD),),
+    keyframes=(Keyframe(10, 0, -(2**31), 2**31 - 1, 5), Keyframe(2**31 - 2, 9, 0, -1, -7)),
+    ranges=((place(5), ranged(40, A, 3.5)), (place(5, 1), ranged(40, A, 2.25)),
+            (place(4), ranged(40, B, -1.5))),
+    closures=((place(9), seen(8, A)), (place(9, 1), seen(8, A, kept=False))),
+)  # fmt: skip
+
+
+def is_close(one: Chapter, other: Chapter) -> bool:
+    """The same but for sigmas of odometry, which travel as 32-bit numbers."""
+    return replace(one, models=()) == replace(other, models=()) and all(
+        a == b and m.numbers() == pytest.approx(n.numbers())
+        for (a, m), (b, n) in zip(one.models, other.models, strict=True)
+    )
+
+
+def test_what_is_packed_comes_back() -> None:
+    assert is_close(unpacked(packed(SAMPLE), SEQ), SAMPLE)
+    nothing = Chapter(2, 3, (0, 0, 0))
+    assert unpacked(packed(nothing), SEQ) == nothing
+
+
+def test_what_came_back_is_packed_to_the_same_bytes() -> None:
+    assert packed(unpacked(packed(SAMPLE), SEQ)) == packed(SAMPLE)
+
+
+@pytest.mark.parametrize(("seq", "fits"), [(3 + 256, True), (3 + 257, False), (2, False)])
+def test_a_chapter_ends_within_256_entries_of_its_first(seq: int, fits: bool) -> None:
+    data = packed(Chapter(2, 3, (0, 0, 0)))
+    if fits:
+        assert unpacked(data, seq)
+        return
+    with pytest.raises(ValueError, match="first entry"):
+        unpacked(data, seq)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        replace(SAMPLE, layer=3),
+        replace(SAMPLE, layer=1),
+        replace(SAMPLE, parts=(2, 1, 0)),
+        replace(SAMPLE, parts=(-1, 1, 1)),
+        replace(SAMPLE, parts=(60, 6, 2)),
+        replace(SAMPLE, models=((2, UNTOLD),)),
+        replace(SAMPLE, models=((71, UNTOLD),)),
+        replace(SAMPLE, ranges=((place(2, 4095), ranged(40, A, 3.5)),)),
+        replace(SAMPLE, ranges=((place(71), ranged(40, A, 3.5)),)),
+        replace(SAMPLE, ranges=SAMPLE.ranges[::-1]),
+        replace(SAMPLE, ranges=SAMPLE.ranges[:1] * 2),
+        replace(SAMPLE, ranges=((place(5), ranged(-1, A, 3.5)),)),
+        replace(SAMPLE, ranges=((place(5), ranged(40, A, 10_000.5)),)),
+        replace(SAMPLE, ranges=((place(5), replace(ranged(40, A, 1.0), q_a=(32.8, 0.0))),)),
+        replace(SAMPLE, keyframes=(Keyframe(10, 2**15, 0, 0, 0),)),
+        replace(SAMPLE, closures=((place(9), replace(seen(8, A), covariance=(0.0,) * 6)),)),
+    ],
+)
+def test_what_no_robot_could_have_packed_is_refused(wrong: Chapter) -> None:
+    assert not is_close(wrong, SAMPLE)
+    with pytest.raises(ValueError):
+        unpacked(packed(wrong), SEQ)
+
+
+def test_the_largest_number_of_parts_is_that_of_the_entries() -> None:
+    assert unpacked(packed(replace(SAMPLE, parts=(60, 6, 1))), SEQ).parts == (60, 6, 1)
+
+
+def test_bytes_that_swell_or_end_elsewhere_are_refused() -> None:
+    data = packed(SAMPLE)
+    inside = zlib.decompress(data)
+    for wrong in (
+        b"",
+        data + b"x",
+        data[:-1],
+        zlib.compress(inside + b"x"),
+        zlib.compress(inside[:-1]),
+        zlib.compress(bytes(chapter_packing.MAX_UNPACKED + 1)),
+    ):
+        with pytest.raises(ValueError):
+            unpacked(wrong, SEQ)
+
+
+def test_damaged_bytes_give_a_chapter_or_a_value_error_and_nothing_else() -> None:
+    chance, inside = random.Random(1), bytearray(zlib.decompress(packed(SAMPLE)))
+    read = 0
+    for _ in range(2_000):
+        damaged = bytearray(inside)
+        for _ in range(chance.randrange(1, 4)):
+            damaged[chance.randrange(len(damaged))] = chance.randrange(256)
+        try:
+            found = unpacked(zlib.compress(bytes(damaged)), SEQ)
+        except (ValueError, IndexError):
+            continue
+        read += 1
+        assert packed(unpacked(packed(found), SEQ)) == packed(found)
+    assert read > 20
+
+
+def test_a_minute_of_driving_has_a_sixth_of_the_bytes_of_its_entries() -> None:
+    """As 60 entries: 70 bytes of each, and 54 for each of two ranges."""
+    chance = random.Random(2)
+    frames, ranges = [], list[Placed[RangeMeasurement]]()
+    for k in range(60):
+        step = (round(chance.gauss(4_000, 300)), round(chance.gauss(0, 300)), 50)
+        last = frames[-1] if frames else Keyframe(0, 0, 0, 0, 0)
+        frames.append(Keyframe(10 * k, 0, last.x + step[0], last.y + step[1], last.theta + step[2]))
+        near = round(5 + 0.1 * k + chance.gauss(0, 0.1), 4)
+        ranges += [(place(k, at), ranged(10 * k, peer, near)) for at, peer in enumerate((A, B))]
+    ordered = tuple(sorted(ranges, key=lambda placed: (placed[1].peer, placed[0])))
+    chapter = Chapter(2, 0, (0, 0, 0), (), tuple(frames), ordered)
+    assert len(packed(chapter)) < 60 * (70 + 2 * 27 + 20) / 6

@@ -1,0 +1,90 @@
+"""When a robot makes a chapter of its log, and in which messages."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from message_builders import HEADER, an_entry
+
+from drslamd.conventions import Chain
+from drslamd.gossip import messages
+from drslamd.gossip.entries.chapter_writer import ChapterWriter
+from drslamd.gossip.lc02 import MAX_PAYLOAD
+from drslamd.slam.graph.measurements import GraphEntry, Keyframe, RangeMeasurement
+
+
+def busy(seq: int, peers: int) -> GraphEntry:
+    """An entry with a range to each of many peers, no two alike."""
+    chance = random.Random(seq)
+    ranges = tuple(
+        RangeMeasurement(
+            10 * seq, Chain(1 + k, 9), 10 * seq + k, (round(chance.random(), 3), 0.0), (0.0, 0.125),
+            round(chance.uniform(1, 90), 4), 0.125,
+        )
+        for k in range(peers)
+    )  # fmt: skip
+    return GraphEntry(seq, None, (Keyframe(10 * seq, 0, 37 * seq * seq, seq, 0),), ranges)
+
+
+def written(entries: list[GraphEntry]) -> list[GraphEntry]:
+    writer = ChapterWriter()
+    for entry in entries:
+        writer.take(entry)
+    return writer.due(len(entries))
+
+
+@pytest.mark.parametrize(("count", "is_due"), [(63, False), (64, True)])
+def test_a_chapter_is_made_of_64_entries(count: int, is_due: bool) -> None:
+    assert bool(written([an_entry(k, 10 * k) for k in range(count)])) is is_due
+
+
+@pytest.mark.parametrize(
+    ("count", "complete", "is_due"),
+    [(15, 0, False), (16, 0, True), (16, 1, False), (40, 24, True), (40, 25, False)],
+)
+def test_a_chapter_is_made_early_when_somebody_lacks_sixteen_entries(
+    count: int, complete: int, is_due: bool
+) -> None:
+    writer = ChapterWriter()
+    for k in range(count):
+        writer.take(an_entry(k, 10 * k))
+    writer.asked(complete)
+    assert bool(writer.due(count)) is is_due
+
+
+def test_a_chapter_says_all_keyframes_and_its_last_part_says_of_how_many_it_is_made() -> None:
+    said = written([busy(k, 12) for k in range(64)])
+    chapters = [entry.chapter for entry in said if entry.chapter]
+    assert [entry.seq for entry in said] == list(range(64, 64 + len(said)))
+    layers = [chapter.layer for chapter in chapters]
+    assert layers == sorted(layers, reverse=True)
+    assert [any(chapter.parts) for chapter in chapters] == [False] * (len(said) - 1) + [True]
+    assert chapters[-1].parts == tuple(layers.count(layer) for layer in (2, 1, 0))
+    assert all(chapter.first == 0 for chapter in chapters)
+    frames = sorted(k.n for chapter in chapters for k in chapter.keyframes)
+    assert frames == [10 * k for k in range(64)]
+    places = [place for chapter in chapters for place, _ in chapter.ranges]
+    assert sorted(places) == [4096 * k + at for k in range(64) for at in range(12)]
+
+
+def test_each_part_fits_a_message() -> None:
+    said = written([busy(k, 20) for k in range(64)])
+    assert len(said) > 5
+    assert all(len(messages.encode(HEADER, entry)) <= MAX_PAYLOAD for entry in said)
+
+
+def test_robots_that_range_to_nobody_write_one_part() -> None:
+    (entry,) = written([an_entry(k, 10 * k) for k in range(64)])
+    assert entry.chapter is not None
+    assert entry.chapter.parts == (0, 0, 1)
+
+
+def test_chapters_are_not_made_of_chapters() -> None:
+    writer = ChapterWriter()
+    for entry in [busy(k, 3) for k in range(64)]:
+        writer.take(entry)
+    said = writer.due(64)
+    for entry in [*said, *(busy(k, 3) for k in range(64 + len(said), 127 + len(said)))]:
+        writer.take(entry)
+    assert writer.due(200) == []

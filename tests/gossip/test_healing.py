@@ -1,0 +1,45 @@
+"""Teams that fell apart, lost robots or got new ones: how soon all hold the same, and how quietly.
+
+The conversations and figures are those of `lab.healing`, which plays longer cases too.
+"""
+
+from __future__ import annotations
+
+import pytest
+from lab.healing import Conversation, heal, joined, parted, restarted
+
+from drslamd.slam.graph.chapters import SPAN
+
+
+@pytest.mark.parametrize(
+    ("fault", "seconds"), [(parted(1, 2), 15), (joined(1), 15), (restarted(1), 15)]
+)
+def test_a_small_team_heals_soon_and_quietly(fault: object, seconds: int) -> None:
+    found = heal(Conversation(4, seed=2), fault, 60)  # type: ignore[arg-type]
+    assert found.seconds is not None
+    assert found.seconds <= seconds
+    assert found.peak < 3.5
+    assert found.graphs == 1
+
+
+def test_a_newcomer_gets_chapters_and_not_the_whole_log() -> None:
+    talk = Conversation(3, seed=1)
+    talk.seconds(4 * SPAN)
+    said = sum(talk.bytes)
+    talk.join(3)
+    before = sum(talk.bytes)
+    while not talk.is_healed():
+        talk.seconds(1)
+        assert sum(talk.bytes) - before < said / 4
+    log = talk.mates[3].team.logs._logs[0]
+    assert len(log.sealed) < 2 * SPAN < log.end
+    talk.settle()
+    assert len(talk.digests()) == 1
+
+
+def test_a_team_that_loses_a_third_of_its_messages_comes_to_one_graph() -> None:
+    talk = Conversation(4, loss=0.3, seed=3)
+    talk.seconds(2 * SPAN + 40)
+    talk.settle()
+    assert len(talk.digests()) == 1
+    assert not any(mate.team.logs.lacks_any() for mate in talk.mates.values())
