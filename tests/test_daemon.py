@@ -107,8 +107,8 @@ def test_a_result_comes_back_as_an_event_with_its_times(daemon: Daemon, clock: S
 
     async def scene() -> None:
         daemon._perform(Solve(7, "optimizer", run))
-        assert daemon._jobs_waiting == 1
-        await until(lambda: not daemon._jobs_waiting)
+        assert daemon._worker.waiting == 1
+        await until(lambda: not daemon._worker.waiting)
 
     with_worker(daemon, scene)
     (event,) = (event for event in heard if isinstance(event, JobDone))
@@ -127,7 +127,7 @@ def test_what_an_old_robot_had_asked_for_is_not_told_to_the_new_one(daemon: Daem
         await until(lambda: daemon.robot is not old)
         heard.extend(heard_by(daemon))
         may_end.set()
-        await until(lambda: not daemon._jobs_waiting)
+        await until(lambda: not daemon._worker.waiting)
 
     with_worker(daemon, scene)
     assert heard == heard_by_old == []

@@ -47,6 +47,7 @@ PURE_ORDER = RINGS["pure"]
 """Inside the pure ring: each knows only what stands before it."""
 
 SLAM_ORDER = [
+    "headway",
     "se2",
     "chi_squared",
     "range_model",
