@@ -37,12 +37,12 @@ from drslamd.gossip.seal import team_key
 from drslamd.io.clock import Clock, MonotonicClock, cpu_s
 from drslamd.io.pace import Pace
 from drslamd.io.serial_port import SerialPort
-from drslamd.io.sleep_watch import SleepWatch
 from drslamd.io.state_store import StateStore, read_key
 from drslamd.io.status_socket import StatusSocket
 from drslamd.io.systemd import Notifier
 from drslamd.io.wall_clock import read_wall_clock
-from drslamd.io.watchdog import Watchdog, slow_disk
+from drslamd.io.watch.sleep_watch import SleepWatch
+from drslamd.io.watch.watchdog import Watchdog, slow_disk
 from drslamd.io.worker import Finished, Worker
 from drslamd.machine.folders import socket_path, state_dir
 from drslamd.parts import (

@@ -36,6 +36,7 @@ def daemon(tmp_path: Path, clock: Stepped) -> Daemon:
 # the clock
 
 
+@pytest.mark.row("T1")
 def test_the_clock_of_a_daemon_is_one_that_nobody_can_set(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -81,6 +82,7 @@ def test_it_is_woken_when_the_robot_asks_and_asked_again_only_for_another_time(
 
 
 @pytest.mark.parametrize("late_ms", [0, 25])
+@pytest.mark.row("T3")
 def test_how_late_the_loop_was_is_in_the_status(
     daemon: Daemon, clock: Stepped, late_ms: int
 ) -> None:

@@ -16,8 +16,8 @@ from deploy_helpers import example_in
 from drslamd.config import parse
 from drslamd.daemon import Daemon
 from drslamd.events import Effect, Event, JobDone, Save, Solve
-from drslamd.io import watchdog
 from drslamd.io.systemd import Notifier
+from drslamd.io.watch import watchdog
 from drslamd.slam import headway
 
 PERIOD_S = 0.15

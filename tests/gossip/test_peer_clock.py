@@ -87,6 +87,7 @@ def test_equal_delays_both_ways_cancel() -> None:
 
 
 @pytest.mark.parametrize("offset", [0, 5 * SECOND, -5 * SECOND, 100 * DAY, -100 * DAY])
+@pytest.mark.row("T4")
 def test_any_offset_is_found_to_ten_milliseconds_through_jitter(offset: int) -> None:
     talk = Conversation(offset, out=jittering(1 * MS, 20 * MS), back=jittering(1 * MS, 20 * MS))
     talk.talk(20)
@@ -96,6 +97,7 @@ def test_any_offset_is_found_to_ten_milliseconds_through_jitter(offset: int) -> 
 
 @pytest.mark.parametrize(("out", "back"), [(0, 60), (60, 0), (5, 200), (200, 5)])
 @pytest.mark.parametrize("ppm", [-200, -100, 0, 100, 200])
+@pytest.mark.row("T4")
 def test_unequal_delays_and_drift_stay_within_the_claim(out: int, back: int, ppm: int) -> None:
     talk = Conversation(10 * SECOND, ppm, constant(out * MS), constant(back * MS))
     for _ in range(40):

@@ -25,6 +25,7 @@ def test_two_clocks_of_one_host_agree_and_grow() -> None:
     assert clocks[0].now() - read[-1] >= 10_000
 
 
+@pytest.mark.row("T1")
 def test_setting_the_wall_clock_moves_the_clock_by_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -38,6 +39,7 @@ def test_setting_the_wall_clock_moves_the_clock_by_nothing(
 @pytest.mark.parametrize(
     ("ns", "seconds"), [(1_764_000_000_999_999_999, 1_764_000_000), (0, 0), (-1, -1)]
 )
+@pytest.mark.row("T5")
 def test_the_wall_clock_is_read_in_whole_seconds(
     ns: int, seconds: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

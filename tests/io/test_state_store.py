@@ -43,6 +43,7 @@ def test_a_folder_that_cannot_be_written_is_a_fault_that_ends_when_it_can(tmp_pa
     assert store.fault == ""
 
 
+@pytest.mark.row("O2")
 def test_an_interrupted_save_leaves_the_old_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -326,6 +327,7 @@ def altered(way: tuple[Any, ...], value: Any) -> Any:
     return state
 
 
+@pytest.mark.row("O13")
 def test_whatever_one_value_of_the_file_is_the_next_start_begins_and_keeps_what_can_be_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

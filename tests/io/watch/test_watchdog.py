@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from drslamd.io.systemd import Notifier
-from drslamd.io.watchdog import DISK_STUCK_S, STUCK_S, Watchdog, has_bytes, slow_disk
+from drslamd.io.watch.watchdog import DISK_STUCK_S, STUCK_S, Watchdog, has_bytes, slow_disk
 from drslamd.io.worker import Worker
 
 

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from drslamd.io.sleep_watch import SleepWatch
+from drslamd.io.watch.sleep_watch import SleepWatch
 
 S = 1_000_000_000
 MS = 1_000_000
