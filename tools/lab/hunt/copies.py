@@ -18,6 +18,8 @@ from lab.hunt.told import WHERE
 ROOT = Path(__file__).resolve().parents[3]
 PARTS = ("drslamd", "tests", "tools", "etc", "systemd", "pyproject.toml", "README.md")
 PATIENCE_S = 300.0
+MOST_FAILED = 8
+"""Of which one names a row."""
 
 
 class Ran(NamedTuple):
@@ -49,8 +51,10 @@ def copied() -> Iterator[Path]:
         yield folder
 
 
-def ran(folder: Path, tests: Sequence[str], patience_s: float = PATIENCE_S) -> Ran:
-    """Run tests of a copy until some fail; tests that do not end count as failed."""
+def ran(
+    folder: Path, tests: Sequence[str], patience_s: float = PATIENCE_S, most: int = MOST_FAILED
+) -> Ran:
+    """Run tests of a copy until so many fail; tests that do not end count as failed."""
     told = folder / "failed.json"
     told.unlink(missing_ok=True)
     paths = os.pathsep.join(str(folder / part) for part in (".", "tools"))
@@ -61,7 +65,15 @@ def ran(folder: Path, tests: Sequence[str], patience_s: float = PATIENCE_S) -> R
         "OPENBLAS_NUM_THREADS": "1",
         WHERE: str(told),
     }
-    options = ["--maxfail=8", "-q", "-p", "lab.hunt.told", "-p", "no:cacheprovider", "--no-header"]
+    options = [
+        f"--maxfail={most}",
+        "-q",
+        "-p",
+        "lab.hunt.told",
+        "-p",
+        "no:cacheprovider",
+        "--no-header",
+    ]
     command = [sys.executable, "-m", "pytest", *options, *tests]
     try:
         done = subprocess.run(
