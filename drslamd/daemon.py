@@ -27,6 +27,7 @@ from drslamd.events import (
     Save,
     SaveDone,
     Send,
+    Slept,
     Solve,
     Stop,
     Tick,
@@ -40,6 +41,8 @@ from drslamd.io.state_store import StateStore, read_key
 from drslamd.io.status_socket import StatusSocket
 from drslamd.io.systemd import Notifier
 from drslamd.io.wall_clock import read_wall_clock
+from drslamd.io.watch.sleep_watch import SleepWatch
+from drslamd.io.watch.watchdog import Watchdog, slow_disk
 from drslamd.io.worker import Finished, Worker
 from drslamd.machine.folders import socket_path, state_dir
 from drslamd.parts import (
@@ -52,10 +55,9 @@ from drslamd.parts import (
 from drslamd.recording.records import Beginning
 from drslamd.reports import graph_report
 from drslamd.robot import Robot
+from drslamd.slam import headway
 from drslamd.slam.calibration.sensor_calibration import SensorCalibration
 
-JOB_STUCK_US = 20 * SECOND_US
-"""A computation that takes longer is no progress, and the watchdog is not fed."""
 RESTARTS_APART_US = 30 * SECOND_US
 """Between two restarts in one process, twice as long after each: a robot that is lied to about its
 own past still has a present."""
@@ -100,9 +102,10 @@ class Daemon:
         }
         self._status = StatusSocket(socket_path(config), questions)
         self._notifier = Notifier()
-        self._worker = Worker()
-        self._jobs_waiting = 0
-        self._solver_moved = 0
+        self._worker, self._disk = Worker(headway.marks), Worker()
+        readers = (self._uwb, self._wheels, self._transport)
+        self._watchdog = Watchdog(self._notifier, self._worker, readers, self._is_ticking)
+        self._sleep = SleepWatch()
         self._timer: asyncio.TimerHandle | None = None
         self._due = 0
         self._stop = asyncio.Event()
@@ -127,6 +130,7 @@ class Daemon:
             )
         )
         self._worker.start()
+        self._disk.start()
         self._recorder.start()
         log.info("daemon.start", robot=self._config.robot.id, epoch=self.robot.own.epoch)
         if self._config.team.insecure:
@@ -155,8 +159,11 @@ class Daemon:
         """One event in, its effects carried out; an exception is our bug and ends the daemon."""
         if self._failure is not None:
             return
-        for effect in self._answers(event):
-            self._perform(effect)
+        slept_us = self._sleep.slept_us()
+        first = [Slept(self._clock.now(), slept_us)] if slept_us else []
+        for each in (*first, event):
+            for effect in self._answers(each):
+                self._perform(effect)
         self._wake()
 
     def _new_robot(self, epoch: int, epochs: dict[int, int], kept: SensorCalibration) -> Robot:
@@ -198,14 +205,9 @@ class Daemon:
         self._wheels.write(effect.data)
 
     def _solve(self, effect: Solve) -> None:
-        robot, now = self.robot, self._clock.now()
-        if not self._jobs_waiting:
-            self._solver_moved = now
-        self._jobs_waiting += 1
+        robot = self.robot
 
         def done(finished: Finished) -> None:
-            self._jobs_waiting -= 1
-            self._solver_moved = self._clock.now()
             if finished.error is not None:
                 raise finished.error
             if robot is self.robot:
@@ -229,7 +231,7 @@ class Daemon:
                 raise finished.error
             self._succeed(old, finished.result)
 
-        self._worker.submit(partial(self._store.begin, old.memory.state(), effect.above), done)
+        self._disk.submit(partial(self._store.begin, old.memory.state(), effect.above), done)
 
     def _succeed(self, old: Robot, epoch: int) -> None:
         """Begin again under a new epoch; ports and network stay as they are."""
@@ -240,7 +242,7 @@ class Daemon:
         self.handle(SaveDone(self._clock.now(), self._store.fault))
 
     def _save(self, effect: Save) -> None:
-        # a sync can take a tenth of a second on an SD card; the worker has the patience
+        # a sync can take seconds on an SD card; neither the loop nor a solve waits for it
         if self.robot is self._ends:
             return  # the epoch of its successor is on the disk, or will be
 
@@ -249,7 +251,7 @@ class Daemon:
                 raise finished.error
             self.handle(SaveDone(self._clock.now(), self._store.fault))
 
-        self._worker.submit(partial(self._store.save, effect.state), done)
+        self._disk.submit(partial(self._store.save, effect.state), done)
 
     # life
 
@@ -274,16 +276,18 @@ class Daemon:
         self._stop.set()
 
     async def _feed_watchdog(self) -> None:
-        """A sign of life only when the loop, the robot's timers and the solver all moved."""
-        period = self._notifier.watchdog_s or 10.0
         while True:
-            await asyncio.sleep(period / 3)
-            now = self._clock.now()
-            ticking = now - self.robot.next_tick < SECOND_US
-            stuck = self._jobs_waiting > 0 and now - self._solver_moved > JOB_STUCK_US
-            if ticking and not stuck:
-                self._notifier.alive()
+            await asyncio.sleep(self._watchdog.every_s)
+            self._watchdog.look()
             self._notifier.status(self._one_line())
+
+    def _is_ticking(self) -> bool:
+        return self._clock.now() - self.robot.next_tick < SECOND_US
+
+    def _complaints(self) -> list[str]:
+        """What only the process knows to be wrong."""
+        slow = slow_disk(self._disk)
+        return [*([slow] if slow else []), *self._recorder.problems()]
 
     def _picture(self) -> dict[str, Any]:
         """The robot's own picture, and what only the process knows."""
@@ -291,7 +295,7 @@ class Daemon:
         picture["network"]["dropped"] = self._transport.dropped
         picture["cpu_s"] = round(cpu_s(), 3)
         picture["recording"] = self._recorder.status()
-        picture["problems"] += self._recorder.problems()
+        picture["problems"] += self._complaints()
         return {**picture, "ms": self._pace.milliseconds(), "loop_lag_ms": self._pace.lag()}
 
     def _paths(self) -> dict[str, Any]:
@@ -306,7 +310,7 @@ class Daemon:
     def _one_line(self) -> str:
         picture = report.status(self.robot, self._clock.now())
         alive = sum(peer["alive"] for peer in picture["peers"].values())
-        problems = "; ".join(picture["problems"] + self._recorder.problems())
+        problems = "; ".join(picture["problems"] + self._complaints())
         return f"{picture['pose']['state']}, {alive} peers" + (f"; {problems}" if problems else "")
 
     async def _end(self, tasks: list[asyncio.Task[None]]) -> None:
@@ -325,6 +329,7 @@ class Daemon:
         await self._status.close()
         await self._recorder.close()
         self._worker.stop()
+        self._disk.stop()
         log.info("daemon.stop", robot=self._config.robot.id)
 
 

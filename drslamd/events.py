@@ -94,6 +94,14 @@ class Tick:
 
 
 @dataclass(frozen=True)
+class Slept:
+    """The computer was asleep for so long, until now; what comes next may have waited meanwhile."""
+
+    utime: int
+    asleep_us: int
+
+
+@dataclass(frozen=True)
 class JobDone:
     """The result of a `Solve` effect."""
 
@@ -126,6 +134,7 @@ Event = Union[
     ChannelMessage,
     NetworkState,
     Tick,
+    Slept,
     JobDone,
     SaveDone,
     Stop,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from drslamd.events import JobDone, Solve
 from drslamd.slam.consistency.pair import PairTracker
@@ -30,6 +30,18 @@ class Job:
     module: str
     pair: PairTracker | None = None
     request: WindowRequest | None = None
+
+    def tell_pair(self, result: Any) -> bool:
+        """Give a pair what was found for it; False where it is not about one pair."""
+        if self.pair is None:
+            return False
+        if self.request is None:
+            self.pair.on_check(result)
+        elif self.module == WHAT_IF:
+            self.pair.on_costs(self.request, *result)
+        else:
+            self.pair.on_estimate(self.request, result)
+        return True
 
 
 class DutyCycle(NamedTuple):

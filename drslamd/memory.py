@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from drslamd.conventions import Chain
-from drslamd.events import Save
+from drslamd.events import Effect, Save, SaveDone
 from drslamd.gossip.epochs import kept_epochs
 from drslamd.gossip.seal import Seal
 from drslamd.slam.calibration.calibration_store import CalibrationStore
@@ -35,3 +35,8 @@ class Memory:
         self._calibration.on_saved()
         self._saved_epochs = dict(self._seal.epochs)
         return [Save(self.state())]
+
+    def on_saved(self, done: SaveDone) -> list[Effect]:
+        """What was to be kept is kept, or cannot be."""
+        self.fault = done.fault
+        return []

@@ -37,6 +37,7 @@ from drslamd.events import (
     SaveDone,
     Send,
     SerialData,
+    Slept,
     Stop,
     Tick,
     Write,
@@ -114,6 +115,7 @@ class Robot:
         self.health = Health()
         self.ports: dict[str, PortState] = {}
         self.network: NetworkState | None = None
+        self.slept: Slept | None = None
         self.jobs = Jobs()
         self.timers = Timers(self._periods())
         self.memory = Memory(self.own, self.team.seal, self.calibration)
@@ -125,8 +127,9 @@ class Robot:
             ChannelMessage: self._on_message,
             NetworkState: self._on_network,
             Tick: self._on_tick,
+            Slept: self._on_slept,
             JobDone: self._on_job,
-            SaveDone: self._on_saved,
+            SaveDone: self.memory.on_saved,
             Stop: self._on_stop,
         }
 
@@ -291,15 +294,7 @@ class Robot:
         return [*effects, *self.broadcast.public(exchange.answers(utime, at_rest), utime)]
 
     def _on_job(self, event: JobDone) -> list[Effect]:
-        job = self.jobs.finish(event)
-        if job.module == WHAT_IF and job.pair is not None and job.request is not None:
-            job.pair.on_costs(job.request, *event.result)
-            return []
-        if job.pair is not None and job.request is not None:
-            job.pair.on_estimate(job.request, event.result)
-            return []
-        if job.pair is not None:
-            job.pair.on_check(event.result)
+        if self.jobs.finish(event).tell_pair(event.result):
             return []
         said = self.back.on_solution(event.result, event.utime)
         public = self.broadcast.public(said, event.utime)
@@ -335,12 +330,15 @@ class Robot:
         due = self.timers.take_due(event.utime)
         return [effect for action in due for effect in action(event.utime)]
 
+    def _on_slept(self, event: Slept) -> list[Effect]:
+        """Nothing was seen meanwhile, and the clocks of the others may have gone elsewhere."""
+        self.slept = event
+        self.front.interrupt()
+        self.team.begin_clocks_again(event.utime)
+        return self._check_health(event.utime)
+
     def _save(self, utime: int) -> list[Effect]:
         return list(self.memory.save())
-
-    def _on_saved(self, event: SaveDone) -> list[Effect]:
-        self.memory.fault = event.fault
-        return []
 
     def _on_stop(self, event: Stop) -> list[Effect]:
         state = self.whereabouts(event.utime).state

@@ -36,6 +36,7 @@ def daemon(tmp_path: Path, clock: Stepped) -> Daemon:
 # the clock
 
 
+@pytest.mark.row("T1")
 def test_the_clock_of_a_daemon_is_one_that_nobody_can_set(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -81,6 +82,7 @@ def test_it_is_woken_when_the_robot_asks_and_asked_again_only_for_another_time(
 
 
 @pytest.mark.parametrize("late_ms", [0, 25])
+@pytest.mark.row("T3")
 def test_how_late_the_loop_was_is_in_the_status(
     daemon: Daemon, clock: Stepped, late_ms: int
 ) -> None:
@@ -107,8 +109,8 @@ def test_a_result_comes_back_as_an_event_with_its_times(daemon: Daemon, clock: S
 
     async def scene() -> None:
         daemon._perform(Solve(7, "optimizer", run))
-        assert daemon._jobs_waiting == 1
-        await until(lambda: not daemon._jobs_waiting)
+        assert daemon._worker.waiting == 1
+        await until(lambda: not daemon._worker.waiting)
 
     with_worker(daemon, scene)
     (event,) = (event for event in heard if isinstance(event, JobDone))
@@ -127,7 +129,7 @@ def test_what_an_old_robot_had_asked_for_is_not_told_to_the_new_one(daemon: Daem
         await until(lambda: daemon.robot is not old)
         heard.extend(heard_by(daemon))
         may_end.set()
-        await until(lambda: not daemon._jobs_waiting)
+        await until(lambda: not daemon._worker.waiting)
 
     with_worker(daemon, scene)
     assert heard == heard_by_old == []

@@ -98,7 +98,7 @@ def test_the_epoch_of_a_restart_is_on_disk_too_and_the_old_robot_overwrites_it_w
     old, may_end = daemon.robot, threading.Event()
 
     async def scene() -> None:
-        daemon._worker.submit(lambda: may_end.wait(10), lambda finished: None)
+        daemon._disk.submit(lambda: may_end.wait(10), lambda finished: None)
         daemon._perform(Restart(old.own.epoch, "test"))
         daemon._perform(Save(old.memory.state()))
         assert daemon.robot is old  # the worker has not come to it

@@ -47,6 +47,7 @@ PURE_ORDER = RINGS["pure"]
 """Inside the pure ring: each knows only what stands before it."""
 
 SLAM_ORDER = [
+    "headway",
     "se2",
     "chi_squared",
     "range_model",
@@ -238,6 +239,7 @@ def test_no_name_stands_for_two_things() -> None:
 
 
 @pytest.mark.parametrize("path", modules(), ids=name_of)
+@pytest.mark.row("T1")
 def test_the_inner_rings_touch_no_clock_no_socket_no_file(path: Path) -> None:
     part = part_of(name_of(path))
     if part is None or ring_of(part) > list(RINGS).index("pure"):

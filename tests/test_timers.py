@@ -60,6 +60,7 @@ def test_an_action_that_comes_a_little_late_keeps_its_rhythm() -> None:
 @pytest.mark.parametrize(
     ("late", "next_due"), [(100, 200), (101, 301), (10 * SECOND_US, 10 * SECOND_US + 200)]
 )
+@pytest.mark.row("T3")
 def test_after_more_than_a_period_an_action_starts_afresh_instead_of_catching_up(
     late: int, next_due: int
 ) -> None:

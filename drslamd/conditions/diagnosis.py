@@ -9,7 +9,7 @@ from drslamd.conditions import contradictions
 from drslamd.conditions.ports import port_cause, port_remedy
 from drslamd.config import Config, SerialWheelSection
 from drslamd.conventions import SECOND_US
-from drslamd.events import NetworkState, Port, PortCondition, PortState
+from drslamd.events import NetworkState, Port, PortCondition, PortState, Slept
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.team import Team
 from drslamd.jobs import OPTIMIZER, RELATIVE_POSE, DutyCycle, Jobs
@@ -27,6 +27,9 @@ from drslamd.whereabouts import Whereabouts
 
 PATIENCE_US = 3 * SECOND_US
 """How long an open port may be silent before that is worth a word."""
+
+SLEEP_TOLD_US = 60 * SECOND_US
+"""How long it is said that the computer was asleep: by then windows have been measured anew."""
 
 LATE = 2
 """A module that runs half as often as it should is worth a word."""
@@ -50,6 +53,7 @@ class Stages(Protocol):
     outbox: Outbox
     ports: dict[str, PortState]
     network: NetworkState | None
+    slept: Slept | None
     memory: Memory
     jobs: Jobs
 
@@ -64,6 +68,7 @@ def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
     yield "wheels", _sensor(robot, "wheels", robot.wheels.advice, utime)
     network = robot.network
     yield "network", None if network is None or network.up else network.detail
+    yield "sleep", _sleep(robot.slept, utime)
     yield from robot.team.conditions(utime)
     yield "pose", why_not_localised(robot, utime)
     doubt = robot.whereabouts(utime).doubt
@@ -87,6 +92,16 @@ def _sensor(
         is_serial = name == "uwb" or isinstance(robot.config.wheels, SerialWheelSection)
         return f"{cause}; {port_remedy(name, state.condition, is_serial)}"
     return advice(utime) if utime - state.utime > PATIENCE_US else None
+
+
+def _sleep(slept: Slept | None, utime: int) -> str | None:
+    if slept is None or utime - slept.utime > SLEEP_TOLD_US:
+        return None
+    seconds = slept.asleep_us / SECOND_US
+    return (
+        f"the computer was asleep for {seconds:.0f} s: clocks and windows begin anew; switch off "
+        "suspend on a robot"
+    )
 
 
 def _load(robot: Stages, utime: int) -> str | None:

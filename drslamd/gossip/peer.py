@@ -189,6 +189,7 @@ class Peer:
             offset.us if offset is not None and known else None,
             of_us.heard.wanted_n if of_us else NOTHING_WANTED,
             of_us.utime if of_us else utime,
+            self.clock.since,
         )
 
 

@@ -28,6 +28,15 @@ RADIO_UNCERTAINTY_US = 3 * MILLISECOND_US
 """LinkTrack stamps in whole milliseconds, on both sides, plus the serial lines' least delay."""
 RADIO_FRESH_US = 5 * SECOND_US
 
+JUMP_US = 50 * MILLISECOND_US
+"""Both ways together that much less than no time at all: one of both clocks has jumped, or stood
+while its computer slept. Drift and all that is late here come to a third of it."""
+LATE_US = 250 * MILLISECOND_US
+"""Two messages in a row that much later than the fastest: is it the network, or did a clock jump?
+Until that is known, all of it is claimed ..."""
+VERY_LATE_US = SECOND_US
+"""... and after one message that is so late, until the next one comes."""
+
 
 @dataclass(frozen=True)
 class Offset:
@@ -39,27 +48,63 @@ class Offset:
 
 
 class PeerClock:
-    """One peer's clock against ours."""
+    """One peer's clock against ours.
+
+    Attributes:
+        since: from when on our clock the offset holds: either clock jumped before, us.
+    """
 
     def __init__(self) -> None:
+        self.since = 0
         self._smallest: deque[tuple[int, int]] = deque()
         """(second, smallest arrival - stamp in it), at most `WINDOW_S` of them."""
+        self._last_two: deque[int] = deque(maxlen=2)
+        self._arrived = 0
         self._echo: tuple[int, int] | None = None
         self._radio: tuple[int, int] | None = None
 
     def on_message(self, sent: int, arrived: int) -> None:
         """A message straight from the peer: its stamp, and its arrival on our clock."""
         second, value = arrived // SECOND_US, arrived - sent
+        self._last_two.append(value)
         if self._smallest and self._smallest[-1][0] == second:
             value = min(value, self._smallest.pop()[1])
         self._smallest.append((second, value))
         while self._smallest[0][0] <= second - WINDOW_S:
             self._smallest.popleft()
+        self._arrived = arrived
+        self._notice_jump()
 
     def echoed(self, echo: tuple[int, int] | None) -> None:
         """The peer's own smallest (arrival there - our stamp), and when it said so; None when it
         does not hear us."""
         self._echo = echo
+        self._notice_jump()
+
+    def begin_again(self, utime: int) -> None:
+        """Our own clock may have jumped: nothing that was known holds any more."""
+        self._smallest.clear()
+        self._last_two.clear()
+        self._echo = self._radio = None
+        self.since = utime
+
+    def _notice_jump(self) -> None:
+        """Begin again with the last message where both ways take less than no time; what the peer
+        said is older than the jump where they still do."""
+        if not self._contradicts_itself():
+            return
+        self.since = self._arrived
+        self._smallest = deque([(self._arrived // SECOND_US, self._last_two[-1])])
+        if self._contradicts_itself():
+            self._echo = None
+
+    def _contradicts_itself(self) -> bool:
+        incoming = self.delay_us
+        return (
+            self._echo is not None
+            and incoming is not None
+            and (self._echo[0] + incoming < -JUMP_US)
+        )
 
     def radio(self, own_minus_system: int, peer_minus_system: int, utime: int) -> None:
         """Both clocks against LinkTrack's system_time, each modulo its period."""
@@ -75,15 +120,23 @@ class PeerClock:
         incoming = self.delay_us
         if incoming is None:
             return None
+        late = self._lateness(incoming)
         if self._echo is None:
-            return Offset(-incoming, ONE_WAY_UNCERTAINTY_US, "one way")
+            return Offset(-incoming, ONE_WAY_UNCERTAINTY_US + late, "one way")
         echo, said = self._echo
         radio = self._by_radio(-incoming, echo, utime)
-        if radio is not None:
+        if radio is not None and not late:
             return Offset(radio, RADIO_UNCERTAINTY_US, "LinkTrack system_time")
         # both ways together take no less than no time: what is below that is as wrong as it says
         uncertainty = abs(echo + incoming) // 2 + DRIFT_US + max(0, utime - said) // AGEING
+        uncertainty += late
         return Offset((echo - incoming) // 2, uncertainty, "messages")
+
+    def _lateness(self, smallest: int) -> int:
+        """How much later than the smallest the last messages came, where that is odd."""
+        both = min(self._last_two) - smallest
+        last = self._last_two[-1] - smallest
+        return last if last >= VERY_LATE_US else both if both >= LATE_US else 0
 
     def _by_radio(self, least: int, most: int, utime: int) -> int | None:
         """The offset by system_time, if it lies where the messages say that it must."""

@@ -321,6 +321,11 @@ class Team:
             if own_minus_system is not None and known and peer.is_alive(utime):
                 peer.clock.radio(own_minus_system, theirs, utime)
 
+    def begin_clocks_again(self, utime: int) -> None:
+        """Our own clock may have jumped."""
+        for peer in self.peers.values():
+            peer.clock.begin_again(utime)
+
     def conditions(self, utime: int) -> list[tuple[str, str | None]]:
         """What is wrong with the conversation, by key, in sentences with a remedy."""
         out: list[tuple[str, str | None]] = []

@@ -35,17 +35,27 @@ def require_python_can() -> None:
 
 
 class CanBus:
-    """Feeds frames, and each change of the bus's state, into `deliver`."""
+    """Feeds frames, and each change of the bus's state, into `deliver`.
+
+    Attributes:
+        reads: how often it has read since the start.
+    """
 
     def __init__(self, section: CanSection, clock: Clock, deliver: Callable[[Event], None]) -> None:
         self._section = section
         self._clock = clock
         self._deliver = deliver
         self._last_state: tuple[PortCondition, str] | None = None
+        self._read_from = -1
+        self.reads = 0
 
     @property
     def name(self) -> str:
         return _name(self._section)
+
+    def descriptor(self) -> int:
+        """Of the open bus; -1 where it is closed or has none."""
+        return self._read_from
 
     async def run(self) -> None:
         """Open, read until it fails, wait, again; ends only by cancellation."""
@@ -80,6 +90,7 @@ class CanBus:
         failed: asyncio.Future[Exception] = loop.create_future()
 
         def ready() -> None:
+            self.reads += 1
             received = _receive(bus, 0.0)
             if not isinstance(received, Exception):
                 self._take(received)
@@ -87,9 +98,11 @@ class CanBus:
                 failed.set_result(received)
 
         loop.add_reader(descriptor, ready)
+        self._read_from = descriptor
         try:
             return await failed
         finally:
+            self._read_from = -1
             loop.remove_reader(descriptor)
 
     async def _read_in_a_thread(self, bus: can.BusABC) -> Exception:

@@ -43,6 +43,7 @@ class Liblcm:
 
     Attributes:
         dropped: messages that liblcm did not take, since the start.
+        reads: how often it has read since the start.
     """
 
     def __init__(
@@ -54,7 +55,7 @@ class Liblcm:
         self._lcm: Any = None
         self._failed = asyncio.Event()
         self._last_state: tuple[bool, str] | None = None
-        self.dropped = 0
+        self.dropped = self.reads = 0
 
     async def run(self) -> None:
         """Join, receive, join again."""
@@ -67,6 +68,10 @@ class Liblcm:
                 await backoff.wait()
         finally:
             self._close()
+
+    def descriptor(self) -> int:
+        """Of what liblcm reads from, or -1."""
+        return -1 if self._lcm is None else int(self._lcm.fileno())
 
     def send(self, channel: str, payload: bytes) -> None:
         """Publish without waiting."""
@@ -104,6 +109,7 @@ class Liblcm:
         return instance
 
     def _handle(self) -> None:
+        self.reads += 1
         try:
             self._lcm.handle()
         except OSError as error:

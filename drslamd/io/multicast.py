@@ -44,6 +44,7 @@ class Multicast:
 
     Attributes:
         dropped: messages that the network did not take, since the start.
+        reads: how often it has read since the start.
     """
 
     def __init__(
@@ -59,7 +60,7 @@ class Multicast:
         self._failed = asyncio.Event()
         self._backoff = Backoff()
         self._last_state: tuple[bool, str] | None = None
-        self.dropped = 0
+        self.dropped = self.reads = 0
 
     async def run(self) -> None:
         """Join, watch, join again."""
@@ -70,6 +71,10 @@ class Multicast:
                 await self._backoff.wait()
         finally:
             self._close()
+
+    def descriptor(self) -> int:
+        """Of the open socket, or -1."""
+        return -1 if self._socket is None else self._socket.fileno()
 
     def send(self, channel: str, payload: bytes) -> None:
         """Publish without waiting."""
@@ -115,6 +120,7 @@ class Multicast:
                     self._fail(f"own messages do not come back on {self._where}; joining again")
 
     def _read(self) -> None:
+        self.reads += 1
         for _ in range(DATAGRAMS_AT_ONCE):
             if self._socket is None:
                 return

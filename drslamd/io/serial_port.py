@@ -56,7 +56,11 @@ def _is_of_terminals(error: OSError) -> bool:
 
 
 class SerialPort:
-    """Feeds what it reads, and each change of its state, into `deliver`."""
+    """Feeds what it reads, and each change of its state, into `deliver`.
+
+    Attributes:
+        reads: how often it has read since the start.
+    """
 
     def __init__(
         self, port: Port, path: str, baud: int, clock: Clock, deliver: Callable[[Event], None]
@@ -68,6 +72,7 @@ class SerialPort:
         self._deliver = deliver
         self._line: serial.Serial | None = None
         self._lost = asyncio.Event()
+        self.reads = 0
         self._last_state: tuple[PortCondition, str] | None = None
 
     async def run(self) -> None:
@@ -82,6 +87,10 @@ class SerialPort:
                 await backoff.wait()
         finally:
             self._close()
+
+    def descriptor(self) -> int:
+        """Of the open port, or -1."""
+        return -1 if self._line is None or self._lost.is_set() else self._line.fileno()
 
     def write(self, data: bytes) -> None:
         """Send without waiting; what a full or dead line does not take is dropped."""
@@ -107,6 +116,7 @@ class SerialPort:
 
     def _read(self) -> None:
         assert self._line is not None
+        self.reads += 1
         try:
             data = os.read(self._line.fileno(), READ_BYTES)
         except BlockingIOError:

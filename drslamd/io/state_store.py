@@ -53,7 +53,7 @@ class StateStore:
             return {}
         if not isinstance(state, dict) or state.get("schema") != SCHEMA:
             self.fault = f"{self.path} was written by another version; starting afresh"
-            return {}
+            return _of_any_version(state)
         if not is_sound(state):
             self.fault = f"{self.path} is damaged; starting afresh"
             return {}
@@ -106,6 +106,16 @@ class StateStore:
 def cannot_write(path: Path, reason: str) -> str:
     """What is said of a state that cannot be kept."""
     return f"cannot write {path}: {reason}"
+
+
+def _of_any_version(state: Any) -> dict[str, Any]:
+    """What every version keeps alike: numbers of starts, where they are believable.
+
+    So neither an older nor a newer program in the place of this one uses a number twice.
+    """
+    fields = state if isinstance(state, dict) else {}
+    starts = {key: fields[key] for key in ("epoch", "epochs") if key in fields}
+    return starts if is_sound(starts) else {}
 
 
 def is_sound(state: Mapping[str, Any]) -> bool:

@@ -10,12 +10,17 @@ class Transport(Protocol):
 
     Attributes:
         dropped: messages that the network did not take.
+        reads: how often it has read.
     """
 
     dropped: int
+    reads: int
 
     async def run(self) -> None:
         """Join, receive, join again after a fault; ends only by cancellation."""
+
+    def descriptor(self) -> int:
+        """What it reads from; -1 while there is nothing to read from."""
 
     def send(self, channel: str, payload: bytes) -> None:
         """Publish without waiting; what the network does not take is dropped and counted."""

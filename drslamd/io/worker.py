@@ -25,9 +25,21 @@ class Finished:
 
 
 class Worker:
-    """Runs one computation after the other and reports each to the loop."""
+    """Runs one computation after the other and reports each to the loop.
 
-    def __init__(self) -> None:
+    Attributes:
+        waiting: computations that have not ended.
+    """
+
+    def __init__(self, marks: Callable[[], int] = lambda: 0) -> None:
+        """
+        Args:
+            marks: a number that is another one after each step of a computation.
+        """
+        self._marks = marks
+        self.waiting = 0
+        self._moved_at = 0.0
+        self._seen = 0
         self._queue: queue.SimpleQueue[tuple[Callable[[], Any], Callable[[Finished], None]] | None]
         self._queue = queue.SimpleQueue()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -39,7 +51,26 @@ class Worker:
 
     def submit(self, run: Callable[[], Any], done: Callable[[Finished], None]) -> None:
         """Compute `run()` in the thread, then call `done` in the loop."""
-        self._queue.put((run, done))
+        if not self.waiting:
+            self._moved_at = time.monotonic()
+        self.waiting += 1
+
+        def ended(finished: Finished) -> None:
+            self.waiting -= 1
+            self._moved_at = time.monotonic()
+            done(finished)
+
+        self._queue.put((run, ended))
+
+    def stuck_s(self) -> float:
+        """How long it has had work and made no headway, s: nothing ended, and no step of a solver.
+
+        Ask once in a while: a step counts from when it is seen.
+        """
+        now, made = time.monotonic(), self._marks()
+        if made != self._seen:
+            self._seen, self._moved_at = made, now
+        return now - self._moved_at if self.waiting else 0.0
 
     def stop(self) -> None:
         """The thread ends after what it has been given; nobody waits for that."""

@@ -24,6 +24,7 @@ from drslamd.events import (
     SaveDone,
     Send,
     SerialData,
+    Slept,
     Stop,
     Tick,
 )
@@ -139,6 +140,8 @@ class Decoder:
             return PortState(utime, cast(Port, content["port"]), condition, content["detail"])
         if kind == "network":
             return NetworkState(utime, content["up"], content["detail"])
+        if kind == "slept":
+            return Slept(utime, int(content["asleep_us"]))
         if kind == "saved":
             return SaveDone(utime, content["fault"])
         if kind == "stop":

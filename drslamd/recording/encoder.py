@@ -25,6 +25,7 @@ from drslamd.events import (
     SaveDone,
     Send,
     SerialData,
+    Slept,
     Tick,
 )
 from drslamd.gossip import lc02
@@ -121,6 +122,8 @@ class Encoder:
             return self._text(utime, "port", state)
         if isinstance(event, NetworkState):
             return self._text(utime, "network", {"up": event.up, "detail": event.detail})
+        if isinstance(event, Slept):
+            return self._text(utime, "slept", {"asleep_us": event.asleep_us})
         if isinstance(event, SaveDone):
             return self._text(utime, "saved", {"fault": event.fault})
         return self._text(utime, "stop", {})

@@ -109,6 +109,10 @@ class FrontEnd:
     def on_motion(self, motion: Motion) -> None:
         self.reckoning.add(self._known.corrected(motion))
 
+    def interrupt(self) -> None:
+        """Nobody watched for a while: no window spans it."""
+        self.reckoning.interrupt()
+
     def on_range(self, sample: RangeSample) -> None:
         if sample.peer_uwb_id not in self.ranges:
             if len(self.ranges) >= MAX_UWB_IDS and not self._forget_silent(sample.utime):
@@ -150,7 +154,8 @@ class FrontEnd:
             is_fresh = ranges is not None and ranges.is_fresh(utime, RANGES_FRESH_US)
             if is_fresh and data is not None and peer.ahead_us is not None:
                 assert ranges is not None
-                partners[peer.chain.robot] = Partner(data, peer.ahead_us, ranges)
+                known = Partner(data, peer.ahead_us, ranges, peer.clocks_since_us)
+                partners[peer.chain.robot] = known
         if own is not None:
             self.watch.look(estimate, PairEnd(self.reckoning.track, own), partners, utime)
 
@@ -197,7 +202,8 @@ class FrontEnd:
             pair = self.pairs.get(peer.chain.robot)
             if pair is not None and pair.peer == peer.chain and peer.ahead_us is not None:
                 a = PairEnd(self.reckoning.track, graph.chains[self.own.robot])
-                b = PairEnd(peer.track, graph.chains[peer.chain.robot], peer.ahead_us)
+                data, since = graph.chains[peer.chain.robot], peer.clocks_since_us
+                b = PairEnd(peer.track, data, peer.ahead_us, since)
                 out.append(Measurable(pair, a, b))
         return out
 

@@ -19,6 +19,7 @@ class PeerInRange:
         ahead_us: its clock minus ours; None while that is not known well enough.
         wanted_n: first sample of our odometry that it lacked and needed when it last said so, at
             wanted_at, us; -1 when it needs none.
+        clocks_since_us: from when on our clock that holds; either clock jumped before.
     """
 
     chain: Chain
@@ -28,3 +29,4 @@ class PeerInRange:
     ahead_us: int | None
     wanted_n: int = -1
     wanted_at: int = 0
+    clocks_since_us: int = 0

@@ -38,11 +38,16 @@ LATE_US = 2_500_000
 
 
 class Partner(NamedTuple):
-    """A robot in range: what its log says, its clock minus ours, us, and the ranges to it."""
+    """A robot in range: what its log says, its clock minus ours, us, and the ranges to it.
+
+    Attributes:
+        since_us: from when on our clock that difference holds.
+    """
 
     data: ChainData
     ahead_us: int
     ranges: RangeBuffer
+    since_us: int = 0
 
 
 class _End(NamedTuple):
@@ -153,6 +158,8 @@ def _newest(own: PairEnd, partner: Partner, utime: int) -> tuple[int, int] | Non
     n = int(keyframes.n[-1])
     said_at = n * GRID_US - partner.ahead_us
     stands = utime - said_at > LATE_US
+    if said_at < partner.since_us:
+        return None
     when = own.last_us if stands else said_at
     return (n, when) if own.first_us <= when <= own.last_us else None
 

@@ -30,6 +30,7 @@ def test_what_is_well_and_was_well_is_no_news() -> None:
 
 
 @pytest.mark.parametrize(("after_us", "said"), [(REPEAT_US - 1, False), (REPEAT_US, True)])
+@pytest.mark.row("O11")
 def test_what_lasts_is_said_again_once_a_minute(after_us: int, said: bool) -> None:
     assert REPEAT_US == 60 * SECOND_US
     health = Health()
@@ -96,6 +97,7 @@ def test_causes_stand_before_what_follows_from_them_and_each_says_since_when() -
     assert ages["team.own_id_used"] == 7 * SECOND_US
 
 
+@pytest.mark.row("O11")
 def test_there_is_an_end_to_how_many_are_held() -> None:
     health = Health()
     for k in range(MAX_CONDITIONS):

@@ -90,6 +90,7 @@ def test_the_spy_sees_what_a_good_configuration_opens(tmp_path: Path) -> None:
         ("[uwb]", "[uwb", "not valid TOML: "),
     ],
 )
+@pytest.mark.row("O1")
 def test_a_wrong_configuration_is_named_before_anything_is_opened(
     tmp_path: Path, old: str, new: str, sentence: str
 ) -> None:

@@ -73,6 +73,7 @@ def test_a_watchdog_that_is_meant_for_another_process_gets_nothing_special(tmp_p
 
 @pytest.mark.row("O4")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.row("O4")
 def test_a_signal_ends_it_in_order(tmp_path: Path, number: signal.Signals) -> None:
     with Daemon(example_in(tmp_path)) as daemon:
         daemon.manager.wait_for("READY=1")
@@ -84,6 +85,7 @@ def test_a_signal_ends_it_in_order(tmp_path: Path, number: signal.Signals) -> No
 
 @pytest.mark.parametrize("pause", [0.0, 0.001, 0.02, 0.06])
 @pytest.mark.parametrize("second", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.row("O4")
 def test_a_second_signal_changes_nothing(
     tmp_path: Path, pause: float, second: signal.Signals
 ) -> None:
@@ -93,6 +95,7 @@ def test_a_second_signal_changes_nothing(
     assert "Traceback" not in daemon.log
 
 
+@pytest.mark.row("O4")
 def test_a_stop_while_it_starts_is_a_stop(tmp_path: Path) -> None:
     """Before Python runs our first line the signal itself ends the process; that is as good."""
     for step in range(16):
@@ -104,6 +107,7 @@ def test_a_stop_while_it_starts_is_a_stop(tmp_path: Path) -> None:
         assert "Traceback" not in daemon.log
 
 
+@pytest.mark.row("O4")
 def test_a_solver_that_does_not_end_does_not_hold_it_up(tmp_path: Path) -> None:
     with Daemon(example_in(tmp_path), fault="stuck_solver") as daemon:
         daemon.manager.wait_for("READY=1")
@@ -184,6 +188,7 @@ def test_an_epoch_from_a_clock_that_ran_ahead_is_not_reused(tmp_path: Path) -> N
         '{"schema": 1, "epoch": 7, "calibration": {"bias_m": {"300": [0.1, 0.1]}}}',
     ],
 )
+@pytest.mark.row("O13")
 def test_a_damaged_or_foreign_state_file_is_named_and_replaced(
     tmp_path: Path, content: str
 ) -> None:

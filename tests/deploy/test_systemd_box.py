@@ -104,6 +104,7 @@ def test_a_configuration_that_cannot_be_used_is_not_tried_again(
     assert sentence in read(traces / f"refused{robot}.log")
 
 
+@pytest.mark.row("O5")
 def test_a_crash_is_followed_by_a_new_start(traces: Path) -> None:
     assert read(traces / "restarts_after_crash") == "1"
 

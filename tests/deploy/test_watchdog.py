@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import signal
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -12,11 +13,12 @@ from pathlib import Path
 import pytest
 from deploy_helpers import example_in
 
-from drslamd import daemon as daemon_module
 from drslamd.config import parse
 from drslamd.daemon import Daemon
-from drslamd.events import Effect, Event, JobDone, Solve
+from drslamd.events import Effect, Event, JobDone, Save, Solve
 from drslamd.io.systemd import Notifier
+from drslamd.io.watch import watchdog
+from drslamd.slam import headway
 
 PERIOD_S = 0.15
 FOREIGN_JOB = 10**6
@@ -50,7 +52,7 @@ class Scene:
     def __init__(self, folder: Path) -> None:
         self.daemon = Daemon(parse(example_in(folder).read_text()))
         self.recorder = Recorder()
-        self.daemon._notifier = self.recorder
+        self.daemon._notifier = self.daemon._watchdog._notifier = self.recorder
         self._ignore_foreign_jobs()
 
     def _ignore_foreign_jobs(self) -> None:
@@ -94,6 +96,7 @@ def test_a_healthy_daemon_feeds_it(scene: Scene) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.row("O6")
 def test_a_loop_that_hangs_does_not_feed_it(scene: Scene) -> None:
     asyncio.run(scene.play(lambda _: time.sleep(0.5), 0.2))
     fed = scene.recorder.fed
@@ -101,6 +104,7 @@ def test_a_loop_that_hangs_does_not_feed_it(scene: Scene) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.row("O6")
 def test_a_robot_that_is_no_longer_woken_does_not_feed_it(scene: Scene) -> None:
     def sleep_for_ever(daemon: Daemon) -> None:
         daemon._wake = lambda: None  # type: ignore[method-assign]
@@ -110,10 +114,11 @@ def test_a_robot_that_is_no_longer_woken_does_not_feed_it(scene: Scene) -> None:
 
 @pytest.mark.row("O6")
 @pytest.mark.slow
+@pytest.mark.row("O6")
 def test_a_solver_that_is_stuck_does_not_feed_it(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(daemon_module, "JOB_STUCK_US", 200_000)
+    monkeypatch.setattr(scene.daemon._watchdog, "stuck_s", 0.2)
     starved = asyncio.run(scene.play(lambda daemon: compute(daemon, lambda: time.sleep(1.5)), 1.0))
     assert starved > 0.5
 
@@ -123,7 +128,7 @@ def test_a_queue_of_computations_that_moves_feeds_it(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On a slow computer the last of many waits long; that is load, not a fault."""
-    monkeypatch.setattr(daemon_module, "JOB_STUCK_US", 300_000)
+    monkeypatch.setattr(scene.daemon._watchdog, "stuck_s", 0.3)
 
     def many(daemon: Daemon) -> None:
         for _ in range(8):
@@ -132,6 +137,46 @@ def test_a_queue_of_computations_that_moves_feeds_it(
     assert asyncio.run(scene.play(many, 0.7)) < PERIOD_S
 
 
+@pytest.mark.slow
+@pytest.mark.row("O6")
+def test_a_long_computation_that_makes_headway_feeds_it(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As that of a large team does."""
+    monkeypatch.setattr(scene.daemon._watchdog, "stuck_s", 0.3)
+
+    def long() -> None:
+        for _ in range(10):
+            time.sleep(0.1)
+            headway.mark()
+
+    assert asyncio.run(scene.play(lambda daemon: compute(daemon, long), 0.9)) < PERIOD_S
+
+
+@pytest.mark.row("O6")
+@pytest.mark.row("O2")
+def test_a_disk_that_hangs_is_named_and_the_robot_goes_on(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A new start would hang on the same disk."""
+    monkeypatch.setattr(watchdog, "DISK_STUCK_S", 0.2)
+    freed = threading.Event()
+    said: list[str] = []
+
+    def hang(daemon: Daemon) -> None:
+        daemon._store.save = lambda _: freed.wait(5)  # type: ignore[method-assign, assignment]
+        daemon._perform(Save({}))
+        compute(daemon, lambda: said.append("solved"))
+        loop = asyncio.get_running_loop()
+        loop.call_later(0.45, lambda: said.extend(daemon._picture()["problems"]))
+        loop.call_later(0.5, freed.set)
+
+    assert asyncio.run(scene.play(hang, 0.6)) < PERIOD_S
+    assert said[0] == "solved"
+    assert any("the disk has not answered for 0 s" in sentence for sentence in said)
+
+
+@pytest.mark.row("O6")
 @pytest.mark.parametrize("port", READERS)
 def test_a_reader_that_died_ends_the_daemon(scene: Scene, port: str) -> None:
     async def die() -> None:

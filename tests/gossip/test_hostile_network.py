@@ -80,6 +80,8 @@ def hostile(events: list[ChannelMessage]) -> Iterator[Datagram]:
         yield Datagram(T0 + 1, draw.randbytes(draw.randrange(100)), "10.0.0.66")
 
 
+@pytest.mark.row("S1")
+@pytest.mark.row("N7")
 def test_a_stranger_changes_nothing_but_counters() -> None:
     team, events = a_busy_team()
     before = snapshot(team)

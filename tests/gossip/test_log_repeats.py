@@ -205,6 +205,7 @@ def test_no_more_than_twelve_messages_leave_at_once() -> None:
     assert sent == [0, 12, 12, 0]
 
 
+@pytest.mark.row("O7")
 def test_no_more_than_240_repeats_are_planned() -> None:
     logs = LogSync(4)
     for robot in range(10, 40):

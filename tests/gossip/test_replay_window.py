@@ -96,6 +96,7 @@ def test_messages_far_ahead_that_are_not_together_take_the_window_nowhere() -> N
     assert taken(window, 2, *leaps, 3) == [True] + [False] * MAX_LEAPS + [True]
 
 
+@pytest.mark.row("S3")
 def test_one_leap_more_than_are_remembered_moves_the_window_to_the_first_of_them() -> None:
     leaps = [5_000 * k for k in range(1, MAX_LEAPS + 2)]
     window = seen(1, *leaps)

@@ -85,6 +85,7 @@ def test_what_somebody_else_has_heard_of_counts_only_so_far_ahead() -> None:
     assert (log.newest, log.lacking) == (4, 2)
 
 
+@pytest.mark.row("O7")
 def test_when_an_entry_was_on_the_air_is_forgotten_with_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -58,10 +58,12 @@ def with_worker(daemon: Daemon, scene: Callable[[], Awaitable[None]]) -> None:
 
     async def run() -> None:
         daemon._worker.start()
+        daemon._disk.start()
         try:
             await asyncio.wait_for(scene(), 10)
         finally:
             daemon._worker.stop()
+            daemon._disk.stop()
             if daemon._timer is not None:
                 daemon._timer.cancel()
 

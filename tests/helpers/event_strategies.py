@@ -20,6 +20,7 @@ from drslamd.events import (
     SaveDone,
     Send,
     SerialData,
+    Slept,
     Stop,
     Tick,
 )
@@ -42,6 +43,7 @@ events: st.SearchStrategy[Event] = st.one_of(
     messages,
     st.builds(NetworkState, utimes, st.booleans(), words),
     st.builds(Tick, utimes),
+    st.builds(Slept, utimes, utimes),
     st.builds(JobDone, utimes, st.integers(0, 2**62), st.none(), st.integers(0, 2**62)),
     st.builds(SaveDone, utimes, words),
     st.builds(Stop, utimes),

@@ -9,10 +9,11 @@ import pytest
 from drslamd.io.clock import MonotonicClock, cpu_s, uptime_s, wall_s
 
 
-def test_the_clock_is_the_kernels_monotonic_one() -> None:
-    before = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1_000
+@pytest.mark.row("T1")
+def test_the_clock_is_that_of_the_kernel_to_the_microsecond() -> None:
+    before = time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1_000
     now = MonotonicClock().now()
-    after = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1_000
+    after = time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1_000
     assert before <= now <= after
     assert isinstance(now, int)
 
@@ -25,6 +26,7 @@ def test_two_clocks_of_one_host_agree_and_grow() -> None:
     assert clocks[0].now() - read[-1] >= 10_000
 
 
+@pytest.mark.row("T1")
 def test_setting_the_wall_clock_moves_the_clock_by_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -35,9 +37,19 @@ def test_setting_the_wall_clock_moves_the_clock_by_nothing(
     assert 0 <= clock.now() - before < 60_000_000
 
 
+@pytest.mark.row("T2")
+def test_the_clock_goes_on_while_the_computer_sleeps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Then the clock that others call monotonic stands."""
+    stands, goes_on = time.monotonic_ns(), time.clock_gettime_ns(time.CLOCK_BOOTTIME)
+    monkeypatch.setattr(time, "monotonic_ns", lambda: stands)
+    monkeypatch.setattr(time, "clock_gettime_ns", lambda which: goes_on + 60 * 10**9)
+    assert MonotonicClock().now() == goes_on // 1_000 + 60_000_000
+
+
 @pytest.mark.parametrize(
     ("ns", "seconds"), [(1_764_000_000_999_999_999, 1_764_000_000), (0, 0), (-1, -1)]
 )
+@pytest.mark.row("T5")
 def test_the_wall_clock_is_read_in_whole_seconds(
     ns: int, seconds: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

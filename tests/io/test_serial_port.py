@@ -61,6 +61,7 @@ def test_all_256_byte_values_arrive_as_they_were_sent(tmp_path: Path) -> None:
     assert received(with_port(tmp_path, script)) == everything
 
 
+@pytest.mark.row("T1")
 def test_bytes_are_stamped_when_they_arrive(tmp_path: Path) -> None:
     async def script(cable: PseudoPort, _: SerialPort, events: list[Event]) -> None:
         for _again in range(10):

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from drslamd.config import ConfigError
+from drslamd.io import state_store
 from drslamd.io.state_store import StateStore, read_key, write_key
 from drslamd.slam.calibration.sensor_calibration import SensorCalibration
 
@@ -32,6 +33,46 @@ def test_a_damaged_or_foreign_state_file_is_a_fault_and_not_an_end(tmp_path: Pat
         assert word in fresh.fault
 
 
+@pytest.mark.row("O13")
+@pytest.mark.parametrize("schema", [0, 2, 99, "1", None])
+def test_of_an_older_or_newer_version_the_numbers_of_starts_are_kept(
+    tmp_path: Path, schema: Any
+) -> None:
+    later = {"epoch": 7, "epochs": {"1": 5}, "calibration": {"scale": "otherwise"}, "more": [1]}
+    (tmp_path / "robot-3.json").write_text(json.dumps({**later, "schema": schema}))
+    store = StateStore(tmp_path, 3)
+    assert store.load() == {"epoch": 7, "epochs": {"1": 5}}
+    assert "another version" in store.fault
+    assert store.begin({}, 7) > 7
+    assert StateStore(tmp_path, 3).load()["schema"] == 1
+
+
+@pytest.mark.row("O13")
+@pytest.mark.parametrize("starts", [{"epoch": -1}, {"epoch": 7, "epochs": {"255": 5}}])
+def test_of_another_version_nothing_is_kept_that_is_not_believable(
+    tmp_path: Path, starts: dict[str, Any]
+) -> None:
+    (tmp_path / "robot-3.json").write_text(json.dumps({**starts, "schema": 2}))
+    assert StateStore(tmp_path, 3).load() == {}
+
+
+@pytest.mark.row("T5")
+@pytest.mark.parametrize(
+    "wall_s",
+    [-1, 0, 1, 1024 * 604_800, 2048 * 604_800, 2**31 - 1, 2**31, 2**32, 2**53 // 10**9, 2**53],
+    ids=str,
+)
+def test_at_every_odd_date_a_start_has_a_number_above_the_last_and_is_read_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wall_s: int
+) -> None:
+    """No clock, weeks of GPS that begin anew, 2038, and beyond."""
+    monkeypatch.setattr(state_store, "wall_s", lambda: wall_s)
+    for last in (0, 7 * 10**15):
+        epoch = StateStore(tmp_path, 3).begin({}, last)
+        assert epoch > last
+        assert StateStore(tmp_path, 3).load()["epoch"] == epoch
+
+
 def test_a_folder_that_cannot_be_written_is_a_fault_that_ends_when_it_can(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("")
@@ -43,6 +84,7 @@ def test_a_folder_that_cannot_be_written_is_a_fault_that_ends_when_it_can(tmp_pa
     assert store.fault == ""
 
 
+@pytest.mark.row("O2")
 def test_an_interrupted_save_leaves_the_old_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -326,6 +368,7 @@ def altered(way: tuple[Any, ...], value: Any) -> Any:
     return state
 
 
+@pytest.mark.row("O13")
 def test_whatever_one_value_of_the_file_is_the_next_start_begins_and_keeps_what_can_be_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
+import time
 from collections.abc import Callable
 
 import pytest
@@ -117,3 +118,42 @@ def test_no_exception_ends_the_thread(fault: type[BaseException]) -> None:
     with_worker(work, 2)
     assert isinstance(found[0], fault)
     assert found[1] is None
+
+
+@pytest.mark.row("T1")
+@pytest.mark.row("O6")
+def test_how_long_it_is_stuck_counts_from_its_last_step_on_a_clock_that_nobody_sets(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now, made = [1000.0], [0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "time_ns", lambda: 4 * 10**18)
+    monkeypatch.setattr(time, "time", lambda: 4e9)
+    worker = Worker(lambda: made[0])
+    assert worker.stuck_s() == 0.0
+    worker.submit(lambda: None, lambda _: None)
+    now[0] += 3.0
+    assert worker.stuck_s() == 3.0
+    made[0] += 1
+    assert worker.stuck_s() == 0.0
+    now[0] += 2.0
+    assert worker.stuck_s() == 2.0
+
+
+@pytest.mark.row("O6")
+def test_who_waits_for_nothing_is_not_stuck(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And an old computation that came to its end says nothing of a new one."""
+    now = [1000.0]
+
+    async def run() -> None:
+        worker, ended = Worker(), asyncio.Event()
+        worker.start()
+        worker.submit(lambda: None, lambda _: ended.set())
+        await asyncio.wait_for(ended.wait(), 10)
+        assert worker.waiting == 0
+        with monkeypatch.context() as patch:
+            patch.setattr(time, "monotonic", lambda: now[0] + 1e6)
+            assert worker.stuck_s() == 0.0
+        worker.stop()
+
+    asyncio.run(run())

@@ -10,7 +10,7 @@ from drslamd.events import CanFrame, ChannelMessage, Datagram, Level, Note, Send
 from drslamd.gossip import lc02
 from drslamd.recording.encoder import Encoder
 from drslamd.recording.event_log import Entry, entries
-from drslamd.recording.records import RECENT
+from drslamd.recording.records import RECENT, SENDERS
 
 STATUS = Send("DRSLAM_STATUS_003", b"status")
 
@@ -46,6 +46,14 @@ def test_who_sent_it_is_said_when_it_is_another_one(encoder: Encoder) -> None:
     names_ = [names(encoder.event(d)) for d in heard]
     assert [len(n) for n in names_] == [2, 1, 2]
     assert names_[2][0] == "REC_FROM_003"
+
+
+@pytest.mark.row("O7")
+def test_of_names_without_end_no_more_senders_are_remembered_than_fit() -> None:
+    encoder = Encoder(3, is_framed=True)
+    for k in range(3 * SENDERS):
+        encoder.event(datagram(f"OTHER_{k}"))
+        assert len(encoder._senders) <= SENDERS
 
 
 def test_a_message_that_was_sent_stands_once_though_it_comes_back(encoder: Encoder) -> None:

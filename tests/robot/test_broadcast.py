@@ -95,6 +95,7 @@ def test_at_ten_solutions_a_second_a_pose_is_said_when_it_is_news() -> None:
         ((0.0, 0.0, 2 * np.pi - 0.31), True),
     ],
 )
+@pytest.mark.row("O12")
 def test_a_pose_that_moved_less_than_it_is_uncertain_waits_for_its_second(
     moved: tuple[float, float, float], said: bool
 ) -> None:

@@ -18,6 +18,7 @@ from drslamd.conventions import SECOND_US
         pytest.param(560, 3.0, True, marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.row("O9")
 def test_a_module_takes_a_fifth_of_a_core_at_most_and_names_its_pace(
     solve_ms: int, cycle_s: float, said: bool
 ) -> None:

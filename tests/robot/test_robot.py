@@ -175,6 +175,7 @@ def test_a_pose_is_the_solved_keyframe_carried_on_by_odometry() -> None:
         (0.5, -10, 0.1),
     ],
 )
+@pytest.mark.row("O12")
 def test_the_heading_stays_within_half_a_turn_however_far_the_robot_turns(
     theta: float, turns: int, expected: float
 ) -> None:

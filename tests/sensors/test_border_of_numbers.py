@@ -288,6 +288,7 @@ def test_a_range_is_finite_and_within_the_limits_of_the_module(
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("name", ["distance_m", "fp_rssi_db", "rx_rssi_db"])
+@pytest.mark.row("M9")
 def test_a_range_that_is_not_finite_would_be_counted(
     name: str, value: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -139,6 +139,7 @@ def test_a_module_that_was_silent_for_long_is_not_in_range(silent_us: int, is_ra
     ("later_us", "remembered"),
     [(RANGES_FRESH_US - 1, range(MAX_UWB_IDS)), (RANGES_FRESH_US, range(1, MAX_UWB_IDS + 1))],
 )
+@pytest.mark.row("O7")
 def test_so_many_modules_are_remembered_and_only_a_silent_one_makes_room(
     later_us: int, remembered: range
 ) -> None:

@@ -135,6 +135,7 @@ def test_a_cable_pulled_in_mid_frame_and_put_back_is_read_again() -> None:
 
 
 @pytest.mark.row("D5")
+@pytest.mark.row("O8")
 def test_descriptors_do_not_pile_up_when_a_cable_is_pulled_often() -> None:
     async def test(team: RealTeam, robot: RealRobot) -> None:
         assert robot.process is not None

@@ -122,6 +122,7 @@ def test_the_lcm_package_reads_the_poses_that_were_published(runs: list[Run]) ->
     assert states.count(PoseState.LOCALISED) > 5
 
 
+@pytest.mark.row("O10")
 def test_recording_costs_less_than_a_hundredth_of_a_core(runs: list[Run], tmp_path: Path) -> None:
     """All events and answers of a run once more into a recorder, and onto the disk."""
     replayer, happened = Replayer(runs[0], key_of(runs[0], None)), []

@@ -41,6 +41,10 @@ class DeadReckoning:
             since = motion.utime - 1
         self._sample(since, before)
 
+    def interrupt(self) -> None:
+        """Of the way to the next motion nothing is known."""
+        self._utime = None
+
     def _sample(self, since: int, before: Array) -> None:
         """Put on the track what lies on the grid after `since`, where we were at `before`."""
         assert self._utime is not None

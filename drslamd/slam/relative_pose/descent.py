@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from drslamd.slam import headway
 from drslamd.slam.range_model import LINKTRACK, RangeModel, RangeNoise
 from drslamd.slam.relative_pose.range_fit import Minima, RangeFit, stepped
 from drslamd.slam.se2 import Array
@@ -46,6 +47,7 @@ class Descent:
         for _ in range(steps):
             if self._is_settled:
                 break
+            headway.mark()
             step, promise = _damped_step(self._normal, self._damping)
             x, bias = stepped(self._x, step), self._bias + step[:, 3]
             cost, normal = _normal_equations(self._fit, x, bias, self._noise, self._huber)

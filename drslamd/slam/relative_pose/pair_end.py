@@ -30,11 +30,16 @@ an antenna at the rim of a large robot it still fits the 16 bits of millimetres 
 
 @dataclass(frozen=True)
 class PairEnd:
-    """One robot: its 10 Hz track, what it said of itself, its clock minus ours in us."""
+    """One robot: its 10 Hz track, what it said of itself, its clock minus ours in us.
+
+    Attributes:
+        since_us: from when on our clock that difference holds.
+    """
 
     track: Track
     data: ChainData
     ahead_us: int = 0
+    since_us: int = 0
 
     def grid(self, utime: Array | float) -> Array:
         """Fractional samples of the track at times (k,) of our clock."""
@@ -47,7 +52,8 @@ class PairEnd:
     @property
     def first_us(self) -> int:
         """Start of the unbroken end of the track, our clock."""
-        return max(self.track.n0, self.track.segment_start) * GRID_US - self.ahead_us
+        start = max(self.track.n0, self.track.segment_start) * GRID_US - self.ahead_us
+        return max(start, self.since_us)
 
     @property
     def last_us(self) -> int:

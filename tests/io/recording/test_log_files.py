@@ -63,6 +63,7 @@ def test_what_is_written_stands_in_the_file_at_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("quota", "size"), [(QUOTA, QUOTA // FILES), (1 << 40, MAX_FILE_BYTES)])
+@pytest.mark.row("O3")
 def test_a_file_is_a_share_of_the_quota_and_not_endless(
     tmp_path: Path, quota: int, size: int
 ) -> None:
@@ -71,6 +72,7 @@ def test_a_file_is_a_share_of_the_quota_and_not_endless(
 
 @pytest.mark.row("O3")
 @pytest.mark.parametrize(("spare", "stay"), [(0, 15), (-1, 14)])
+@pytest.mark.row("O3")
 def test_the_oldest_go_when_another_one_does_not_fit(tmp_path: Path, spare: int, stay: int) -> None:
     size = QUOTA // FILES
     for part in range(15):

@@ -117,6 +117,7 @@ def test_the_next_file_begins_between_two_events_and_stands_alone(files: LogFile
     assert all(path.stat().st_size < 1_300 for path in paths)
 
 
+@pytest.mark.row("O2")
 def test_a_disk_that_hangs_costs_a_gap_that_is_counted_and_never_waits(
     files: LogFiles, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -53,6 +53,7 @@ def test_an_error_of_a_relative_pose_is_predicted_minus_measured_seen_from_the_f
 
 
 @pytest.mark.parametrize(("seen", "measured", "error"), [(3.1, -3.1, 6.2), (-3.1, 3.1, -6.2)])
+@pytest.mark.row("O12")
 def test_an_error_of_a_heading_is_the_short_way_around(
     seen: float, measured: float, error: float
 ) -> None:

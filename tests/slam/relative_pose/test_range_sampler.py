@@ -58,6 +58,19 @@ def test_a_range_says_how_both_robots_stood_turned_against_their_keyframes() -> 
     assert found.turn_b == pytest.approx(math.remainder(-0.5 * samples, 2 * math.pi), abs=1e-3)
 
 
+@pytest.mark.row("O12")
+@pytest.mark.parametrize("turn", [0.5, -0.5])
+def test_neither_robot_is_turned_by_more_than_half_a_turn(turn: float) -> None:
+    """Both turn by 3.75 rad since their keyframes."""
+    found = RangeSampler(0.1).sample(
+        weak_paths(0.0, 0.0), turning_end(0, turn), turning_end(1, turn), Chain(1, 1)
+    )
+    assert found is not None
+    assert found.turn_a == found.turn_b
+    assert 2 < abs(found.turn_a) < math.pi
+    assert np.sign(found.turn_a) == -np.sign(turn)
+
+
 def standing_end(robot: int) -> PairEnd:
     return turning_end(robot, 0.0)
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from drslamd.slam import headway
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
@@ -48,6 +49,7 @@ def descend(
     damping, level, size, steps, converged = FIRST_DAMPING, 1, np.inf, 0, False
     while steps < most and not converged and damping < MOST_DAMPING:
         steps += 1
+        headway.mark()
         is_kept = factor is not None
         if factor is None:
             system, gradient = equations.at(point, CURVATURES[level])

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drslamd.slam import se2
+from drslamd.slam import headway, se2
 from drslamd.slam.optimizer.closures.symmetric import Factor, Symmetric, elimination_order
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.se2 import Array
@@ -98,6 +98,7 @@ class PoseGraphSolver:
         before = np.inf
         while steps < most and not converged and damping < MOST_DAMPING:
             steps += 1
+            headway.mark()
             kept = factor is not None
             factor = factor or self._factor(point, newton, damping)
             trial, expected = self._stepped(point, factor) if factor else (point, 0.0)

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
+from drslamd.slam import headway
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.se2 import Array
 
@@ -159,6 +160,7 @@ def descend(problem: BlockProblem, x: Array, most: int = MOST_STEPS) -> tuple[Ar
     total = 0.0
     before: tuple[Array, Array, Array] | None = None
     for step in range(most):
+        headway.mark()
         ambient = problem.gradient(x)
         gradient = tangent(x, ambient)
         downhill = -tangent(x, cho_solve_banded((factor, True), gradient, check_finite=False))

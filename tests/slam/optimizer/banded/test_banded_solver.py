@@ -373,6 +373,7 @@ def test_angles_come_back_wrapped() -> None:
 
 
 @pytest.mark.parametrize("most", [0, 1, 2])
+@pytest.mark.row("O12")
 def test_what_has_not_converged_does_not_say_so(most: int) -> None:
     problem, _ = team_problem(14, robots=3, count=40)
     far = problem.initial + np.random.default_rng(15).normal(0, 0.5, problem.initial.shape)

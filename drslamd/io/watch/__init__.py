@@ -1,0 +1,1 @@
+"""Does everything still move, and did the computer sleep?"""
