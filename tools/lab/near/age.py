@@ -1,0 +1,103 @@
+"""How old a pose is when whoever steers has it, and what it costs: a real daemon, real time."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from drslamd.io.near_socket import connected
+from drslamd.io.status_socket import ask
+from drslamd.machine.folders import near_path
+from drslamd.near import near_message
+from lab.play.playback import equip, robot_toml
+from lab.play.real_team import PseudoPort, free_port
+from lab.recordings import world
+
+START_S = 60.0
+TICK_S = os.sysconf("SC_CLK_TCK")
+
+
+async def measured(
+    robots: int, seconds: float, computes: bool, reads: bool = True
+) -> tuple[list[float], float, int]:
+    """Ages of the poses in ms, share of a core, and how many peers there were."""
+    hardware = equip(world.simulate(world.Scene(robots=1, seconds=seconds + 2), 1))[0]
+    with tempfile.TemporaryDirectory(prefix="drslamd-near-") as name:
+        folder = Path(name)
+        uwb, wheels = PseudoPort(folder / "uwb"), PseudoPort(folder / "wheels")
+        extra = (
+            f'[gossip]\ninterface = "127.0.0.1"\nttl = 0\nport = {free_port()}\n'
+            f'[daemon]\nstate_dir = "{folder}"\nstatus_socket = "{folder}/socket"\n'
+            'log_level = "error"\n'
+        )
+        config = folder / "robot.toml"
+        config.write_text(robot_toml(hardware, str(uwb.name), str(wheels.name), extra))
+        word = "compute" if computes else "rest"
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "lab.near.busy_daemon", str(config), str(robots), word),
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": ":".join(sys.path)},
+        )
+        try:
+            await _ready(folder / "socket")
+            chunks = [c for c in hardware.chunks() if c.port == "wheels"]
+            playing = asyncio.ensure_future(_play(wheels, chunks))
+            ages: list[float] = []
+            peers = 0
+            if reads:
+                # a process of its own would be nearer to life; a thread waits in the kernel as well
+                ages, peers = await asyncio.to_thread(_read, folder / "socket", seconds)
+                share = 0.0
+            else:
+                share = 0.0
+            before, began = _cpu_s(process.pid), time.monotonic()
+            await playing
+            share = (_cpu_s(process.pid) - before) / max(time.monotonic() - began, 1e-9)
+        finally:
+            process.terminate()
+            await process.wait()
+            uwb.pull()
+            wheels.pull()
+    return ages, share, peers
+
+
+async def _ready(path: Path) -> None:
+    for _ in range(int(START_S / 0.1)):
+        try:
+            await ask(path, "status")
+            return
+        except (OSError, ValueError):
+            await asyncio.sleep(0.1)
+    raise AssertionError("the daemon does not answer")
+
+
+async def _play(port: PseudoPort, chunks: list) -> None:
+    began = time.monotonic()
+    for chunk in chunks:
+        wait = began + chunk.t - time.monotonic()
+        if wait > 0:
+            await asyncio.sleep(wait)
+        port.write(chunk.printed())
+
+
+def _read(path: Path, seconds: float) -> tuple[list[float], int]:
+    ages, peers, end = [], 0, time.monotonic() + seconds
+    with connected(near_path(path)) as reader:
+        while time.monotonic() < end:
+            payload = reader.recv(1 << 16)
+            now = time.monotonic_ns() // 1_000
+            near = near_message.decode(payload)
+            assert not isinstance(near, str), near
+            ages.append((now - near.utime) / 1e3)
+            peers = len(near.peers)
+    return ages, peers
+
+
+def _cpu_s(pid: int) -> float:
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / TICK_S
