@@ -10,16 +10,14 @@ from __future__ import annotations
 import asyncio
 import os
 import socket
-from dataclasses import replace
 from pathlib import Path
 
 from drslamd.conventions import SECOND_US
-from drslamd.gossip.message_types import UNKNOWN_CLOCK
 from drslamd.gossip.seal import VERSION, Header
 from drslamd.io.clock import Clock
 from drslamd.io.status_socket import cannot_listen
-from drslamd.io.wall_clock import WallClock, read_wall_clock
-from drslamd.near.near_message import UNKNOWN_UNCERTAINTY, encode
+from drslamd.io.wall_clock import read_wall_clock
+from drslamd.near.near_message import NO_WALL, UNKNOWN_UNCERTAINTY, Wall, encode
 from drslamd.near.surroundings import Surroundings
 
 MOST_READERS = 16
@@ -40,7 +38,7 @@ class NearSocket:
         self._listener: socket.socket | None = None
         self._readers: set[socket.socket] = set()
         self._told: int | None = None
-        self._wall = WallClock(UNKNOWN_CLOCK, None)
+        self._wall: Wall = NO_WALL
         self._wall_at: int | None = None
         self.lost = 0
 
@@ -76,19 +74,18 @@ class NearSocket:
         if not self._readers or near.utime is None or near.utime == self._told:
             return
         self._told, now = near.utime, self._clock.now()
-        found = near.look(now)
-        if found is None:
+        told = near.look(now, self._wall_clock(now))
+        if told is None:
             return
-        wall = self._wall_clock(now)
-        unsure = UNKNOWN_UNCERTAINTY if wall.uncertainty_us is None else wall.uncertainty_us
-        told = replace(found, utc_minus_clock_us=wall.utc_minus_clock_us, utc_uncertainty_us=unsure)
         payload = encode(Header(VERSION, *near.own, 0, now), told)
         for reader in list(self._readers):
             self._send(reader, payload)
 
-    def _wall_clock(self, now: int) -> WallClock:
+    def _wall_clock(self, now: int) -> Wall:
         if self._wall_at is None or now - self._wall_at >= WALL_US:
-            self._wall, self._wall_at = read_wall_clock(self._clock), now
+            utc_minus_clock_us, unsure = read_wall_clock(self._clock)
+            self._wall = utc_minus_clock_us, UNKNOWN_UNCERTAINTY if unsure is None else unsure
+            self._wall_at = now
         return self._wall
 
     def _send(self, reader: socket.socket, payload: bytes) -> None:

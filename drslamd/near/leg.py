@@ -6,12 +6,10 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-import numpy as np
-
+from drslamd.near.packed import Packed, moved, times, turned
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.noise import OdometryNoise
-from drslamd.slam.pose_now import noise_of_sums
 from drslamd.slam.se2 import Array
 
 
@@ -31,10 +29,11 @@ class Leg:
             correction: of this robot's odometry.
         """
         self.start = start
+        self._start: tuple[float, float, float] = tuple(start.tolist())
         self._noise, self._level, self._correction = noise, level, correction
         self._x = self._y = self._theta = 0.0
         self._sums = [0.0] * 6
-        self._end: tuple[float, ...] = tuple(start.tolist())
+        self._end: tuple[float, float, float] = self._start
 
     @staticmethod
     def of(estimate: TeamEstimate, robot: int, noise: OdometryNoise) -> Leg:
@@ -56,7 +55,7 @@ class Leg:
         x, y = cos * x - sin * y, sin * x + cos * y
         self._add(x, y, self._x + x / 2, self._y + y / 2)
         self._x, self._y, self._theta = self._x + x, self._y + y, self._theta + theta + bend
-        w_x, w_y, w_theta = self.start.tolist()
+        w_x, w_y, w_theta = self._start
         cos, sin = math.cos(w_theta), math.sin(w_theta)
         x, y = w_x + cos * self._x - sin * self._y, w_y + sin * self._x + cos * self._y
         self._end = x, y, w_theta + self._theta
@@ -72,28 +71,34 @@ class Leg:
         sums[5] += length * middle_x * middle_x
 
     @property
-    def end(self) -> tuple[float, ...]:
+    def end(self) -> tuple[float, float, float]:
         """x, y, theta in w where it leads; theta counts on."""
         return self._end
 
     @property
-    def forward(self) -> Array:
-        """(3, 3) how x, y, theta in w at its end move with those at its start."""
-        out = np.eye(3)
-        out[0, 2], out[1, 2] = self.start[1] - self._end[1], self._end[0] - self.start[0]
-        return out
+    def lever(self) -> tuple[float, float]:
+        """From its start to its end, x and y in w."""
+        return self._end[0] - self._start[0], self._end[1] - self._start[1]
 
     @property
-    def added(self) -> Array:
-        """(3, 3) what it adds to the covariance of x, y, theta in w."""
-        end = np.array([self._x, self._y, self._theta])
-        sums = np.array(self._sums)
-        return noise_of_sums(float(self.start[2]), end, sums, self._noise, self._level)
-
-    def moved(self, covariance: Array) -> Array:
-        """(3, 3) at its end what is known (3, 3) at its start."""
-        forward = self.forward
-        return np.asarray(forward @ covariance @ forward.T)
+    def added(self) -> Packed:
+        """What it adds to the covariance in w: `noise.twist_covariance`, taken to its end."""
+        noise, sums = self._noise, self._sums
+        s, y, x_neg, yy, xy_neg, xx = sums
+        turn, drawn = noise.yaw_rad_per_sqrt_m**2, noise.translation_per_sqrt_m**2 * s
+        wx, wy = noise.scale * self._x, noise.scale * self._y
+        by, bx, bs = (noise.yaw_rad_per_m * value for value in (y, x_neg, s))
+        twist = (
+            turn * yy + drawn + wx * wx + by * by,
+            turn * xy_neg + wx * wy + by * bx,
+            turn * y + by * bs,
+            turn * xx + drawn + wy * wy + bx * bx,
+            turn * x_neg + bx * bs,
+            turn * s + bs * bs,
+        )
+        at_end = moved(twist, self._x, self._y)
+        theta = self._start[2]
+        return times(self._level**2, turned(at_end, math.cos(theta), -math.sin(theta)))
 
     def along(self, way: Array) -> None:
         """All steps of a way (k, 3), poses o_T_i."""

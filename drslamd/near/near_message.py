@@ -33,6 +33,11 @@ LONGEST_US = 2**31 - 1
 _FAULTS = (ValueError, struct.error, IndexError)
 
 
+Wall = tuple[int, int]
+"""To be added to a time of our clock to get UTC, us, and how wrong that is at most."""
+NO_WALL = (UNKNOWN_CLOCK, UNKNOWN_UNCERTAINTY)
+
+
 @dataclass(frozen=True)
 class Neighbours:
     """m peers.
@@ -80,20 +85,22 @@ class Near:
         utime: of the odometry that it rests on, us.
         odom: (3,) o_T_a, which never jumps; theta counts on.
         speed_mps, turn_radps: of the body.
+        utc_minus_clock_us: to be added to a time of our clock to get UTC; `UNKNOWN_CLOCK`.
+        utc_uncertainty_us: how wrong that is at most; `UNKNOWN_UNCERTAINTY`.
         state: what the pose in the frame of the team is worth; without one the rest is zero.
         frame, frame_epoch: whose first pose is the origin of that frame.
         correction: (3,) w_T_o; the pose in w is the product of both.
         covariance: (6,) of that pose.
         resets: how often it jumped by more than it was uncertain, or changed its frame.
         peers: who is around.
-        utc_minus_clock_us: to be added to a time of our clock to get UTC; `UNKNOWN_CLOCK`.
-        utc_uncertainty_us: how wrong that is at most; `UNKNOWN_UNCERTAINTY`.
     """
 
     utime: int
     odom: tuple[float, float, float]
     speed_mps: float
     turn_radps: float
+    utc_minus_clock_us: int = UNKNOWN_CLOCK
+    utc_uncertainty_us: int = UNKNOWN_UNCERTAINTY
     state: PoseState = PoseState.NOT_LOCALISED
     frame: int = 0
     frame_epoch: int = 0
@@ -101,8 +108,6 @@ class Near:
     covariance: tuple[float, ...] = (0.0,) * 6
     resets: int = 0
     peers: Neighbours = NOBODY
-    utc_minus_clock_us: int = UNKNOWN_CLOCK
-    utc_uncertainty_us: int = UNKNOWN_UNCERTAINTY
 
     @property
     def pose(self) -> Array:

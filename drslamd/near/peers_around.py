@@ -7,6 +7,7 @@ time. Who has said nothing for two and a half seconds, and lives, stands where i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from drslamd.gossip.peer import Peer
 from drslamd.gossip.team import Team
 from drslamd.near.leg import Leg
 from drslamd.near.near_message import LONGEST_US, NOBODY, Neighbours
+from drslamd.near.packed import Packed
 from drslamd.near.relative import Relatives, relatives
 from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
@@ -23,7 +25,7 @@ from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.se2 import Array
 
-LOOK_US = 100 * MILLISECOND_US
+LOOK_US = 200 * MILLISECOND_US
 """Between two looks for news."""
 STANDS_US = 2_500 * MILLISECOND_US
 """So long after its last keyframe a robot stands; who drives makes one each second."""
@@ -76,6 +78,8 @@ class PeersAround:
         self._estimate: TeamEstimate | None = None
         self._tracked: dict[int, _Tracked] = {}
         self._relatives: Relatives | None = None
+        self._rows: tuple[Any, ...] = ()
+        """Columns of `_row`, at the last look."""
         self._looked = 0
 
     def renew(self, estimate: TeamEstimate, leg: Leg, utime: int) -> None:
@@ -94,6 +98,8 @@ class PeersAround:
         for robot, tracked in news.items():
             if not tracked.follow():
                 del self._tracked[robot]
+        rows = [self._row(robot, tracked, utime) for robot, tracked in self._tracked.items()]
+        self._rows = tuple(zip(*rows, strict=True))
         if is_new or news:
             legs = {robot: tracked.leg for robot, tracked in self._tracked.items()}
             self._relatives = relatives(estimate, self._own, leg, legs)
@@ -123,26 +129,27 @@ class PeersAround:
         shifts = self._back.graph.view.shifts
         return round((shifts.get(robot, 0.0) - shifts.get(self._own, 0.0)) * GRID_US)
 
-    def seen(self, leg: Leg, added: Array, bold: float, utime: int) -> Neighbours:
+    def seen(self, leg: Leg, added: Packed, bold: float, utime: int) -> Neighbours:
         """All of them from the end of our leg.
 
         Args:
-            added: (3, 3) what is added to the covariance of our solved pose, bold already.
+            added: what is added to the covariance of our solved pose, bold already.
             bold: times the variance that the solution claims.
             utime: of our odometry, us.
         """
         if self._relatives is None or not self._tracked:
             return NOBODY
         seen, covariance = self._relatives.seen_from(leg.end, added, bold)
-        rows = [self._row(robot, tracked, utime) for robot, tracked in self._tracked.items()]
-        states, utimes, uncertainties, speeds, turns = zip(*rows, strict=True)
-        robots = tuple(self._tracked)
-        return Neighbours(robots, states, utimes, uncertainties, seen, covariance, speeds, turns)
+        stands, states, thens, unsure, speeds, turns = self._rows
+        utimes = tuple(utime if still else then for still, then in zip(stands, thens, strict=True))
+        return Neighbours(
+            tuple(self._tracked), states, utimes, unsure, seen, covariance, speeds, turns
+        )
 
     def _row(
         self, robot: int, tracked: _Tracked, utime: int
-    ) -> tuple[PoseState, int, int, float, float]:
-        """State, time, its uncertainty, speed and turn rate of one peer."""
+    ) -> tuple[bool, PoseState, int, int, float, float]:
+        """Does it stand? Then state, time, its uncertainty, speed and turn rate of one peer."""
         peer = self._team.peers.get(robot)
         offset = peer.clock.offset(utime) if peer is not None else None
         ahead_us = tracked.ahead_us if offset is None else offset.us
@@ -150,9 +157,9 @@ class PeersAround:
         then = tracked.n * GRID_US - ahead_us
         lives = peer is not None and peer.is_alive(utime)
         if lives and utime - then > STANDS_US:
-            return _state(peer), utime, unsure, 0.0, 0.0
+            return True, _state(peer), then, unsure, 0.0, 0.0
         state = _state(peer) if lives else PoseState.STALE
-        return state, then, unsure, tracked.speed_mps, tracked.turn_radps
+        return False, state, then, unsure, tracked.speed_mps, tracked.turn_radps
 
 
 def _state(peer: Peer | None) -> PoseState:

@@ -20,9 +20,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from drslamd.near.leg import Leg
+from drslamd.near.packed import Packed, moved, turned
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.se2 import Array
+
+UPPER = np.triu_indices(3)
+"""Of a matrix of three by three, in the order of packed covariances."""
 
 
 @dataclass(frozen=True)
@@ -38,13 +42,13 @@ class Relatives:
     known: Array
 
     def seen_from(
-        self, pose: Sequence[float], added: Array, bold: float = 1.0
+        self, pose: Sequence[float], added: Packed, bold: float = 1.0
     ) -> tuple[Array, Array]:
         """(m, 3) a_T_b, and (6, m) its covariance in the axes of a.
 
         Args:
             pose: w_T_a.
-            added: (3, 3) what our leg adds to its covariance.
+            added: what our leg adds to its covariance, packed.
             bold: times `known` that is claimed.
         """
         x, y, theta = pose
@@ -53,8 +57,10 @@ class Relatives:
         seen = np.empty_like(self.poses)
         seen[:, 0], seen[:, 1] = cos * dx + sin * dy, cos * dy - sin * dx
         seen[:, 2] = se2.wrap(self.poses[:, 2] - theta)
-        covariance = bold * self.known + _moved(added, dx, dy)
-        return seen, _turned(covariance, cos, sin)
+        covariance = np.empty_like(self.known)
+        for row, here in enumerate(moved(added, dx, dy)):
+            covariance[row] = bold * self.known[row] + here
+        return seen, np.array(turned(covariance, cos, sin))
 
 
 def relatives(estimate: TeamEstimate, own: int, leg: Leg, legs: dict[int, Leg]) -> Relatives:
@@ -68,34 +74,11 @@ def relatives(estimate: TeamEstimate, own: int, leg: Leg, legs: dict[int, Leg]) 
         return Relatives(poses, np.zeros((6, 0)))
     joints = [estimate.joint_of(own, robot) for robot in legs]
     joint = np.stack([found for found in joints if found is not None])
-    across = np.tile(np.eye(3), (len(legs), 1, 1))
+    across, along = (np.tile(np.eye(3), (len(legs), 1, 1)) for _ in range(2))
     across[:, 0, 2], across[:, 1, 2] = leg.start[1] - poses[:, 1], poses[:, 0] - leg.start[0]
-    j = np.concatenate([-across, np.stack([peer.forward for peer in legs.values()])], axis=2)
-    known = j @ joint @ np.swapaxes(j, 1, 2) + np.stack([peer.added for peer in legs.values()])
-    return Relatives(poses, np.stack([known[:, r, c] for r, c in zip(*UPPER, strict=True)]))
-
-
-UPPER = np.triu_indices(3)
-
-
-def _moved(added: Array, dx: Array, dy: Array) -> Array:
-    """(6, m) S added S'."""
-    xx, xy, xt, yy, yt, tt = se2.packed(added)
-    to_x, to_y = xt - dy * tt, yt + dx * tt
-    rows = [xx - dy * (xt + to_x), xy + dx * xt - dy * to_y, to_x, yy + dx * (yt + to_y), to_y]
-    return np.stack([*rows, np.full_like(dx, tt)])
-
-
-def _turned(packed: Array, cos: float, sin: float) -> Array:
-    """(6, m) in axes that are turned by an angle with this cosine and sine."""
-    xx, xy, xt, yy, yt, tt = packed
-    twice = 2 * cos * sin * xy
-    rows = [
-        cos * cos * xx + twice + sin * sin * yy,
-        cos * sin * (yy - xx) + (cos * cos - sin * sin) * xy,
-        cos * xt + sin * yt,
-        sin * sin * xx - twice + cos * cos * yy,
-        cos * yt - sin * xt,
-        tt,
-    ]
-    return np.stack(rows)
+    levers = np.array([peer.lever for peer in legs.values()])
+    along[:, 0, 2], along[:, 1, 2] = -levers[:, 1], levers[:, 0]
+    j = np.concatenate([-across, along], axis=2)
+    known = j @ joint @ np.swapaxes(j, 1, 2)
+    added = np.array([peer.added for peer in legs.values()]).T
+    return Relatives(poses, known[:, UPPER[0], UPPER[1]].T + added)

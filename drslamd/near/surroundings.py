@@ -10,8 +10,9 @@ Peers are `peers_around`.
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -20,7 +21,8 @@ from drslamd.conventions import MILLISECOND_US, SECOND_US, Chain
 from drslamd.events import Send
 from drslamd.gossip.team import Team
 from drslamd.near.leg import Leg
-from drslamd.near.near_message import Near, encode, is_near, near_channel
+from drslamd.near.near_message import NO_WALL, Near, Wall, encode, is_near, near_channel
+from drslamd.near.packed import added_up, moved, times
 from drslamd.near.peers_around import PeersAround
 from drslamd.sensors.samples import Motion
 from drslamd.slam import se2
@@ -60,7 +62,7 @@ class Surroundings:
         self.own, self._front, self._back, self._team = own, front, back, team
         self._standing = standing
         self.utime: int | None = None
-        self._odom: tuple[float, ...] = (0.0, 0.0, 0.0)
+        self._odom = (0.0, 0.0, 0.0)
         self._path_m = 0.0
         self._late: deque[tuple[int, float, float]] = deque()
         """Time, way and heading of late, as many as `SPEED_US` holds."""
@@ -76,7 +78,7 @@ class Surroundings:
     def on_motion(self, motion: Motion) -> None:
         """Our odometry went on, and dead reckoning has it already."""
         reckoning = self._front.reckoning
-        pose, utime = tuple(reckoning.pose.tolist()), reckoning.utime
+        (x, y, theta), utime = reckoning.pose.tolist(), reckoning.utime
         if utime is None or utime == self.utime:
             return
         if motion.gap:
@@ -84,10 +86,10 @@ class Surroundings:
             self._leg, self._began = None, reckoning.track.end
             self._late.clear()
         elif self._leg is not None:
-            self._leg.go(self._odom, pose)
-        self._odom, self.utime = pose, utime
+            self._leg.go(self._odom, (x, y, theta))
+        self._odom, self.utime = (x, y, theta), utime
         self._path_m += motion.distance_m
-        self._late.append((utime, self._path_m, pose[2]))
+        self._late.append((utime, self._path_m, theta))
         while len(self._late) > 2 and self._late[1][0] <= utime - SPEED_US:
             self._late.popleft()
 
@@ -104,33 +106,36 @@ class Surroundings:
         channel, seal = near_channel(self.own.robot), self._team.seal
         return [Send(channel, seal.close(channel, encode(seal.header(utime), near.on_air())))]
 
-    def look(self, utime: int) -> Near | None:
-        """What there is to say now; None before the first odometry."""
+    def look(self, utime: int, wall: Wall = NO_WALL) -> Near | None:
+        """What there is to say now; None before the first odometry.
+
+        Args:
+            wall: UTC minus our clock, and how wrong that is, us.
+        """
         if self.utime is None:
             return None
         self._renew(utime)
-        odom = (self._odom[0], self._odom[1], self._odom[2])
-        speed, turn = self._speeds()
-        unlocalised = Near(self.utime, odom, speed, turn, resets=self._resets)
-        estimate, leg = self._estimate, self._leg
-        if estimate is None or leg is None or self._where.pose is None:
-            return unlocalised
-        bold, gap_m = self._back.revisions.boldness, self._front.watch.gap_m
-        added, doubt = bold * leg.added, np.diag([gap_m**2, gap_m**2, 0.0])
-        known = estimate.covariance(self.own.robot)
-        if known is None:
-            return unlocalised
-        covariance = bold * leg.moved(known) + added + doubt
-        pose = np.array(leg.end)
-        x, y, theta = se2.compose(pose, se2.inverse(np.array(odom))).tolist()
-        return replace(
-            unlocalised,
-            state=self._where.state,
+        odom, (speed, turn) = self._odom, self._speeds()
+        estimate, leg, where = self._estimate, self._leg, self._where
+        known = estimate.covariance(self.own.robot) if estimate is not None else None
+        if estimate is None or leg is None or known is None or where.pose is None:
+            return Near(self.utime, odom, speed, turn, *wall, resets=self._resets)
+        bold, gap = self._back.revisions.boldness, self._front.watch.gap_m**2
+        added = added_up(times(bold, leg.added), (gap, 0.0, 0.0, gap, 0.0, 0.0))
+        covariance = added_up(times(bold, moved(se2.packed(known), *leg.lever)), added)
+        return Near(
+            self.utime,
+            odom,
+            speed,
+            turn,
+            *wall,
+            state=where.state,
             frame=estimate.frame.robot,
             frame_epoch=estimate.frame.epoch,
-            correction=(x, y, float(se2.wrap(theta))),
-            covariance=se2.packed(covariance),
-            peers=self._peers.seen(leg, added + doubt, bold, self.utime),
+            correction=_taken_off(leg.end, odom),
+            covariance=covariance,
+            resets=self._resets,
+            peers=self._peers.seen(leg, added, bold, self.utime),
         )
 
     def _speeds(self) -> tuple[float, float]:
@@ -166,7 +171,8 @@ class Surroundings:
             return True
         apart = np.array(leg.end) - np.array(old.end)
         apart[2] = se2.wrap(apart[2])
-        covariance = old.moved(known) + old.added + RESOLUTION**2 * np.eye(3)
+        carried = added_up(moved(se2.packed(known), *old.lever), old.added)
+        covariance = se2.unpacked(carried) + RESOLUTION**2 * np.eye(3)
         return bool(apart @ np.linalg.solve(covariance, apart) > JUMP)
 
     def _own_leg(self, estimate: TeamEstimate | None) -> Leg | None:
@@ -183,3 +189,11 @@ class Surroundings:
         leg.along(way)
         leg.go(way[-1].tolist(), self._odom)
         return leg
+
+
+def _taken_off(w_T_a: Sequence[float], o_T_a: Sequence[float]) -> tuple[float, float, float]:
+    """w_T_o."""
+    turn = math.remainder(w_T_a[2] - o_T_a[2], 2 * math.pi)
+    cos, sin = math.cos(turn), math.sin(turn)
+    x, y = o_T_a[0], o_T_a[1]
+    return w_T_a[0] - cos * x + sin * y, w_T_a[1] - sin * x - cos * y, turn

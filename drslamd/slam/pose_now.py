@@ -48,31 +48,20 @@ def carried(
         level: how many times the sigma of odometry is what is configured.
     """
     forward = np.eye(3)
-    forward[:2, 2] = se2.rotate(heading, _lever(step[-1])[:2, 2])
+    forward[:2, 2] = se2.rotate(heading, _lever(step)[:2, 2])
     moved = forward @ covariance @ forward.T
     return np.asarray(moved + noise_of_way(heading, step, noise, level))
 
 
 def noise_of_way(heading: float, step: Array, noise: OdometryNoise, level: float) -> Array:
     """(3, 3) what a way adds to the covariance of x, y, theta in w, see `carried`."""
-    return noise_of_sums(heading, step[-1], growth(step)[-1], noise, level)
+    lever = _lever(step)
+    added = lever @ covariance_between(noise, step, growth(step), 0, -1) @ lever.T
+    return np.asarray(level**2 * se2.turned(added, heading))
 
 
-def noise_of_sums(
-    heading: float, end: Array, sums: Array, noise: OdometryNoise, level: float
-) -> Array:
-    """(3, 3) the same of a way of which only the end (3,) and the sums (6,) of `growth` are known.
-
-    Both are seen from its start.
-    """
-    ends = np.stack([np.zeros(3), end])
-    twist = covariance_between(noise, ends, np.stack([np.zeros(6), sums]), 0, 1)
-    lever = _lever(end)
-    return np.asarray(level**2 * se2.turned(lever @ twist @ lever.T, heading))
-
-
-def _lever(end: Array) -> Array:
-    """(3, 3) from a twist about the start of a way to one about its end (3,)."""
+def _lever(step: Array) -> Array:
+    """(3, 3) from a twist about the start of a way to one about its end."""
     lever = np.eye(3)
-    lever[:2, 2] = -end[1], end[0]
+    lever[:2, 2] = -step[-1, 1], step[-1, 0]
     return lever

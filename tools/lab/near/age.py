@@ -9,8 +9,6 @@ import tempfile
 import time
 from pathlib import Path
 
-import numpy as np
-
 from drslamd.io.near_socket import connected
 from drslamd.io.status_socket import ask
 from drslamd.machine.folders import near_path

@@ -42,9 +42,7 @@ def _speed(before: Near, after: Near) -> float:
     return float(way / (after.utime - before.utime) * 1e6)
 
 
-def _add(
-    tally: Tally, recording: Recording, simulator: Simulator, robot: int, near: Near
-) -> None:
+def _add(tally: Tally, recording: Recording, simulator: Simulator, robot: int, near: Near) -> None:
     member = simulator.members[robot]
     here = _true(recording, robot, member, near.utime)
     origin = recording.trails[near.frame].truth[0]
