@@ -25,7 +25,7 @@ from drslamd.slam.se2 import Array
 
 FINGERPRINT: bytes = lcmtypes.near_t._get_packed_fingerprint()
 MOST_ON_AIR = 20
-"""Peers in one datagram, which with these has 1,381 bytes."""
+"""Peers in one datagram, which with these has 1,340 bytes."""
 UNKNOWN_UNCERTAINTY = -1
 LAST_UTC_US = 2**53
 """The year 2255; also how far any clock is from UTC at most."""

@@ -7,13 +7,14 @@ import os
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from drslamd.io.near_socket import connected
 from drslamd.io.status_socket import ask
 from drslamd.machine.folders import near_path
 from drslamd.near import near_message
-from lab.play.playback import equip, robot_toml
+from lab.play.playback import Chunk, equip, robot_toml
 from lab.play.real_team import PseudoPort, free_port
 from lab.recordings import world
 
@@ -23,8 +24,13 @@ TICK_S = os.sysconf("SC_CLK_TCK")
 
 async def measured(
     robots: int, seconds: float, computes: bool, reads: bool = True
-) -> tuple[list[float], float, int]:
-    """Ages of the poses in ms, share of a core, and how many peers there were."""
+) -> tuple[list[float], float]:
+    """Ages of the poses in ms, and the share of a core that the daemon took.
+
+    Args:
+        computes: module 3 of such a team, without a pause.
+        reads: is anybody connected?
+    """
     hardware = equip(world.simulate(world.Scene(robots=1, seconds=seconds + 2), 1))[0]
     with tempfile.TemporaryDirectory(prefix="drslamd-near-") as name:
         folder = Path(name)
@@ -39,29 +45,28 @@ async def measured(
         word = "compute" if computes else "rest"
         process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "lab.near.busy_daemon", str(config), str(robots), word),
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": ":".join(sys.path)},
+            env={
+                **os.environ,
+                "OPENBLAS_NUM_THREADS": "1",
+                "PYTHONPATH": os.pathsep.join(sys.path),
+            },
         )
         try:
             await _ready(folder / "socket")
-            chunks = [c for c in hardware.chunks() if c.port == "wheels"]
+            chunks = [c for c in hardware.chunks() if c.port == "wheels" and c.t < seconds]
+            before, began = _cpu_s(process.pid), time.monotonic()
             playing = asyncio.ensure_future(_play(wheels, chunks))
             ages: list[float] = []
-            peers = 0
             if reads:
-                # a process of its own would be nearer to life; a thread waits in the kernel as well
-                ages, peers = await asyncio.to_thread(_read, folder / "socket", seconds)
-                share = 0.0
-            else:
-                share = 0.0
-            before, began = _cpu_s(process.pid), time.monotonic()
+                ages = await asyncio.to_thread(_read, folder / "socket", seconds - 1.0)
             await playing
-            share = (_cpu_s(process.pid) - before) / max(time.monotonic() - began, 1e-9)
+            share = (_cpu_s(process.pid) - before) / (time.monotonic() - began)
         finally:
             process.terminate()
             await process.wait()
             uwb.pull()
             wheels.pull()
-    return ages, share, peers
+    return ages, share
 
 
 async def _ready(path: Path) -> None:
@@ -74,7 +79,7 @@ async def _ready(path: Path) -> None:
     raise AssertionError("the daemon does not answer")
 
 
-async def _play(port: PseudoPort, chunks: list) -> None:
+async def _play(port: PseudoPort, chunks: Sequence[Chunk]) -> None:
     began = time.monotonic()
     for chunk in chunks:
         wait = began + chunk.t - time.monotonic()
@@ -83,17 +88,17 @@ async def _play(port: PseudoPort, chunks: list) -> None:
         port.write(chunk.printed())
 
 
-def _read(path: Path, seconds: float) -> tuple[list[float], int]:
-    ages, peers, end = [], 0, time.monotonic() + seconds
+def _read(path: Path, seconds: float) -> list[float]:
+    ages, end = [], time.monotonic() + seconds
     with connected(near_path(path)) as reader:
         while time.monotonic() < end:
             payload = reader.recv(1 << 16)
             now = time.monotonic_ns() // 1_000
             near = near_message.decode(payload)
             assert not isinstance(near, str), near
-            ages.append((now - near.utime) / 1e3)
-            peers = len(near.peers)
-    return ages, peers
+            if near.peers.robots:
+                ages.append((now - near.utime) / 1e3)
+    return ages
 
 
 def _cpu_s(pid: int) -> float:
