@@ -35,7 +35,7 @@ def test_peers_come_with_their_covariance() -> None:
     from dimos_lcm.geometry_msgs import PoseWithCovarianceStamped
 
     seen = decoded("/robot_3/sees/robot_1", PoseWithCovarianceStamped)
-    assert list(seen.pose.covariance)[0] == NEAR.peers.covariance[0, 0]
+    assert next(iter(seen.pose.covariance)) == NEAR.peers.covariance[0, 0]
 
 
 def test_channels_are_named_as_dimos_names_them(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from near_scenes import NEAR
@@ -25,7 +26,7 @@ def test_rosbags_and_mcap_read_tf_and_odometry_of_the_file(tmp_path: Path) -> No
         topics = {channel.topic for _, channel, _ in make_reader(file).iter_messages()}
     assert {"/tf", "/robot_3/odometry", "/robot_3/sees/robot_1"} <= topics
     with AnyReader([path]) as bag:
-        found = {
+        found: dict[str, Any] = {
             c.topic: bag.deserialize(raw, c.msgtype) for c, _, raw in bag.messages(bag.connections)
         }
     assert found["/tf"].transforms[0].transform.translation.x == 3.0
@@ -45,7 +46,8 @@ def test_a_reader_of_dds_takes_tf() -> None:
         pytest.skip("DDS finds no network interface here")
     kind = dds_type("tf2_msgs/TFMessage")
     reader = DataReader(participant, Topic(participant, "rt/tf", kind))
-    feed, found = Dds(3, 83), []
+    feed = Dds(3, 83)
+    found: list[Any] = []
     end = time.monotonic() + 10
     while not found and time.monotonic() < end:
         feed.tell(NEAR)

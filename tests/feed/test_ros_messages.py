@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from near_scenes import NEAR
@@ -13,7 +14,7 @@ from drslamd.gossip.message_types import PoseState
 from drslamd.near.near_message import NOBODY, Near
 
 
-def by_topic(near: Near) -> dict:
+def by_topic(near: Near) -> dict[str, Any]:
     return {topic: message for topic, _, message in ros_messages(3, near)}
 
 

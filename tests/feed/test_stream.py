@@ -14,7 +14,7 @@ from near_scenes import NEAR
 from drslamd.feed.stream import told, unix_us
 from drslamd.gossip.message_types import UNKNOWN_CLOCK
 from drslamd.gossip.seal import VERSION, Header
-from drslamd.near.near_message import encode
+from drslamd.near.near_message import Near, encode
 
 PAYLOAD = encode(Header(VERSION, 3, 7, 0, 5_000_001), NEAR)
 
@@ -31,7 +31,7 @@ def test_a_daemon_that_starts_again_is_found_again(tmp_path: Path) -> None:
     path = tmp_path / "near"
     daemon = listening(path)
     messages = told(path, sleep=lambda s: None)
-    pulled = []
+    pulled: list[Near] = []
 
     def serve(listener: socket.socket) -> None:
         reader, _ = listener.accept()
@@ -50,7 +50,6 @@ def test_a_daemon_that_starts_again_is_found_again(tmp_path: Path) -> None:
     pulled += islice(messages, 1)
     thread.join()
     again.close()
-    messages.close()
     assert [near.utime for near in pulled] == [NEAR.utime] * 2
 
 

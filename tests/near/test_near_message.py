@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -78,7 +79,7 @@ def test_on_lcm_the_nearest_have_room_in_one_datagram() -> None:
     ],
     ids=str,
 )
-def test_what_no_robot_can_have_said_is_one_phrase(wrong: dict) -> None:
+def test_what_no_robot_can_have_said_is_one_phrase(wrong: dict[str, Any]) -> None:
     assert isinstance(near_message.decode(near_message.encode(HEADER, replace(NEAR, **wrong))), str)
 
 

@@ -42,7 +42,7 @@ def test_a_peer_is_where_its_newest_keyframe_is(steered: Steered) -> None:
     assert after.speeds[0] == pytest.approx(0.3, abs=1e-3)
     assert np.allclose(after.a_T_b[1], before.a_T_b[1])
     assert after.utimes[0] == n * GRID_US
-    assert (after.covariance[[0, 3, 5], 0] > before.covariance[[0, 3, 5], 0]).all()
+    assert after.covariance[5, 0] > before.covariance[5, 0]
 
 
 def test_news_are_looked_for_five_times_a_second(steered: Steered) -> None:

@@ -10,6 +10,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from drslamd.io.near_socket import connected
 from drslamd.io.status_socket import ask
 from drslamd.machine.folders import near_path
@@ -17,6 +19,7 @@ from drslamd.near import near_message
 from lab.play.playback import Chunk, equip, robot_toml
 from lab.play.real_team import PseudoPort, free_port
 from lab.recordings import world
+from lab.recordings.recording import Array
 
 START_S = 60.0
 TICK_S = os.sysconf("SC_CLK_TCK")
@@ -56,17 +59,17 @@ async def measured(
             chunks = [c for c in hardware.chunks() if c.port == "wheels" and c.t < seconds]
             before, began = _cpu_s(process.pid), time.monotonic()
             playing = asyncio.ensure_future(_play(wheels, chunks))
-            ages: list[float] = []
+            read = np.zeros((0, 2))
             if reads:
-                ages = await asyncio.to_thread(_read, folder / "socket", seconds - 1.0)
-            await playing
+                read = await asyncio.to_thread(_read, folder / "socket", seconds - 1.0)
+            written = await playing
             share = (_cpu_s(process.pid) - before) / (time.monotonic() - began)
         finally:
             process.terminate()
             await process.wait()
             uwb.pull()
             wheels.pull()
-    return ages, share
+    return _ages(read, written), share
 
 
 async def _ready(path: Path) -> None:
@@ -79,17 +82,29 @@ async def _ready(path: Path) -> None:
     raise AssertionError("the daemon does not answer")
 
 
-async def _play(port: PseudoPort, chunks: Sequence[Chunk]) -> None:
+async def _play(port: PseudoPort, chunks: Sequence[Chunk]) -> Array:
+    """(k, 2) when each was due and when it was written, us."""
+    rows = []
     began = time.monotonic()
     for chunk in chunks:
         wait = began + chunk.t - time.monotonic()
         if wait > 0:
             await asyncio.sleep(wait)
         port.write(chunk.printed())
+        rows.append([(began + chunk.t) * 1e6, time.monotonic_ns() / 1e3])
+    return np.array(rows)
 
 
-def _read(path: Path, seconds: float) -> list[float]:
-    ages, end = [], time.monotonic() + seconds
+def _ages(read: Array, written: Array) -> list[float]:
+    """ms from measurement to reader; how late the emulated wheels were does not count."""
+    due, late = written[:, 0], written[:, 1] - written[:, 0]
+    nearest = np.abs(read[:, 1, None] - due).argmin(axis=1)
+    return ((read[:, 0] - read[:, 1] - late[nearest]) / 1e3).tolist()
+
+
+def _read(path: Path, seconds: float) -> Array:
+    """(m, 2) when each message was read and the time that it bears, us."""
+    rows, end = [], time.monotonic() + seconds
     with connected(near_path(path)) as reader:
         while time.monotonic() < end:
             payload = reader.recv(1 << 16)
@@ -97,8 +112,8 @@ def _read(path: Path, seconds: float) -> list[float]:
             near = near_message.decode(payload)
             assert not isinstance(near, str), near
             if near.peers.robots:
-                ages.append((now - near.utime) / 1e3)
-    return ages
+                rows.append([now, near.utime])
+    return np.array(rows, dtype=float).reshape(-1, 2)
 
 
 def _cpu_s(pid: int) -> float:
