@@ -57,7 +57,12 @@ class Surroundings:
         back: BackEnd,
         team: Team,
         standing: Standing,
+        is_asked: bool = True,
     ) -> None:
+        """
+        Args:
+            is_asked: False for what is said on LCM and never shown to a reader.
+        """
         self._period_us = round(SECOND_US / config.near.lcm_hz) if config.near.lcm_hz else 0
         self.own, self._front, self._back, self._team = own, front, back, team
         self._standing = standing
@@ -67,6 +72,9 @@ class Surroundings:
         self._late: deque[tuple[int, float, float]] = deque()
         """Time, way and heading of late, as many as `SPEED_US` holds."""
         self._said = 0
+        parts = (config, own, front, back, team, standing)
+        self._air = Surroundings(*parts, is_asked=False) if self._period_us and is_asked else None
+        """Apart, so that what is said on LCM does not depend on when readers of the socket ask."""
         self._estimate: TeamEstimate | None = None
         self._leg: Leg | None = None
         self._began = 0
@@ -77,6 +85,8 @@ class Surroundings:
 
     def on_motion(self, motion: Motion) -> None:
         """Our odometry went on, and dead reckoning has it already."""
+        if self._air is not None:
+            self._air.on_motion(motion)
         reckoning = self._front.reckoning
         (x, y, theta), utime = reckoning.pose.tolist(), reckoning.utime
         if utime is None or utime == self.utime:
@@ -95,11 +105,11 @@ class Surroundings:
 
     def send(self, utime: int) -> list[Send]:
         """On LCM, as often as is asked for."""
-        if not self._period_us or self.utime is None:
+        if self._air is None or self.utime is None:
             return []
         if self.utime - self._said < self._period_us - SOONER_US:
             return []
-        near = self.look(utime)
+        near = self._air.look(utime)
         if near is None or not is_near(near):
             return []
         self._said = self.utime

@@ -114,3 +114,20 @@ def test_on_lcm_it_is_said_as_often_as_it_is_asked_for() -> None:
     found = near_message.decode(said[-1].payload)
     assert isinstance(found, near_message.Near)
     assert found.peers.robots == (1, 2)
+
+
+def test_what_is_said_on_lcm_does_not_depend_on_who_reads_the_socket() -> None:
+    payloads = []
+    for reads in (False, True):
+        scene = Steered("[near]\nlcm_hz = 1\n")
+        scene.drive(20)
+        scene.solve()
+        said = []
+        for _ in range(150):
+            scene.drive(1)
+            if reads:
+                scene.look()
+            said += scene.robot.near.send(scene.utime)
+        payloads.append([send.payload for send in said])
+    assert payloads[0] == payloads[1]
+    assert len(payloads[0]) == 3

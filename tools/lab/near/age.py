@@ -99,7 +99,8 @@ def _ages(read: Array, written: Array) -> list[float]:
     """ms from measurement to reader; how late the emulated wheels were does not count."""
     due, late = written[:, 0], written[:, 1] - written[:, 0]
     nearest = np.abs(read[:, 1, None] - due).argmin(axis=1)
-    return ((read[:, 0] - read[:, 1] - late[nearest]) / 1e3).tolist()
+    ages: list[float] = ((read[:, 0] - read[:, 1] - late[nearest]) / 1e3).tolist()
+    return ages
 
 
 def _read(path: Path, seconds: float) -> Array:
