@@ -258,6 +258,14 @@ class GossipSection(Section):
         return self
 
 
+class NearSection(Section):
+    """The pose of now and the peers around it, for whoever steers by it."""
+
+    lcm_hz: Annotated[float, Field(ge=0, le=50)] = 0
+    """Messages a second on the channel DRSLAM_NEAR, at most one for each sample of odometry; 0 says
+    nothing there. The local socket always has all of them."""
+
+
 class DaemonSection(Section):
     state_dir: str = ""
     """Default: $STATE_DIRECTORY under systemd, else ~/.local/state/drslamd."""
@@ -283,6 +291,7 @@ class Config(Section):
     consistency: ConsistencySection = ConsistencySection()
     optimizer: OptimizerSection = OptimizerSection()
     gossip: GossipSection = GossipSection()
+    near: NearSection = NearSection()
     daemon: DaemonSection = DaemonSection()
 
     @property

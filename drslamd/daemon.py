@@ -35,6 +35,7 @@ from drslamd.events import (
 )
 from drslamd.gossip.seal import team_key
 from drslamd.io.clock import Clock, MonotonicClock, cpu_s
+from drslamd.io.near_socket import NearSocket
 from drslamd.io.pace import Pace
 from drslamd.io.serial_port import SerialPort
 from drslamd.io.state_store import StateStore, read_key
@@ -44,7 +45,7 @@ from drslamd.io.wall_clock import read_wall_clock
 from drslamd.io.watch.sleep_watch import SleepWatch
 from drslamd.io.watch.watchdog import Watchdog, slow_disk
 from drslamd.io.worker import Finished, Worker
-from drslamd.machine.folders import socket_path, state_dir
+from drslamd.machine.folders import near_path, socket_path, state_dir
 from drslamd.parts import (
     dbc_text,
     make_recorder,
@@ -101,6 +102,7 @@ class Daemon:
             "closures": lambda: report.closures(self.robot),
         }
         self._status = StatusSocket(socket_path(config), questions)
+        self._near = NearSocket(near_path(socket_path(config)), self._clock)
         self._notifier = Notifier()
         self._worker, self._disk = Worker(headway.marks), Worker()
         readers = (self._uwb, self._wheels, self._transport)
@@ -140,9 +142,9 @@ class Daemon:
         self.handle(SaveDone(self._clock.now(), self._store.fault))
         parts = (self._transport.run(), self._uwb.run(), self._wheels.run(), self._feed_watchdog())
         tasks = [self._start(part) for part in parts]
-        fault = await self._status.open()
-        if fault:
-            log.warning("status.fault", what=fault)
+        for fault in (await self._status.open(), self._near.open()):
+            if fault:
+                log.warning("status.fault", what=fault)
         self.handle(Tick(self._clock.now()))
         self._notifier.ready()
         await self._stop.wait()
@@ -165,6 +167,7 @@ class Daemon:
             for effect in self._answers(each):
                 self._perform(effect)
         self._wake()
+        self._near.tell(self.robot.near)
 
     def _new_robot(self, epoch: int, epochs: dict[int, int], kept: SensorCalibration) -> Robot:
         beginning = Beginning(epoch, dict(epochs), kept.state())
@@ -327,6 +330,7 @@ class Daemon:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
         await self._status.close()
+        self._near.close()
         await self._recorder.close()
         self._worker.stop()
         self._disk.stop()

@@ -48,6 +48,7 @@ from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
 from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, WHAT_IF, Job, Jobs
 from drslamd.memory import Memory
+from drslamd.near.surroundings import Surroundings
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.samples import Motion
 from drslamd.sensors.wheels.wheel_input import WheelInput
@@ -111,6 +112,7 @@ class Robot:
         self.back = BackEnd(config, self.own, tuning)
         self.broadcast = Broadcast(config, self.team, self.front, self.back)
         self.standing = Standing(config, self.own, self.front, self.back)
+        self.near = Surroundings(config, self.own, self.front, self.back, self.team, self.standing)
         self.outbox = Outbox(config.robot.id, config.gossip.max_bytes_per_s)
         self.health = Health()
         self.ports: dict[str, PortState] = {}
@@ -175,7 +177,8 @@ class Robot:
     def _on_motions(self, motions: list[Motion]) -> list[Effect]:
         for motion in motions:
             self.front.on_motion(motion)
-        return []
+            self.near.on_motion(motion)
+        return [*self.near.send(motions[-1].utime)] if motions else []
 
     def _on_port(self, event: PortState) -> list[Effect]:
         self.ports[event.port] = event
@@ -253,9 +256,8 @@ class Robot:
         """Module 1: a window of ranges and both odometries, for each pair that we own."""
         if self.jobs.is_resting(RELATIVE_POSE, utime):
             return []
-        windows = self.front.module1(
-            self.neighbours(utime), self.back.graph, self.back.estimate, utime
-        )
+        peers = self.neighbours(utime)
+        windows = self.front.module1(peers, self.back.graph, self.back.estimate, utime)
         return [
             self.jobs.begin(Job(RELATIVE_POSE, window.pair, window.request), window.run)
             for window in windows
@@ -280,8 +282,7 @@ class Robot:
         """Module 3: the team's pose graph."""
         if self.jobs.is_busy(OPTIMIZER) or self.jobs.is_resting(OPTIMIZER, utime):
             return []
-        talking = set(self.team.living(utime))
-        run = self.back.begin(self.team.present(utime), talking, utime)
+        run = self.back.begin(self.team.present(utime), set(self.team.living(utime)), utime)
         return [self.jobs.begin(Job(OPTIMIZER), run)] if run else []
 
     def _take_turn(self, utime: int) -> list[Effect]:
@@ -315,9 +316,8 @@ class Robot:
         self.team.forget_silent(utime)
         self.front.watch_ranges(self.neighbours(utime), self.back.graph, self.back.estimate, utime)
         self.back.exchange.keep({peer.chain for peer in self.team.peers.values()})
-        notes: list[Effect] = []
-        for key, sentence in diagnosis.conditions(self, utime):
-            notes += self.health.set(key, sentence, utime)
+        found = diagnosis.conditions(self, utime)
+        notes: list[Effect] = [n for key, why in found for n in self.health.set(key, why, utime)]
         above = self.team.superseded_by
         if above is None or self.team.is_own_id_used(utime):
             return notes

@@ -31,6 +31,7 @@ RINGS = {
         "whereabouts",
         "standing",
         "broadcast",
+        "near",
         "conditions",
         "robot",
         "reports",
@@ -39,7 +40,7 @@ RINGS = {
         "status_table",
     ],
     "shell": ["host", "io", "export"],
-    "entry": ["parts", "machine", "doctor", "daemon", "view", "cli", "__main__"],
+    "entry": ["parts", "machine", "doctor", "daemon", "view", "feed", "cli", "__main__"],
 }
 """From the inside out; a module imports only from its own ring and those before it."""
 

@@ -15,6 +15,7 @@ from drslamd.cli import (
     check,
     doctor,
     export,
+    feed,
     keygen,
     record,
     run,
@@ -39,6 +40,7 @@ examples:
   drslamd view --interface wlan0             the team on a live map, in a browser
   drslamd trajectory -c /etc/drslamd/3.toml --tum out/
   drslamd export -c /etc/drslamd/3.toml --to out/ --format csv mcap
+  drslamd feed foxglove -c /etc/drslamd/3.toml   pose and peers, live, for other programs
   drslamd record run.lcmlog --interface wlan0   what all robots say, for LCM tools
 
 exit codes: 0 done, 1 doctor or calibrate found something, 64 wrong usage, 69 no daemon or sensor
@@ -46,7 +48,20 @@ answers (view: no aiohttp, or its port is taken), 70 a bug, 73 a file cannot be 
 daemon already runs, 78 the set-up cannot be used
 """
 
-VERBS = (init, run, check, calibrate, doctor, status, view, trajectory, export, record, keygen)
+VERBS = (
+    init,
+    run,
+    check,
+    calibrate,
+    doctor,
+    status,
+    view,
+    trajectory,
+    export,
+    feed,
+    record,
+    keygen,
+)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -30,6 +30,7 @@ from drslamd.gossip.seal import TAG_BYTES, Header
 __all__ = [
     "CHANNEL_PREFIX",
     "FINGERPRINTS",
+    "NEAR_PREFIX",
     "MAX_BATCH",
     "MAX_HEARD",
     "MAX_LOGS",
@@ -48,6 +49,8 @@ __all__ = [
 ]
 
 CHANNEL_PREFIX = "DRSLAM_"
+NEAR_PREFIX = f"{CHANNEL_PREFIX}NEAR_"
+"""Of what robots tell whoever steers, and do not listen to."""
 FINGERPRINTS = {kind: codec.struct._get_packed_fingerprint() for kind, codec in CODECS.items()}
 """LCM's eight bytes that begin every message of a kind."""
 

@@ -47,7 +47,7 @@ class Outbox:
         since = 0 if self._utime is None else max(0, utime - self._utime)
         self._utime = utime
         self._bucket = min(full, self._bucket + self._rate * since / SECOND_US)
-        kind = messages.kind_of_channel(send.channel) or ""
+        kind = messages.kind_of_channel(send.channel) or "NEAR"
         is_ours = send.channel == messages.channel(kind, self._robot)
         leaves = LEAVES.get(kind, RELAYED) if is_ours else RELAYED
         size = 8 + len(send.channel) + 1 + len(send.payload)

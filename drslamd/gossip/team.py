@@ -203,6 +203,8 @@ class Team:
         else:
             channel, payload = event.channel, event.payload
         kind = messages.kind_of_channel(channel)
+        if channel.startswith(messages.NEAR_PREFIX):
+            return None  # for whoever steers, not for robots
         if kind is None:
             self.refused["channel of another program"] += 1
             return None

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import queue
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -22,6 +23,11 @@ class Finished:
     result: Any
     error: BaseException | None
     seconds: float
+
+
+SWITCH_S = 0.0005
+"""How long the thread computes on while the loop waits for the interpreter. Python's own 5 ms, for
+each of several waits of one event, would make a pose too old to steer by."""
 
 
 class Worker:
@@ -47,6 +53,7 @@ class Worker:
     def start(self) -> None:
         """Begin to work for the running loop."""
         self._loop = asyncio.get_running_loop()
+        sys.setswitchinterval(SWITCH_S)
         threading.Thread(target=self._work, name="worker", daemon=True).start()
 
     def submit(self, run: Callable[[], Any], done: Callable[[Finished], None]) -> None:

@@ -11,6 +11,7 @@ from .heard_t import heard_t as heard_t
 from .held_t import held_t as held_t
 from .keyframe_t import keyframe_t as keyframe_t
 from .log_t import log_t as log_t
+from .near_t import near_t as near_t
 from .odometry_t import odometry_t as odometry_t
 from .peer_t import peer_t as peer_t
 from .pose_t import pose_t as pose_t

@@ -47,6 +47,11 @@ def socket_path(config: Config) -> Path:
     return (Path(runtime) if runtime else state_dir(config)) / _socket_name(config)
 
 
+def near_path(status: Path) -> Path:
+    """Where a robot tells its pose as often as it can, beside where it answers questions."""
+    return status.with_suffix(".near")
+
+
 def socket_to_ask(config: Config) -> Path:
     """Where a running daemon of this robot answers: the service's, if there is one.
 

@@ -22,6 +22,16 @@ class DeadReckoning:
         self._pose = np.zeros(3)
         self._not_before = 0
 
+    @property
+    def utime(self) -> int | None:
+        """Of the last motion, us."""
+        return self._utime
+
+    @property
+    def pose(self) -> Array:
+        """(3,) o_T_a after it; theta counts on."""
+        return self._pose
+
     def add(self, motion: Motion) -> None:
         """Take one motion; motions must come in the order of their time."""
         since, before = self._utime, self._pose

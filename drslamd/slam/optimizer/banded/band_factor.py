@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cholesky_banded
-from scipy.linalg.lapack import dtbtrs
 
+from drslamd.slam.optimizer.banded.lapack import cholesky_banded, triangular_banded
 from drslamd.slam.optimizer.banded.layout import NOWHERE
 from drslamd.slam.optimizer.banded.normal_equations import System
 from drslamd.slam.se2 import Array, Index
@@ -41,10 +40,10 @@ class BandFactor:
         band[0] *= 1 + damping
         corner[np.diag_indices(len(corner))] *= 1 + damping
         try:
-            lower = cholesky_banded(band, lower=True, check_finite=False)
+            lower = cholesky_banded(band)
         except np.linalg.LinAlgError:
             return None
-        halfway = _triangular(lower, system.border)
+        halfway = triangular_banded(lower, system.border)
         schur = corner - halfway.T @ halfway
         # a tiny pivot of A can leave nothing of the border but rounding
         definite = np.isfinite(schur).all() and bool((np.diag(schur) > 0).all())
@@ -54,12 +53,12 @@ class BandFactor:
         """The solution for a right-hand side (n + b,), or for c of them (n + b, c)."""
         n = len(self.halfway)
         columns = right.reshape(len(right), -1)
-        middle = _triangular(self.lower, columns[:n])
+        middle = triangular_banded(self.lower, columns[:n])
         try:
             outer = np.linalg.solve(self.schur, columns[n:] - self.halfway.T @ middle)
         except np.linalg.LinAlgError:
             return None
-        inner = _triangular(self.lower, middle - self.halfway @ outer, transposed=True)
+        inner = triangular_banded(self.lower, middle - self.halfway @ outer, transposed=True)
         return np.concatenate([inner, outer]).reshape(right.shape)
 
     def joint_covariance(self, unknowns: Index) -> Array | None:
@@ -69,7 +68,7 @@ class BandFactor:
         inside = unknowns < n
         unit = np.zeros((n, len(unknowns)))
         unit[unknowns[inside], columns[inside]] = 1
-        own = _triangular(self.lower, unit)
+        own = triangular_banded(self.lower, unit)
         bound = -self.halfway.T @ own
         bound[unknowns[~inside] - n, columns[~inside]] += 1
         try:
@@ -85,7 +84,7 @@ class BandFactor:
         where there is no inverse.
         """
         n = len(self.halfway)
-        across = _triangular(self.lower, self.halfway, transposed=True)
+        across = triangular_banded(self.lower, self.halfway, transposed=True)
         try:
             outer = np.linalg.inv(self.schur)
         except np.linalg.LinAlgError:
@@ -100,14 +99,6 @@ class BandFactor:
         both = (row < n) & (column != NOWHERE)
         blocks[both] += selected_inverse(self.lower)[(row - column)[both], column[both]]
         return np.asarray(blocks)
-
-
-def _triangular(lower: Array, columns: Array, transposed: bool = False) -> Array:
-    """L^-1, or L'^-1, times columns (n, c)."""
-    if not columns.size:  # of which scipy would write beyond its memory
-        return columns
-    solved, _ = dtbtrs(lower, columns, uplo="L", trans="T" if transposed else "N")
-    return np.asarray(solved)
 
 
 def selected_inverse(lower: Array) -> Array:

@@ -1,0 +1,84 @@
+"""Peers as they are seen from where we are now, with the covariance of both ends together.
+
+Of two robots the solution knows more than of each: where both are wrong alike, they are right
+about each other. So what is told of a pair comes from their joint covariance, carried to the end
+of both legs. With errors a (ours) and b of x, y, theta in w, d the way from us to the peer, and
+
+    S = [1 0 -dy; 0 1 dx; 0 0 1]
+
+the relative pose is wrong by R(-theta) (b - S a). Our own leg moves fifty times a second, but S F,
+from its start, does not: so all but the noise of our own leg is worked out once for each solution
+and each news of a peer, here for all peers together.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drslamd.near.leg import Leg
+from drslamd.near.packed import Packed, moved, turned
+from drslamd.slam import se2
+from drslamd.slam.graph.estimate import TeamEstimate
+from drslamd.slam.se2 import Array
+
+UPPER = np.triu_indices(3)
+"""Of a matrix of three by three, in the order of packed covariances."""
+
+
+@dataclass(frozen=True)
+class Relatives:
+    """m peers in w, as uncertain as they are for us, the noise of our leg left out.
+
+    Attributes:
+        poses: (m, 3) w_T_b.
+        known: (6, m) covariance of b - S a, xx xy xt yy yt tt in the axes of w.
+    """
+
+    poses: Array
+    known: Array
+
+    def seen_from(
+        self, pose: Sequence[float], added: Packed, bold: float = 1.0
+    ) -> tuple[Array, Array]:
+        """(m, 3) a_T_b, and (6, m) its covariance in the axes of a.
+
+        Args:
+            pose: w_T_a.
+            added: what our leg adds to its covariance, packed.
+            bold: times `known` that is claimed.
+        """
+        x, y, theta = pose
+        dx, dy = self.poses[:, 0] - x, self.poses[:, 1] - y
+        cos, sin = math.cos(theta), math.sin(theta)
+        seen = np.empty_like(self.poses)
+        seen[:, 0], seen[:, 1] = cos * dx + sin * dy, cos * dy - sin * dx
+        seen[:, 2] = se2.wrap(self.poses[:, 2] - theta)
+        covariance = np.empty_like(self.known)
+        for row, here in enumerate(moved(added, dx, dy)):
+            covariance[row] = bold * self.known[row] + here
+        return seen, np.array(turned(covariance, cos, sin))
+
+
+def relatives(estimate: TeamEstimate, own: int, leg: Leg, legs: dict[int, Leg]) -> Relatives:
+    """Peers of which something is known together with us.
+
+    Args:
+        leg: our own, from our last solved pose; legs: of the peers, in the order that is kept.
+    """
+    poses = np.array([peer.end for peer in legs.values()]).reshape(-1, 3)
+    if not legs:
+        return Relatives(poses, np.zeros((6, 0)))
+    joints = [estimate.joint_of(own, robot) for robot in legs]
+    joint = np.stack([found for found in joints if found is not None])
+    across, along = (np.tile(np.eye(3), (len(legs), 1, 1)) for _ in range(2))
+    across[:, 0, 2], across[:, 1, 2] = leg.start[1] - poses[:, 1], poses[:, 0] - leg.start[0]
+    levers = np.array([peer.lever for peer in legs.values()])
+    along[:, 0, 2], along[:, 1, 2] = -levers[:, 1], levers[:, 0]
+    j = np.concatenate([-across, along], axis=2)
+    known = j @ joint @ np.swapaxes(j, 1, 2)
+    added = np.array([peer.added for peer in legs.values()]).T
+    return Relatives(poses, known[:, UPPER[0], UPPER[1]].T + added)
