@@ -9,6 +9,7 @@ import numpy as np
 from lab.soak.faults import FAULTS
 
 MIXED = "mixed"
+LASTS_S = 12.0
 FEWEST, MOST = 3, 6
 """Faults of a mixed run."""
 
@@ -35,7 +36,7 @@ class Scenario:
     faults: tuple[tuple[str, float], ...]
     expects: tuple[Expectation, ...] = ()
     says: str = ""
-    lasts_s: float = 12.0
+    lasts_s: float = LASTS_S
 
     @property
     def rows(self) -> tuple[str, ...]:
@@ -57,6 +58,8 @@ _SAID = {
     "disk-full": r"No space left",
     "read-only": r"Read-only",
 }
+_LASTS_S = {"disk-full": 30.0, "read-only": 30.0}
+"""A robot writes once a minute."""
 _EACH_DOSE = ("loss", "outliers", "range-dropout")
 """Kinds of which every dose is a cell; of others the strongest, weaker ones come in mixtures."""
 
@@ -69,8 +72,9 @@ def _alone() -> list[Scenario]:
         for dose in doses:
             title = f"{name}-{dose:g}" if len(doses) > 1 else name
             is_sensor = fault.rows[0][0] in "DM"
+            lasts_s = _LASTS_S.get(name, LASTS_S)
             expects = TRUE if is_sensor else (*HEALED_SOON, *TRUE)
-            out.append(Scenario(title, ((name, dose),), expects, _SAID.get(name, "")))
+            out.append(Scenario(title, ((name, dose),), expects, _SAID.get(name, ""), lasts_s))
     return out
 
 
