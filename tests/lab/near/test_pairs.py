@@ -9,7 +9,7 @@ from lab.recordings import world
 
 @pytest.mark.slow
 def test_what_is_told_of_peers_is_honest_and_odom_is_smooth() -> None:
-    tally = pairs.honesty(world.simulate(world.Scene(seconds=60.0), 101), 101)
+    tally = pairs.honesty(world.simulate(world.Scene(), 101), 101)
     assert tally["pair/nees"].n > 50
     assert tally["pair/nees"].mean < 1.5
     assert tally["pair/age"].mean < 1.5
