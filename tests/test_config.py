@@ -234,7 +234,6 @@ WRONG = {
 
 @pytest.mark.row("O1")
 @pytest.mark.parametrize("name", WRONG)
-@pytest.mark.row("O1")
 def test_a_fault_is_one_sentence_with_key_value_and_what_is_allowed(name: str) -> None:
     text, key, value, allowed = WRONG[name]
     matching = [f for f in faults(text) if f.startswith(key)]

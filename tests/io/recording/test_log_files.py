@@ -72,7 +72,6 @@ def test_a_file_is_a_share_of_the_quota_and_not_endless(
 
 @pytest.mark.row("O3")
 @pytest.mark.parametrize(("spare", "stay"), [(0, 15), (-1, 14)])
-@pytest.mark.row("O3")
 def test_the_oldest_go_when_another_one_does_not_fit(tmp_path: Path, spare: int, stay: int) -> None:
     size = QUOTA // FILES
     for part in range(15):
