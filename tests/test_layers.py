@@ -75,6 +75,7 @@ SLAM_ORDER = [
 
 OPTIMIZER_ORDER = [
     "bias_prior",
+    "sensor_priors",
     "mounting_prior",
     "problem",
     "complex_factors",

@@ -13,7 +13,8 @@ from slam_scenes import Array
 from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout
 from drslamd.slam.optimizer.banded.normal_equations import GAUGE_SIGMA, System
 from drslamd.slam.optimizer.banded.point import Point
-from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem
+from drslamd.slam.optimizer.problem import Doubted, Problem
+from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.range_model import LINKTRACK
 
 CUT = 2.5

@@ -14,10 +14,10 @@ from drslamd.slam.optimizer.problem import (
     CarriedEnds,
     Doubted,
     OdometryFactors,
-    Priors,
     Problem,
     RangeFactors,
 )
+from drslamd.slam.optimizer.sensor_priors import Priors
 from drslamd.slam.range_model import LINKTRACK
 
 BIAS = BiasPrior(sigma=0.6, spread=0.3, dof=3.0, team=0.1)

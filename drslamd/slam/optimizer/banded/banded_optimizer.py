@@ -28,7 +28,8 @@ from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE
 from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.factors import Numbering
-from drslamd.slam.optimizer.problem import Calibration, Doubted, Priors, Problem
+from drslamd.slam.optimizer.problem import Doubted, Problem
+from drslamd.slam.optimizer.sensor_priors import Calibration, Priors
 from drslamd.slam.range_model import LINKTRACK, RangeModel
 from drslamd.slam.se2 import Array, Index
 

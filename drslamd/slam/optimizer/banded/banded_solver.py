@@ -20,7 +20,8 @@ from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import raised
 from drslamd.slam.optimizer.banded.solution import Solution
-from drslamd.slam.optimizer.problem import Calibration, Problem
+from drslamd.slam.optimizer.problem import Problem
+from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.se2 import Array
 
 SETTLED = 1e-7

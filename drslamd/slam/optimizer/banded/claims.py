@@ -9,7 +9,8 @@ from drslamd.slam.calibration.range_scatter import LEAST_SCATTER, scatter_ratios
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
-from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem
+from drslamd.slam.optimizer.problem import Doubted, Problem
+from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.se2 import Array, Index
 
 UNKNOWN = 1e6

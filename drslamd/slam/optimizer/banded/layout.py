@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drslamd.slam.optimizer.problem import Calibration, OdometryFactors, Problem, RangeFactors
+from drslamd.slam.optimizer.problem import OdometryFactors, Problem, RangeFactors
+from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.optimizer.vertex_cover import vertex_cover
 from drslamd.slam.se2 import Array, Index
 

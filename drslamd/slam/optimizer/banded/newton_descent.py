@@ -11,7 +11,7 @@ from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE, WEIGHT, WHOLE
-from drslamd.slam.optimizer.problem import Calibration
+from drslamd.slam.optimizer.sensor_priors import Calibration
 
 FIRST_DAMPING = 1e-6
 """Of Levenberg and Marquardt, relative to the diagonal; less after each step that helped."""

@@ -13,11 +13,8 @@ from drslamd.slam.optimizer.banded.linearised import Linearised
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
 from drslamd.slam.optimizer.mounting_prior import ANTENNA, TRACK
-from drslamd.slam.optimizer.problem import (
-    Calibration,
-    Problem,
-    pose_errors,
-)
+from drslamd.slam.optimizer.problem import Problem, pose_errors
+from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.se2 import Array, Index
 
 GAUGE_SIGMA = 1e-5

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 from drslamd.slam.calibration.range_scatter import inlier_scatter
 from drslamd.slam.optimizer.problem import (
-    Calibration,
     Problem,
     RangeErrors,
     corrected,
     pose_errors,
     range_errors,
 )
+from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.se2 import Array
 
 

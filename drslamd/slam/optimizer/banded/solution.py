@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from drslamd.slam.optimizer.problem import Calibration, Doubted
+from drslamd.slam.optimizer.problem import Doubted
+from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.se2 import Array
 
 

@@ -38,13 +38,8 @@ from drslamd.slam.optimizer.banded.explanation import explain
 from drslamd.slam.optimizer.banded.misfit import guessed_misfit
 from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.problem import (
-    Calibration,
-    Doubted,
-    OdometryFactors,
-    Priors,
-    Problem,
-)
+from drslamd.slam.optimizer.problem import Doubted, OdometryFactors, Problem
+from drslamd.slam.optimizer.sensor_priors import Calibration, Priors
 
 gtsam = pytest.importorskip("gtsam", reason="gtsam has no wheel for this Python")
 

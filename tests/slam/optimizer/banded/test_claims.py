@@ -16,7 +16,8 @@ from drslamd.slam.optimizer.banded.banded_solver import solve
 from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
-from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem
+from drslamd.slam.optimizer.problem import Doubted, Problem
+from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.range_model import LINKTRACK
 
 SHARED = math.sqrt(1 + 2 * 0.64 * math.exp(-0.4) / (1 - math.exp(-0.4)))

@@ -35,7 +35,8 @@ from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import Levels
 from drslamd.slam.optimizer.banded.point import Point
-from drslamd.slam.optimizer.problem import Calibration, Problem
+from drslamd.slam.optimizer.problem import Problem
+from drslamd.slam.optimizer.sensor_priors import Calibration
 
 ROBOTS, COUNT = 4, 45
 FAULT = (25, 31)

@@ -12,13 +12,8 @@ from slam_problems import mismounted, team_problem
 from slam_scenes import Array
 
 from drslamd.slam.optimizer.banded import linearised
-from drslamd.slam.optimizer.problem import (
-    Calibration,
-    Problem,
-    corrected,
-    pose_errors,
-    range_errors,
-)
+from drslamd.slam.optimizer.problem import Problem, corrected, pose_errors, range_errors
+from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.range_model import LINKTRACK
 
 PROBLEM = mismounted(*team_problem(1, robots=3, count=5, is_thinned=True), turned_sigma=0.2)

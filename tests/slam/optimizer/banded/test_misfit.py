@@ -28,7 +28,8 @@ from drslamd.slam.optimizer.banded.misfit import (
 from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
-from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem
+from drslamd.slam.optimizer.problem import Doubted, Problem
+from drslamd.slam.optimizer.sensor_priors import Calibration
 
 
 def solved(problem: Problem) -> tuple[Equations, Point]:

@@ -24,7 +24,8 @@ from drslamd.slam.optimizer.banded.mountings import Scores, fitted, let_go, scor
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
-from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem
+from drslamd.slam.optimizer.problem import Doubted, Problem
+from drslamd.slam.optimizer.sensor_priors import Calibration
 
 MOST = 60
 

@@ -17,7 +17,8 @@ from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations, System
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.bias_prior import WHOLE
-from drslamd.slam.optimizer.problem import Calibration, Problem
+from drslamd.slam.optimizer.problem import Problem
+from drslamd.slam.optimizer.sensor_priors import Calibration
 
 MOST = 60
 

@@ -33,7 +33,8 @@ from drslamd.slam.optimizer.banded.layout import BandLayout
 from drslamd.slam.optimizer.banded.normal_equations import Equations, System
 from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE, WEIGHT, WHOLE
 from drslamd.slam.optimizer.mounting_prior import ANTENNA, TRACK
-from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem
+from drslamd.slam.optimizer.problem import Doubted, Problem
+from drslamd.slam.optimizer.sensor_priors import Calibration
 
 THRESHOLD = np.array([2.5, 1.5, 0.9])
 

@@ -43,7 +43,8 @@ from drslamd.slam.optimizer.banded.odometry_levels import (
     raised,
 )
 from drslamd.slam.optimizer.banded.point import Point
-from drslamd.slam.optimizer.problem import Calibration, Problem
+from drslamd.slam.optimizer.problem import Problem
+from drslamd.slam.optimizer.sensor_priors import Calibration
 
 ROBOTS, COUNT = 4, 45
 FAULT = (25, 31)

@@ -12,7 +12,8 @@ from slam_problems import mismounted, no_ranges, team_problem
 from slam_scenes import Array
 
 from drslamd.slam.optimizer.banded.point import Point
-from drslamd.slam.optimizer.problem import Calibration, Doubted, Problem
+from drslamd.slam.optimizer.problem import Doubted, Problem
+from drslamd.slam.optimizer.sensor_priors import Calibration
 
 
 def somewhere() -> tuple[Problem, Array, Calibration]:
