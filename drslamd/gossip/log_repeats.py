@@ -47,7 +47,7 @@ LOOK_BACK_S = 5.0
 """Over which it is counted what else is said."""
 
 
-class Pace:
+class Allowance:
     """How many bytes of repeats a team sends together: as many as it says anyhow.
 
     Everybody counts what is on the air, its own messages and what it hears, so that those who heal
@@ -137,7 +137,7 @@ class LogRepeats:
         self._questions: dict[int, _Question] = {}
         """By the peer that asks."""
         self.repeated = 0
-        self.pace = Pace()
+        self.pace = Allowance()
 
     def on_status(
         self, sender: int, named: Mapping[int, LogState], left_out: Set[int], utime: int

@@ -7,7 +7,7 @@ from log_scenes import OTHER, OWNER, PEER, T0, holding, repeated, said, state
 from message_builders import MS, SECOND
 
 from drslamd.conventions import Chain
-from drslamd.gossip.log_repeats import Pace
+from drslamd.gossip.log_repeats import Allowance
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.message_types import LogState
 from drslamd.slam.graph.measurements import Chapter
@@ -218,7 +218,7 @@ def test_no_more_than_240_repeats_are_planned() -> None:
 # their pace
 
 
-def repeated_in(seconds: int, pace: Pace, size: int = 500) -> int:
+def repeated_in(seconds: int, pace: Allowance, size: int = 500) -> int:
     """Bytes of repeats that go out when somebody always has one."""
     sent = 0
     for ms in range(0, 1000 * seconds, 10):
@@ -229,11 +229,11 @@ def repeated_in(seconds: int, pace: Pace, size: int = 500) -> int:
 
 
 def test_repeats_have_a_least_rate_where_nothing_else_is_said() -> None:
-    assert 14_500 <= repeated_in(10, Pace()) <= 16_500
+    assert 14_500 <= repeated_in(10, Allowance()) <= 16_500
 
 
 def test_repeats_have_as_many_bytes_as_everything_else() -> None:
-    pace, sent = Pace(), 0
+    pace, sent = Allowance(), 0
     for ms in range(0, 30_000, 10):
         pace.on_air(40, T0 + ms * MS)
         if ms >= 20_000 and pace.has_room(T0 + ms * MS):
@@ -243,16 +243,16 @@ def test_repeats_have_as_many_bytes_as_everything_else() -> None:
 
 
 def test_they_may_be_more_where_messages_are_lost() -> None:
-    lossy = Pace()
+    lossy = Allowance()
     lossy.reckon([0.5, 0.5])
-    assert repeated_in(10, lossy) > 3 * repeated_in(10, Pace())
-    hopeless = Pace()
+    assert repeated_in(10, lossy) > 3 * repeated_in(10, Allowance())
+    hopeless = Allowance()
     hopeless.reckon([1.0])
     assert hopeless.loss == 0.8
 
 
 def test_whoever_floods_the_channel_with_repeats_leaves_each_robot_one_a_second() -> None:
-    pace, sent = Pace(), 0
+    pace, sent = Allowance(), 0
     for ms in range(0, 10_000, 10):
         pace.on_air(1_000, T0 + ms * MS, repeated=True, heard=True)
         if pace.has_room(T0 + ms * MS):
