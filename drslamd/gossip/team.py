@@ -35,7 +35,7 @@ MODEL_EVERY = 64
 MEASUREMENTS_PER_ENTRY = 20
 """Keyframes, ranges and closures in one log entry; 20 closures with 20 peers are 1,280 bytes."""
 PUBLIC_ENVELOPE_BYTES = 80
-"""Of a public_poses_t besides its poses, each a number and 4 * rank floats, and 10 for each held."""
+"""Of a public_poses_t besides its poses, each a number and 4 * rank floats; 10 for each held."""
 UNVERIFIED_US = 10 * SECOND_US
 """How long after a message that does not fit the team key it is still spoken of."""
 _FINGERPRINTS = {kind: frozenset([value]) for kind, value in messages.FINGERPRINTS.items()}
