@@ -11,7 +11,7 @@ from drslamd.conventions import Chain
 from drslamd.gossip.log_repeats import LogRepeats
 from drslamd.gossip.message_types import MAX_LOGS, LogState
 from drslamd.gossip.replicated_log import AHEAD, ReplicatedLog
-from drslamd.slam.graph.measurements import Chapter
+from drslamd.slam.graph.measurements import Chapter, GraphEntry
 
 
 class LogSync:
@@ -58,6 +58,12 @@ class LogSync:
         if log.is_held(seq):
             log.aired[seq] = utime
         return new
+
+    def say(self, own: Chain, entry: GraphEntry, sealed: bytes, utime: int) -> None:
+        """An entry of our own; chapters are said as if they were repeated, when there is room."""
+        self.add(own, entry.seq, sealed, utime, entry.chapter)
+        if entry.chapter is None:
+            self.repeats.pace.on_air(len(sealed), utime)
 
     def next_states(self) -> tuple[LogState, ...]:
         """For our status: our own log, and those of the others, in turn when they are too many."""

@@ -35,7 +35,7 @@ MODEL_EVERY = 64
 MEASUREMENTS_PER_ENTRY = 20
 """Keyframes, ranges and closures in one log entry; 20 closures with 20 peers are 1,280 bytes."""
 PUBLIC_ENVELOPE_BYTES = 80
-"""What a public_poses_t needs besides its poses and what it holds of others."""
+"""Of a public_poses_t besides its poses, each a number and 4 * rank floats; 10 for each held."""
 UNVERIFIED_US = 10 * SECOND_US
 """How long after a message that does not fit the team key it is still spoken of."""
 _FINGERPRINTS = {kind: frozenset([value]) for kind, value in messages.FINGERPRINTS.items()}
@@ -101,8 +101,6 @@ class Team:
 
     def send_public(self, public: PublicPoses, utime: int) -> list[Send]:
         """Lifted poses, as many in one message as one datagram takes."""
-        # 10 bytes for each that is held, 4 bytes of number and 4 * rank floats for each pose, and
-        # the anchor's floats once
         lifted = 16 * public.rank
         envelope = PUBLIC_ENVELOPE_BYTES + 10 * len(public.held) + lifted
         return [
@@ -117,9 +115,7 @@ class Team:
         decoded = messages.decode("GRAPH", sealed)
         if not isinstance(decoded, GraphEntry):
             raise AssertionError(f"own graph entry does not decode: {decoded}")
-        self.logs.add(self.own, decoded.seq, sealed, utime, decoded.chapter)
-        if decoded.chapter is None:
-            self.logs.repeats.pace.on_air(len(sealed), utime)
+        self.logs.say(self.own, decoded, sealed, utime)
         self._chapters.take(decoded)
         self._next_seq = decoded.seq + 1
         return decoded, sealed
@@ -280,8 +276,7 @@ class Team:
             return
         self.logs.repeats.pace.reckon([p.usual_loss for p in self.living(utime).values()])
         self.logs.on_states(status.logs, peer.chain.robot, utime)
-        for complete in (s.complete for s in status.logs if (s.id, s.epoch) == self.own):
-            self._chapters.asked(complete)
+        self._chapters.on_states(self.own, status.logs)
         self.starts.on_status(peer.chain.robot, status, self._next_seq, utime)
 
     @property
@@ -293,8 +288,6 @@ class Team:
     def is_spent(self) -> bool:
         """Does this start run out of numbers for its messages or its log?"""
         return self.seal.is_spent or self._next_seq >= LAST_SEQ
-
-    # who is there
 
     def living(self, utime: int) -> dict[int, Peer]:
         """Peers that are alive and hear us."""

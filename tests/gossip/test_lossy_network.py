@@ -82,7 +82,7 @@ def test_a_partition_heals(loss: float) -> None:
     assert air.rounds_until_equal(10, robots=(2, 3, 4)) <= 10
     assert not air.is_equal()
     air.hears = lambda a, b: True
-    assert air.rounds_until_equal(25) <= 25
+    assert air.rounds_until_equal(40) <= 40
 
 
 @pytest.mark.row("N5")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
+from drslamd.conventions import Chain
 from drslamd.gossip.entries.chapter_packing import packed
 from drslamd.gossip.lc02 import MAX_PAYLOAD
+from drslamd.gossip.message_types import LogState
 from drslamd.slam.graph.chapters import SPAN, Layer, Sorter, part
 from drslamd.slam.graph.measurements import Chapter, GraphEntry
 
@@ -29,6 +31,12 @@ class ChapterWriter:
         """An entry that was said, in order."""
         if entry.chapter is None:
             self._entries.append(entry)
+
+    def on_states(self, own: Chain, states: Iterable[LogState]) -> None:
+        """A peer says how much of our log it has."""
+        for state in states:
+            if (state.id, state.epoch) == own:
+                self.asked(state.complete)
 
     def asked(self, complete: int) -> None:
         """Somebody lacks our log from entry `complete` on: many entries are better said at once."""
