@@ -21,6 +21,7 @@ CAUSES_FIRST = (
     "uwb",
     "wheels",
     "network",
+    "team.recording",
     "team.wrong_tag",
     "team.wrong_version",
     "team.uwb_id",
