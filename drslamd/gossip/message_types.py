@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Union
 
-from drslamd.conventions import LAST_UTIME
+from drslamd.conventions import LAST_UTIME, Chain
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.se2 import Array
@@ -108,3 +108,11 @@ class Pose:
 
 
 Message = Union[Status, OdometryBatch, GraphEntry, Pose, PublicPoses]
+
+
+@dataclass(frozen=True)
+class Received:
+    """One accepted message."""
+
+    origin: Chain
+    message: Message

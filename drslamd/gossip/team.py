@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Container, Iterator, Sequence, Set
-from dataclasses import dataclass
 
 from drslamd.conventions import SECOND_US, Chain
 from drslamd.events import ChannelMessage, Datagram, Send
@@ -14,7 +13,7 @@ from drslamd.gossip.lc02 import MAX_PAYLOAD
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.membership.acquaintance import Acquaintance, vouched
 from drslamd.gossip.membership.refusals import Refusals
-from drslamd.gossip.message_types import UNANSWERED
+from drslamd.gossip.message_types import UNANSWERED, Received
 from drslamd.gossip.messages import UNKNOWN_CLOCK, Heard, Message, OdometryBatch, Pose, Status
 from drslamd.gossip.peer import Peer, carrier, shared_module
 from drslamd.gossip.replicated_log import AHEAD
@@ -38,14 +37,6 @@ MEASUREMENTS_PER_ENTRY = 20
 PUBLIC_ENVELOPE_BYTES = 80
 """What a public_poses_t needs besides its poses and what it holds of others."""
 _FINGERPRINTS = {kind: frozenset([value]) for kind, value in messages.FINGERPRINTS.items()}
-
-
-@dataclass(frozen=True)
-class Received:
-    """One accepted message."""
-
-    origin: Chain
-    message: Message
 
 
 class Team:

@@ -82,6 +82,8 @@ def hostile(events: list[ChannelMessage]) -> Iterator[Datagram]:
         yield Datagram(T0 + 1, draw.randbytes(draw.randrange(100)), "10.0.0.66")
 
 
+@pytest.mark.row("N7")
+@pytest.mark.row("S1")
 def test_a_stranger_changes_nothing_but_counters() -> None:
     team, events = a_busy_team()
     before = snapshot(team)
@@ -134,6 +136,7 @@ def test_a_recording_of_an_absent_robot_does_not_bring_it_back_to_a_robot_that_r
     assert restarted.present(T0) == {1}
 
 
+@pytest.mark.row("S5")
 def test_a_recording_from_before_the_last_known_start_is_refused_as_a_whole() -> None:
     _, events = a_busy_team()
     restarted = Team(a_seal(1, epoch=12))

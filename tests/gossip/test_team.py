@@ -393,6 +393,7 @@ def test_a_sender_without_a_name_is_called_unknown() -> None:
     assert "from an unknown sender" in str(dict(team.conditions(T0))["team.wrong_tag"])
 
 
+@pytest.mark.row("S8")
 def test_both_of_two_robots_with_one_id_say_so() -> None:
     first, second = Team(a_seal(3, epoch=5)), Team(a_seal(3, epoch=6))
     tell(first, second.seal, a_status())

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from drslamd.conventions import Chain
 from drslamd.events import ChannelMessage
+from drslamd.gossip.message_types import Received
 from drslamd.gossip.seal import Seal
-from drslamd.gossip.team import Received, Team
+from drslamd.gossip.team import Team
 
 
 def introduce(team: Team, *chains: Chain | Seal, utime: int = 0) -> Team:

@@ -10,7 +10,8 @@ from acquainted import introduce
 from message_builders import MS, SECOND, a_seal, a_status
 
 from drslamd.events import ChannelMessage, Send
-from drslamd.gossip.team import Received, Team
+from drslamd.gossip.message_types import Received
+from drslamd.gossip.team import Team
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.robot_model import UNTOLD
 

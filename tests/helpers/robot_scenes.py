@@ -59,7 +59,7 @@ class RobotScene:
     def hear(
         self, peer: int, message: Message, epoch: int = 1, *, is_met: bool = True
     ) -> list[Effect]:
-        """A message arrives the moment it is sent, of a peer that has answered us if it `is_met`."""
+        """A message arrives the moment it is sent, of a peer that answered us if it `is_met`."""
         team = self.robot.team
         if is_met and peer != self.robot.own.robot and epoch >= team.seal.epochs.get(peer, 0):
             introduce(team, Chain(peer, epoch), utime=self.utime)

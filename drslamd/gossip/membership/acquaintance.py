@@ -6,8 +6,8 @@ recording names. So a peer counts from its first status on that names our start,
 before that status never counts. Until then a robot is a stranger: our status names it, for it must
 know that we hear it and wait, and nothing else is taken from it.
 
-A log may come through others, from robots that we do not hear or that are gone. It counts as soon as
-an acquaintance holds that very log: that one has its answer, or knows somebody who has.
+A log may come through others, from robots that we do not hear or that are gone. It counts as soon
+as an acquaintance holds that very log: that one has its answer, or knows somebody who has.
 """
 
 from __future__ import annotations
