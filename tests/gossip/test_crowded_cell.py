@@ -49,7 +49,7 @@ def test_forty_robots_know_that_they_are_heard_hold_all_logs_and_do_not_crowd_th
     Half of the others are named in each status, so each is named four times; at a loss of a fifth
     all four are lost for 0.2 % of pairs.
     """
-    air = Air(40, loss, period=2 * SECOND)
+    air = Air(40, loss, period=2 * SECOND).meet()
     air.seconds(4, speakers=range(40))
     air.seconds(12)
     assert all(len(held) == 4 * 40 for held in air.held.values())

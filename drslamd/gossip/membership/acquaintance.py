@@ -62,11 +62,6 @@ class Acquaintance:
         if earlier and utime - self._began >= PATIENCE_US:
             self._of_the_past[origin.robot] = utime
 
-    def on_own_past(self, utime: int) -> None:
-        """A message of an earlier start of ours came."""
-        self._began = utime if self._began is None else self._began
-        self._of_the_past[self._own.robot] = utime
-
     def met(self, origin: Chain, utime: int) -> Peer:
         """A robot has answered: from now on a peer, with what its voice told of its clock."""
         stranger = self.strangers.get(origin.robot)
