@@ -56,7 +56,17 @@ class TeamSection(Section):
     key_file: str = ""
     """File made by `drslamd keygen`, mode 0600, the same on every robot."""
     insecure: bool = False
-    """True runs without a key: whoever is on the network can then forge messages."""
+    """True runs without a key: whoever is on the network can then forge messages. Without
+    `trust_everyone_on` that is only for a network that ends on this host (`gossip.ttl = 0`)."""
+    trust_everyone_on: str = ""
+    """With `insecure`: the network whose every computer is trusted, `gossip.interface`, or
+    `gossip.group` where no interface is named."""
+
+    @model_validator(mode="after")
+    def _trust_is_asked_for(self) -> TeamSection:
+        if self.trust_everyone_on and not self.insecure:
+            raise ValueError("trust_everyone_on is for insecure = true: leave it out")
+        return self
 
     @model_validator(mode="after")
     def _key_or_explicitly_none(self) -> TeamSection:

@@ -38,7 +38,7 @@ from drslamd.io.clock import Clock, MonotonicClock, cpu_s
 from drslamd.io.near_socket import NearSocket
 from drslamd.io.pace import Pace
 from drslamd.io.serial_port import SerialPort
-from drslamd.io.state_store import StateStore, read_key
+from drslamd.io.state_store import StateStore
 from drslamd.io.status_socket import StatusSocket
 from drslamd.io.systemd import Notifier
 from drslamd.io.wall_clock import read_wall_clock
@@ -52,6 +52,7 @@ from drslamd.parts import (
     make_transport,
     make_wheels,
     taped_calibration,
+    team_secret,
 )
 from drslamd.recording.records import Beginning
 from drslamd.reports import graph_report
@@ -77,7 +78,7 @@ class Daemon:
         """
         self._config = config
         self._clock = clock or MonotonicClock()
-        secret = None if config.team.insecure else read_key(config.team.key_file)
+        secret = team_secret(config)
         self._store = StateStore(state_dir(config), config.robot.id)
         state = self._store.load()
         self._load_fault = self._store.fault
@@ -314,7 +315,9 @@ class Daemon:
         picture = report.status(self.robot, self._clock.now())
         alive = sum(peer["alive"] for peer in picture["peers"].values())
         problems = "; ".join(picture["problems"] + self._complaints())
-        return f"{picture['pose']['state']}, {alive} peers" + (f"; {problems}" if problems else "")
+        key = "INSECURE, " if picture["insecure"] else ""
+        said = f"; {problems}" if problems else ""
+        return f"{key}{picture['pose']['state']}, {alive} peers{said}"
 
     async def _end(self, tasks: list[asyncio.Task[None]]) -> None:
         """Say goodbye, keep the state, let go of everything; nobody waits for the solver."""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from drslamd.config import Config, ConfigError, DbcSection, SerialWheelSection
+from drslamd.config import Config, ConfigError, DbcSection, GossipSection, SerialWheelSection
 from drslamd.host.owners import denied
 from drslamd.host.plain_file import read_plain
 from drslamd.io.can_bus import CanBus, require_python_can
@@ -18,6 +19,7 @@ from drslamd.io.recording.log_files import LogFiles
 from drslamd.io.recording.provenance import clocks, provenance
 from drslamd.io.recording.recorder import NoRecorder, Recorder
 from drslamd.io.serial_port import SerialPort
+from drslamd.io.state_store import read_key
 from drslamd.io.transport import Transport
 from drslamd.recording.encoder import Encoder
 from drslamd.setup.calibration_file import MAX_BYTES, Taped, UnusableCalibration, read
@@ -25,6 +27,41 @@ from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibra
 
 Handle = Callable[[Any], None]
 """Takes an event."""
+
+
+def team_secret(config: Config) -> bytes | None:
+    """What seals the messages of the team; None where it has asked to run without.
+
+    Raises:
+        ConfigError: the key cannot be used; or there is none, other computers can be reached, and
+            nobody wrote down that all of them are trusted.
+    """
+    team, network = config.team, network_name(config.gossip)
+    if not team.insecure:
+        return read_key(team.key_file)
+    if not stays_on_this_host(config.gossip) and team.trust_everyone_on != network:
+        instead = f", not {team.trust_everyone_on!r}" if team.trust_everyone_on else ""
+        fault = (
+            f"team.insecure = true: whoever is on the network {network} could forge messages; "
+            "make a key with drslamd keygen FILE and set team.key_file, or, if every computer "
+            f"there is trusted, team.trust_everyone_on = {network!r}{instead}"
+        )
+        raise ConfigError([fault])
+    return None
+
+
+def network_name(section: GossipSection) -> str:
+    """What the network of the team is called: its interface, or the group that any may carry."""
+    return section.interface or section.group
+
+
+def stays_on_this_host(section: GossipSection) -> bool:
+    """Can no other computer hear the team, nor speak to it?"""
+    if section.provider == "liblcm" and section.url:
+        scheme, _, rest = section.url.partition("://")
+        ttl = re.search(r"ttl=(\d+)", rest)
+        return scheme == "udpm" and (ttl is None or int(ttl[1]) == 0)  # LCM's default is 0
+    return section.ttl == 0 or section.interface == "lo" or section.interface.startswith("127.")
 
 
 def make_transport(config: Config, clock: Clock, handle: Handle) -> Transport:

@@ -129,7 +129,7 @@ def _network(robot: Robot, utime: int) -> dict[str, Any]:
 
 
 def _peers(robot: Robot, utime: int) -> dict[str, Any]:
-    own_hash, peers = robot.back.digest(), sorted(robot.team.peers.items())
+    own_hash, peers = robot.back.digest(), sorted(robot.team.everybody.items())
     return {str(k): _peer(robot, peer, utime, own_hash) for k, peer in peers}
 
 

@@ -105,7 +105,7 @@ def test_what_belongs_to_a_section_inside_a_section_is_told_as_well() -> None:
 def test_a_missing_section_and_a_missing_key_are_told_what_they_are() -> None:
     robot, team, uwb, wheels = faults("")
     assert robot == "robot: missing; a section, [robot], with id, calibration"
-    assert team == "team: missing; a section, [team], with key_file, insecure"
+    assert team == "team: missing; a section, [team], with key_file, insecure, trust_everyone_on"
     assert uwb.startswith("uwb: missing; a section, [uwb], with port, baud, id, max_range_m, ")
     assert wheels == "wheels: missing; a section, [wheels], with source and what belongs to it"
     (sentence,) = faults(file_with("robot", ""))

@@ -245,7 +245,7 @@ def test_what_the_network_did_not_take_is_in_the_status(daemon: Daemon) -> None:
 
 
 def test_the_line_for_systemd_says_where_it_stands_and_what_is_wrong(daemon: Daemon) -> None:
-    assert daemon._one_line() == "not localised, 0 peers"
+    assert daemon._one_line() == "INSECURE, not localised, 0 peers"
     daemon.robot.health.set("uwb", "no bytes", 0)
     daemon.robot.health.set("wheels", "no motion", 0)
-    assert daemon._one_line() == "not localised, 0 peers; no bytes; no motion"
+    assert daemon._one_line() == "INSECURE, not localised, 0 peers; no bytes; no motion"

@@ -21,6 +21,7 @@ from drslamd.parts import (
     make_transport,
     make_wheels,
     taped_calibration,
+    team_secret,
 )
 from drslamd.setup.calibration_file import MAX_BYTES
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED
@@ -186,3 +187,58 @@ def test_a_calibration_that_cannot_be_used_is_one_sentence(
 def test_a_folder_is_no_calibration(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="Is a directory"):
         taped_calibration(named(tmp_path))
+
+
+# a team without a key
+
+
+def without_key(gossip: str = "", trusted: str = "") -> Config:
+    more = f'trust_everyone_on = "{trusted}"\n' if trusted else ""
+    text = CONFIG.replace('trust_everyone_on = "239.255.76.67"\n', more)
+    return parse(f"{text}[gossip]\n{gossip}\n")
+
+
+@pytest.mark.parametrize(
+    ("gossip", "trusted"),
+    [
+        ("ttl = 0", ""),
+        ('interface = "lo"', ""),
+        ('interface = "127.0.0.1"', ""),
+        ("", "239.255.76.67"),
+        ('interface = "wlan0"', "wlan0"),
+        ('provider = "liblcm"\nurl = "udpm://239.255.76.67:7667"', ""),
+        ('provider = "liblcm"\nurl = "udpm://239.255.76.67:7667?ttl=0"', ""),
+    ],
+)
+def test_a_team_may_be_without_key_on_this_host_or_where_all_are_trusted_by_name(
+    gossip: str, trusted: str
+) -> None:
+    assert team_secret(without_key(gossip, trusted)) is None
+
+
+@pytest.mark.parametrize(
+    ("gossip", "trusted", "network"),
+    [
+        ("", "", "239.255.76.67"),
+        ("ttl = 1", "eth0", "239.255.76.67"),
+        ('interface = "wlan0"', "", "wlan0"),
+        ('interface = "wlan0"', "239.255.76.67", "wlan0"),
+        ('provider = "liblcm"\nurl = "udpm://239.255.76.67:7667?ttl=1"', "", "239.255.76.67"),
+        ('provider = "liblcm"\nurl = "tcpq://10.0.0.1:7700"', "", "239.255.76.67"),
+    ],
+)
+def test_elsewhere_a_team_without_key_is_refused_with_the_way_out(
+    gossip: str, trusted: str, network: str
+) -> None:
+    with pytest.raises(ConfigError) as refused:
+        team_secret(without_key(gossip, trusted))
+    (fault,) = refused.value.faults
+    assert fault.startswith(f"team.insecure = true: whoever is on the network {network} could")
+    assert f"team.trust_everyone_on = {network!r}" in fault
+    assert "drslamd keygen" in fault
+
+
+def test_trust_without_insecure_is_a_fault_of_the_configuration() -> None:
+    text = CONFIG.replace("insecure = true", 'key_file = "k"')
+    with pytest.raises(ConfigError, match="trust_everyone_on is for insecure = true"):
+        parse(text)

@@ -163,7 +163,7 @@ def why_not_localised(robot: Stages, utime: int) -> str | None:
         return None
     if robot.back.estimate is not None:
         return "not localised: the odometry was interrupted, and what follows it has no place yet"
-    peers = robot.team.peers
+    peers = robot.team.everybody
     living = robot.team.living(utime)
     if not peers:
         return (

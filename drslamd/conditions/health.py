@@ -22,6 +22,7 @@ CAUSES_FIRST = (
     "wheels",
     "network",
     "sleep",
+    "team.recording",
     "team.wrong_tag",
     "team.wrong_version",
     "team.uwb_id",

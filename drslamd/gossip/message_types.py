@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Union
 
+from drslamd.conventions import LAST_UTIME, Chain
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.se2 import Array
@@ -17,6 +18,10 @@ UNKNOWN_CLOCK = -(2**63)
 """`Status.uwb_clock_us` of a robot that does not know LinkTrack's system_time."""
 
 NOTHING_WANTED = -1
+
+UNANSWERED = -LAST_UTIME
+"""`Heard.delay_us` of a robot that is heard and has not yet said that it hears this start: what it
+says does not count before (`drslamd.gossip.acquaintance`)."""
 
 MAX_HEARD = 28
 """Peers named in one status, which with as many logs has 1,361 bytes; whoever hears more names them
@@ -45,7 +50,7 @@ class Heard:
     """A peer that is heard.
 
     Attributes:
-        delay_us: the smallest (arrival here - utime there) of late.
+        delay_us: the smallest (arrival here - utime there) of late; or `UNANSWERED`.
         wanted_n: first sample of its odometry that we lack and need, `NOTHING_WANTED` if none.
     """
 
@@ -103,3 +108,11 @@ class Pose:
 
 
 Message = Union[Status, OdometryBatch, GraphEntry, Pose, PublicPoses]
+
+
+@dataclass(frozen=True)
+class Received:
+    """One accepted message."""
+
+    origin: Chain
+    message: Message

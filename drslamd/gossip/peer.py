@@ -13,6 +13,7 @@ from drslamd.gossip.message_types import (
     MAX_BATCH,
     MAX_HEARD,
     NOTHING_WANTED,
+    UNANSWERED,
     Heard,
     OdometryBatch,
     Pose,
@@ -76,6 +77,9 @@ class Peer:
         self.received = 0
         self._status_counter = self._pose_counter = 0
         self._named: dict[int, _Named] = {}
+        self._logs: dict[int, int] = {}
+        """Epochs of the logs that it holds, by robot; ids bound their number."""
+        self._answered: int | None = None
         self._gap_since: int | None = None
         self._tallies: deque[_Tally] = deque(maxlen=LOSS_STATUSES)
 
@@ -103,6 +107,18 @@ class Peer:
         )
         return max(0.0, losses[len(losses) // 2]) if losses else 0.0
 
+    def answered(self, counter: int) -> None:
+        """It named this start of ours in the message with this counter."""
+        self._answered = min(counter, counter if self._answered is None else self._answered)
+
+    def is_past(self, counter: int) -> bool:
+        """Was a message made before its robot answered us?"""
+        return self._answered is None or counter < self._answered
+
+    def holds(self, origin: Chain) -> bool:
+        """Has it said that it holds this log?"""
+        return self._logs.get(origin.robot) == origin.epoch
+
     def take_status(self, status: Status, counter: int, own: Chain, utime: int) -> bool:
         """Keep the latest status; False when this one was overtaken by a later one."""
         if _is_overtaken(counter, self._status_counter):
@@ -112,8 +128,10 @@ class Peer:
         entries = max((log.newest for log in status.logs if log.id == self.chain.robot), default=0)
         self._tallies.append(_Tally(counter - entries, self.received))
         self._remember(status, utime)
+        self._logs.update((log.id, log.epoch) for log in status.logs)
         of_us = self._named_as(own)
-        self.clock.echoed((of_us.heard.delay_us, of_us.utime) if of_us else None)
+        is_met = of_us is not None and of_us.heard.delay_us != UNANSWERED
+        self.clock.echoed((of_us.heard.delay_us, of_us.utime) if of_us and is_met else None)
         offset = self.clock.offset(utime)
         if offset is not None:
             self.clock_history.add(ClockReading(utime, offset.us, offset.uncertainty_us))
@@ -167,14 +185,33 @@ class Peer:
         leaving = self.status is not None and self.status.leaving
         return utime - self.last_heard < within_us and not leaving
 
+    def waits_for(self, own: Chain) -> bool:
+        """Does it hear this start and take nothing of it yet, because it has no answer?"""
+        named = self._named_as(own)
+        return named is not None and named.heard.delay_us == UNANSWERED
+
     def hears(self, own: Chain) -> bool:
         """Has it said that it hears this very start of ours? A replayed recording cannot."""
         return self._named_as(own) is not None
 
+    def named(self, is_needed: bool) -> Heard:
+        """As our status names it.
+
+        Args:
+            is_needed: do we need its odometry?
+        """
+        delay_us = self.clock.delay_us
+        wanted = self.track.end if is_needed else NOTHING_WANTED
+        return Heard(*self.chain, UNANSWERED if delay_us is None else delay_us, wanted)
+
     @property
     def audible(self) -> Set[Chain]:
-        """Whom it hears."""
-        return {Chain(robot, named.heard.epoch) for robot, named in self._named.items()}
+        """Whom it hears, and is heard by."""
+        return {
+            Chain(robot, named.heard.epoch)
+            for robot, named in self._named.items()
+            if named.heard.delay_us != UNANSWERED
+        }
 
     def neighbour(self, own: Chain, utime: int) -> PeerInRange:
         """What the front end must know of a living peer."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Container, Iterator, Sequence, Set
-from dataclasses import dataclass
 
 from drslamd.conventions import SECOND_US, Chain
 from drslamd.events import ChannelMessage, Datagram, Send
@@ -14,6 +13,9 @@ from drslamd.gossip.entries.chapter_writer import ChapterWriter
 from drslamd.gossip.lc02 import MAX_PAYLOAD
 from drslamd.gossip.log_repeats import Place
 from drslamd.gossip.log_sync import LogSync
+from drslamd.gossip.membership.acquaintance import Acquaintance, vouched
+from drslamd.gossip.membership.refusals import Refusals
+from drslamd.gossip.message_types import UNANSWERED, Received
 from drslamd.gossip.messages import UNKNOWN_CLOCK, Heard, Message, OdometryBatch, Pose, Status
 from drslamd.gossip.peer import Peer, carrier, shared_module
 from drslamd.gossip.replicated_log import AHEAD
@@ -36,29 +38,7 @@ MEASUREMENTS_PER_ENTRY = 20
 """Keyframes, ranges and closures in one log entry; 20 closures with 20 peers are 1,280 bytes."""
 PUBLIC_ENVELOPE_BYTES = 80
 """Of a public_poses_t besides its poses, each a number and 4 * rank floats; 10 for each held."""
-UNVERIFIED_US = 10 * SECOND_US
-"""How long after a message that does not fit the team key it is still spoken of."""
 _FINGERPRINTS = {kind: frozenset([value]) for kind, value in messages.FINGERPRINTS.items()}
-
-_REMEDIES: dict[SealFault | StartFault, str] = {
-    SealFault.WRONG_TAG: "hears messages that do not fit the team key, from {sender}; "
-    "give all robots the same team.key_file",
-    SealFault.WRONG_VERSION: "hears messages of another version of drslamd, from {sender}; "
-    "install the same version on all robots",
-    SealFault.OWN_ID_USED: "another robot uses id {robot}, at {sender}; "
-    "give every robot a robot.id of its own",
-    StartFault.BEYOND_CLOCKS: "hears a start that no clock can show, from {sender}; its state file "
-    "is damaged, or somebody who can seal messages makes them up",
-}
-"""Refusals that somebody must do something about."""
-
-
-@dataclass(frozen=True)
-class Received:
-    """One accepted message."""
-
-    origin: Chain
-    message: Message
 
 
 class Team:
@@ -77,7 +57,7 @@ class Team:
         self.own = Chain(seal.robot, seal.epoch)
         self.logs = LogSync(seal.robot)
         self.peers: dict[int, Peer] = {}
-        self.refused: Counter[str] = Counter()
+        self.refusals = Refusals(seal.robot)
         self.accepted = 0
         self.unsayable = 0
         self.repeats_heard = 0
@@ -88,7 +68,11 @@ class Team:
         self._named_last = -1
         """The robot after which the next status goes on, when it cannot name all that are heard."""
         self.starts = Starts(self.own, seal.epochs)
-        self._last_refused: dict[SealFault | StartFault, tuple[int, str]] = {}
+        self.acquaintance = Acquaintance(self.own)
+
+    @property
+    def refused(self) -> Counter[str]:
+        return self.refusals.counts
 
     # outgoing
 
@@ -165,7 +149,12 @@ class Team:
 
     def audible(self, utime: int) -> Set[Chain]:
         """Whom we hear."""
-        return {peer.chain for peer in self.peers.values() if peer.is_alive(utime)}
+        return {peer.chain for peer in self.everybody.values() if peer.is_alive(utime)}
+
+    @property
+    def everybody(self) -> dict[int, Peer]:
+        """Peers, and strangers who have not answered this start."""
+        return {**self.peers, **self.acquaintance.strangers}
 
     def next_heard(self, utime: int, needed: Container[int] = ()) -> tuple[Heard, ...]:
         """For our next status: whom we hear, in turn when they are too many.
@@ -173,17 +162,17 @@ class Team:
         Args:
             needed: robots whose odometry we need.
         """
+        strangers = self.acquaintance.strangers
         chains = sorted(self.audible(utime))
         if len(chains) > messages.MAX_HEARD:
             later = [chain for chain in chains if chain.robot > self._named_last]
             chains = (later + chains)[: messages.MAX_HEARD]
             self._named_last = chains[-1].robot
         return tuple(
-            Heard(*peer.chain, peer.clock.delay_us, peer.track.end)
-            if peer.chain.robot in needed
-            else Heard(*peer.chain, peer.clock.delay_us)
-            for peer in (self.peers[chain.robot] for chain in chains)
-            if peer.clock.delay_us is not None
+            Heard(*chain, UNANSWERED)
+            if chain.robot in strangers
+            else self.peers[chain.robot].named(chain.robot in needed)
+            for chain in chains
         )
 
     # incoming
@@ -221,11 +210,44 @@ class Team:
         if fault is not None:
             self._refuse(fault, event)
             return None
+        if not self._is_acquainted(header, message, event):
+            self.refused["of a robot that has not answered this start"] += 1
+            return None
         if isinstance(message, GraphEntry) and not self._is_near(origin, message.seq):
             self.refused["entry far ahead of its log"] += 1
             return None
         self.seal.accept(header, once)
         return self._sort(header, message, payload, event.utime)
+
+    def _is_acquainted(
+        self, header: Header, message: Message, event: Datagram | ChannelMessage
+    ) -> bool:
+        """Is it no recording of the past? What a stranger says is remembered only as a voice."""
+        origin = Chain(header.origin, header.epoch)
+        peer = self.peers.get(origin.robot)
+        is_peer = peer is not None and peer.chain == origin
+        if isinstance(message, GraphEntry):
+            is_begun = self.logs.epoch(origin.robot) == origin.epoch
+            return is_begun or is_peer or vouched(origin, self.peers.values())
+        if isinstance(message, Status) and self.acquaintance.answers(message):
+            self.meet(origin, header.counter, event.utime)
+            return True
+        if peer is not None and is_peer:
+            return not peer.is_past(header.counter)
+        self.acquaintance.hear(origin, header.utime, event.utime, event.sender)
+        if isinstance(message, Status):
+            self.acquaintance.read(origin, message, event.utime)
+            # who holds us for a later start does not hear us, and cannot answer
+            self.starts.on_status(origin.robot, message, self._next_seq, event.utime)
+        return False
+
+    def meet(self, origin: Chain, counter: int, utime: int) -> None:
+        """A robot has answered this start, with the message that has this counter."""
+        peer = self.peers.get(origin.robot)
+        if peer is None or peer.chain != origin:
+            peer = self.peers[origin.robot] = self.acquaintance.met(origin, utime)
+            self.logs.begin(origin)
+        peer.answered(counter)
 
     def _is_near(self, origin: Chain, seq: int) -> bool:
         """Is it near the end of its log as we, or the latest status of any peer, know it?"""
@@ -242,8 +264,7 @@ class Team:
             self.own_echoes += 1
             self.last_echo = event.utime
             return
-        self.refused[fault.value] += 1
-        self._last_refused[fault] = (event.utime, event.sender)
+        self.refusals.add(fault, event.utime, event.sender)
 
     def _sort(self, header: Header, message: Message, sealed: bytes, utime: int) -> Received | None:
         origin = Chain(header.origin, header.epoch)
@@ -258,10 +279,7 @@ class Team:
             self.accepted += 1
             return Received(origin, message)
         self.accepted += 1
-        peer = self.peers.get(origin.robot)
-        if peer is None or peer.chain != origin:
-            peer = self.peers[origin.robot] = Peer(origin, utime)
-            self.logs.begin(origin)
+        peer = self.peers[origin.robot]
         peer.on_message(header.utime, utime)
         if isinstance(message, Status):
             self._status(peer, message, header.counter, utime)
@@ -274,9 +292,11 @@ class Team:
     def _status(self, peer: Peer, status: Status, counter: int, utime: int) -> None:
         if not peer.take_status(status, counter, self.own, utime):
             return
-        self.logs.repeats.pace.reckon([p.usual_loss for p in self.living(utime).values()])
-        self.logs.on_states(status.logs, peer.chain.robot, utime)
-        self._chapters.on_states(self.own, status.logs)
+        if not peer.waits_for(self.own):
+            losses = [p.usual_loss for p in self.living(utime).values()]
+            self.logs.repeats.pace.reckon(losses)
+            self.logs.on_states(status.logs, peer.chain.robot, utime)
+            self._chapters.on_states(self.own, status.logs)
         self.starts.on_status(peer.chain.robot, status, self._next_seq, utime)
 
     @property
@@ -323,21 +343,15 @@ class Team:
 
     def conditions(self, utime: int) -> list[tuple[str, str | None]]:
         """What is wrong with the conversation, by key, in sentences with a remedy."""
-        out: list[tuple[str, str | None]] = []
-        for fault, sentence in _REMEDIES.items():
-            _, sender = self._last_refused.get(fault, (0, ""))
-            text = sentence.format(robot=self.own.robot, sender=sender or "an unknown sender")
-            key = f"team.{fault.name.lower()}"
-            out.append((key, text if self._refused_of_late(fault, utime) else None))
-        return [*out, ("team.uwb_id", shared_module(self.peers.values(), utime))]
+        return [
+            *self.refusals.conditions(utime),
+            ("team.recording", self.acquaintance.recording(utime)),
+            ("team.uwb_id", shared_module(self.peers.values(), utime)),
+        ]
 
     def is_own_id_used(self, utime: int) -> bool:
         """Does another robot speak under our id?"""
-        return self._refused_of_late(SealFault.OWN_ID_USED, utime)
-
-    def _refused_of_late(self, fault: SealFault | StartFault, utime: int) -> bool:
-        when, _ = self._last_refused.get(fault, (None, ""))
-        return when is not None and utime - when < UNVERIFIED_US
+        return self.refusals.is_of_late(SealFault.OWN_ID_USED, utime)
 
     def robot_of_uwb(self, uwb_id: int) -> int | None:
         """The robot that carries this UWB module, None when it is not (yet) known."""
@@ -347,3 +361,4 @@ class Team:
         """Drop the peers that were not heard for long; their logs remain."""
         for robot in [r for r, p in self.peers.items() if utime - p.last_heard > FORGET_US]:
             del self.peers[robot]
+        self.acquaintance.forget_silent(utime)

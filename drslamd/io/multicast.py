@@ -21,7 +21,7 @@ from pathlib import Path
 from drslamd.config import GossipSection
 from drslamd.events import Datagram, Event, NetworkState
 from drslamd.gossip import lc02
-from drslamd.host.interfaces import NO_ADDRESS, SYSFS, address_of, fault_of
+from drslamd.host.interfaces import NO_ADDRESS, SYSFS, address_of, fault_of, interfaces
 from drslamd.io.backoff import Backoff
 from drslamd.io.clock import Clock
 
@@ -60,6 +60,7 @@ class Multicast:
         self._failed = asyncio.Event()
         self._backoff = Backoff()
         self._last_state: tuple[bool, str] | None = None
+        self._own_addresses: set[str] = set()
         self.dropped = self.reads = 0
 
     async def run(self) -> None:
@@ -105,6 +106,7 @@ class Multicast:
             return False
         self._failed.clear()
         self._unheard_since = None
+        self._own_addresses = {interface.address for interface in interfaces()}
         asyncio.get_running_loop().add_reader(self._socket.fileno(), self._read)
         return True
 
@@ -131,9 +133,15 @@ class Multicast:
             except OSError as error:
                 self._fail(f"cannot receive on {self._where}: {error.strerror or error}")
                 return
+            if self._section.ttl == 0 and not self._is_of_this_host(sender[0]):
+                continue  # in both directions
             if data in self._recent:
                 self._heard_ourselves()
             self._deliver(Datagram(self._clock.now(), data, sender[0]))
+
+    def _is_of_this_host(self, address: str) -> bool:
+        own = address in self._own_addresses or address == self._section.interface
+        return own or address.startswith("127.")
 
     def _heard_ourselves(self) -> None:
         self._unheard_since = None

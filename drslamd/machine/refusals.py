@@ -11,10 +11,9 @@ from drslamd.config import CanWheelSection, Config, ConfigError, DbcSection
 from drslamd.io.can_bus import require_python_can
 from drslamd.io.claim import holder, is_held
 from drslamd.io.liblcm import require_lcm
-from drslamd.io.state_store import read_key
 from drslamd.machine.finding import Finding, Severity
 from drslamd.machine.folders import socket_path, socket_to_ask, state_dir
-from drslamd.parts import dbc_text, taped_calibration
+from drslamd.parts import dbc_text, taped_calibration, team_secret
 
 SECOND_DAEMON = "second daemon"
 """The check of which the findings end with an exit code of their own."""
@@ -67,11 +66,6 @@ def _error(check: str, fault: str) -> Finding:
     return Finding(check, Severity.ERROR, cause, remedy)
 
 
-def _team_key(config: Config) -> None:
-    if not config.team.insecure:
-        read_key(config.team.key_file)
-
-
 def _transport(config: Config) -> None:
     if config.gossip.provider == "liblcm":
         require_lcm()
@@ -92,7 +86,7 @@ def _dbc(config: Config) -> None:
 
 LOOKS: dict[str, Callable[[Config], object]] = {
     "folders": state_dir,
-    "team key": _team_key,
+    "team key": team_secret,
     "lcm": _transport,
     "python-can": _can,
     "dbc": _dbc,

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from drslamd.config import UwbSection
+from drslamd.config import GossipSection, UwbSection
 from drslamd.setup.choices import UwbChoice, WheelsChoice
 
 WIDTH = 44
@@ -48,7 +48,7 @@ def toml(chosen: FirstConfig) -> str:
         _line("#calibration", f"{chosen.robot}.calibration.toml", "drslamd calibrate makes it"),
         "",
         "[team]",
-        *_team(chosen.key_file),
+        *_team(chosen.key_file, chosen.interface),
         "",
         "[uwb]",
         *_uwb(chosen.uwb, chosen.robot),
@@ -65,10 +65,12 @@ def toml(chosen: FirstConfig) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _team(key_file: str) -> list[str]:
+def _team(key_file: str, interface: str) -> list[str]:
     if not key_file:
         why = "anybody on the network can forge messages; better: key_file"
-        return [_line("insecure", True, why)]
+        network = interface or GossipSection.model_fields["group"].default
+        trusted = "every computer there is trusted"
+        return [_line("insecure", True, why), _line("trust_everyone_on", network, trusted)]
     return [_line("key_file", key_file, "the same on every robot, mode 0600")]
 
 

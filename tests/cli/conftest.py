@@ -11,6 +11,7 @@ TOML = """
 id = 3
 [team]
 insecure = true
+trust_everyone_on = "239.255.76.67"
 [uwb]
 port = "/dev/none"
 [wheels]

@@ -11,6 +11,8 @@ from drslamd import cli
 from drslamd.cli import exit_codes
 from drslamd.config import parse
 
+NO_KEY = 'insecure = true\ntrust_everyone_on = "239.255.76.67"'
+
 
 def test_it_ends_with_a_verdict_and_a_warning_leaves_the_exit_code_of_a_run(
     config: Path, capsys: pytest.CaptureFixture[str]
@@ -36,7 +38,7 @@ def test_a_configuration_that_cannot_be_used_is_a_finding_like_others(
 def test_what_a_program_reads_says_the_same(
     config: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    config.write_text(config.read_text().replace("insecure = true", 'key_file = "no.key"'))
+    config.write_text(config.read_text().replace(NO_KEY, 'key_file = "no.key"'))
     assert cli.main(["check", "-c", str(config), "--json"]) == exit_codes.BAD_CONFIG
     answer = json.loads(capsys.readouterr().out)
     assert answer["exit_code"] == exit_codes.BAD_CONFIG

@@ -29,6 +29,8 @@ from drslamd.config import GossipSection
 
 PROXYLESS = urllib.request.build_opener(urllib.request.ProxyHandler({}))
 
+NO_KEY = 'insecure = true\ntrust_everyone_on = "239.255.76.67"'
+
 
 def options(**given: Any) -> argparse.Namespace:
     flags = ("config", "group", "port", "interface")
@@ -41,7 +43,7 @@ def keyed(config: Path, mode: int = 0o600) -> Path:
     key.write_text(SECRET.hex() + "\n")
     key.chmod(mode)
     gossip = '\n[gossip]\ninterface = "lo"\nport = 7001\ngroup = "239.1.2.3"\n'
-    text = config.read_text().replace("insecure = true", f'key_file = "{key}"')
+    text = config.read_text().replace(NO_KEY, f'key_file = "{key}"')
     config.write_text(text + gossip)
     return config
 

@@ -5,7 +5,7 @@ touch $out/booted
 
 sudo() { "$@"; }
 sudoedit() {
-    sed -i 's/^id = 1 /id = 3 /; s/^#interface = ""/interface = "10.9.8.7"/; s/^#ttl = 1/ttl = 0/' "$1"
+    sed -i 's/^id = 1 /id = 3 /; s/^key_file = .*/insecure = true/; s/^#interface = ""/interface = "10.9.8.7"/; s/^#ttl = 1/ttl = 0/' "$1"
 }
 robot() { # robot NUMBER SED_COMMAND: another configuration like that of robot 3
     sed "s/^id = 3 /id = $1 /; $2" /etc/drslamd/3.toml >"/etc/drslamd/$1.toml"
@@ -32,7 +32,7 @@ stat -c '%n %a %U:%G' /etc/drslamd /etc/drslamd/* >$out/configuration
 
 # a second robot, and a third with the key
 robot 4 ''
-robot 5 's/^insecure = true//; s/^#key_file/key_file/'
+robot 5 's|^insecure = true|key_file = "/etc/drslamd/team.key"|'
 systemctl start drslamd@4 drslamd@5 2>>$out/install.log
 systemctl is-active drslamd@4 drslamd@5 >$out/others
 
@@ -40,7 +40,7 @@ systemctl is-active drslamd@4 drslamd@5 >$out/others
 robot 6 's/^insecure = true/insecure = 6/'
 cp /etc/drslamd/team.key /etc/drslamd/foreign.key
 chown root: /etc/drslamd/foreign.key
-robot 7 's/^insecure = true//; s/^#key_file.*/key_file = "foreign.key"/'
+robot 7 's/^insecure = true/key_file = "foreign.key"/'
 for n in 6 7; do
     systemctl start drslamd@$n 2>/dev/null
 done

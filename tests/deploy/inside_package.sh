@@ -7,8 +7,7 @@ export DEBIAN_FRONTEND=noninteractive
 
 sudo() { "$@"; }
 sudoedit() {
-    sed -i 's/^id = 1 /id = 3 /; s/^insecure = true//; s/^#key_file/key_file/
-        s/^#interface = ""/interface = "10.9.8.7"/; s/^#ttl = 1/ttl = 0/' "$1"
+    sed -i 's/^id = 1 /id = 3 /; s/^#interface = ""/interface = "10.9.8.7"/; s/^#ttl = 1/ttl = 0/' "$1"
 }
 wait_for() { # wait_for SECONDS COMMAND...: until it succeeds
     local end=$((SECONDS + $1))

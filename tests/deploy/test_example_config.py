@@ -12,7 +12,15 @@ from deploy_helpers import EXAMPLE
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from drslamd.config import SOURCES, CanWheelSection, Config, SerialWheelSection, WheelSection, parse
+from drslamd.config import (
+    SOURCES,
+    CanWheelSection,
+    Config,
+    SerialWheelSection,
+    TeamSection,
+    WheelSection,
+    parse,
+)
 
 SHARED_BY_BASES = {"max_speed_mps", "reverse_left", "reverse_right"}
 """Shown once for all bases, and so is what is below `can.`."""
@@ -83,7 +91,7 @@ def sections() -> dict[str, type[BaseModel]]:
 
 def test_the_example_is_a_configuration_with_no_surprises() -> None:
     config = parse(EXAMPLE.read_text())
-    assert config.team.insecure
+    assert config.team == TeamSection(key_file="/etc/drslamd/team.key")
     assert config.uwb.port.startswith("/dev/serial/by-id/")
     assert config.wheels.source == "kobuki"
     for name, section in sections().items():
@@ -137,17 +145,20 @@ def test_each_base_can_take_the_place_of_the_kobuki(source: str) -> None:
 
 
 def test_taking_every_comment_mark_away_changes_nothing() -> None:
-    text = [line for line in other_sections() if not line.startswith("key_file")]
+    text = [
+        line
+        for line in other_sections()
+        if not line.startswith("insecure") and not line.startswith("trust_")
+    ]
     everything, plain = parse("\n".join(text + blocks()["kobuki"])), parse(EXAMPLE.read_text())
     assert everything.uwb_id == plain.uwb_id
     assert everything.model_copy(update={"uwb": plain.uwb}) == plain
 
 
-def test_the_way_to_a_team_key_is_to_swap_two_lines() -> None:
+def test_the_example_has_a_key_and_says_how_to_make_it() -> None:
     text = EXAMPLE.read_text()
-    swapped = text.replace("\ninsecure = true", "\n#insecure = true")
-    swapped = swapped.replace("\n#key_file = ", "\nkey_file = ")
-    assert parse(swapped).team.key_file == "/etc/drslamd/team.key"
+    assert parse(text).team.key_file == "/etc/drslamd/team.key"
+    assert not parse(text).team.insecure
     assert "drslamd keygen /etc/drslamd/team.key" in text
 
 

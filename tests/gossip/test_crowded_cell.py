@@ -7,6 +7,7 @@ from typing import cast
 
 import numpy as np
 import pytest
+from acquainted import introduce
 from gossip_team import Air
 from message_builders import SECOND, a_seal, a_status, an_entry, sealed
 
@@ -48,7 +49,7 @@ def test_forty_robots_know_that_they_are_heard_hold_all_logs_and_do_not_crowd_th
     Half of the others are named in each status, so each is named four times; at a loss of a fifth
     all four are lost for 0.2 % of pairs.
     """
-    air = Air(40, loss, period=2 * SECOND)
+    air = Air(40, loss, period=2 * SECOND).meet()
     air.seconds(4, speakers=range(40))
     air.seconds(12)
     assert all(len(held) == 4 * 40 for held in air.held.values())
@@ -76,6 +77,7 @@ def test_a_robot_in_a_crowd_stays_quiet_and_still_names_everybody(others: int) -
     """Statuses that are not sent must not use up turns: of 42 or 84 always the same would speak."""
     team = Team(a_seal(0))
     seals = [a_seal(robot) for robot in range(1, others + 1)]
+    introduce(team, *seals)
     broadcast = a_broadcast(team, {1000 + robot for robot in range(1, others + 1)})
     said: list[tuple[int, Status]] = []
     for second in range(20):
@@ -113,7 +115,7 @@ def test_a_quiet_robot_speaks_when_any_of_a_crowd_comes_or_goes() -> None:
 
 @pytest.mark.parametrize("lost", ["odometry", "entry of a log"])
 def test_a_robot_that_lacks_something_is_not_quiet(lost: str) -> None:
-    team, seal = Team(a_seal(0)), a_seal(1)
+    team, seal = introduce(Team(a_seal(0)), Chain(1, 1)), a_seal(1)
 
     def says(message: Message) -> None:
         team.receive(ChannelMessage(0, *sealed(seal, message)))
@@ -132,7 +134,7 @@ def test_a_robot_that_lacks_something_is_not_quiet(lost: str) -> None:
 
 
 def test_a_quiet_robot_speaks_when_it_ranges_to_somebody_new_or_no_longer_does() -> None:
-    team = Team(a_seal(0))
+    team = introduce(Team(a_seal(0)), Chain(1, 1))
     team.receive(ChannelMessage(0, *sealed(a_seal(1), a_status(uwb_id=1001))))
     ranged: set[int] = set()
     broadcast = a_broadcast(team, ranged)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from acquainted import introduce
 from message_builders import (
     OTHER_SECRET,
     SECOND,
@@ -30,7 +31,7 @@ from drslamd.gossip.team import Team
 
 OWN = Chain(1, 10)
 T0 = 100 * SECOND
-COUNTERS = {"refused", "own_echoes", "last_echo", "repeats_heard", "_last_refused"}
+COUNTERS = {"refusals", "own_echoes", "last_echo", "repeats_heard"}
 """What an unproven message may change: counts, and what the user is told of them."""
 
 
@@ -42,6 +43,7 @@ def a_busy_team() -> tuple[Team, list[ChannelMessage]]:
     """A team in full conversation, and all that robot 3 has said in it."""
     team, seal = Team(a_seal(*OWN)), a_seal(3, epoch=11)
     team.append(an_entry(0, 4), T0)
+    introduce(team, seal, utime=T0)
     said = [*kinds().values(), an_entry(0, 1), an_entry(1, 2), a_status((Heard(*OWN, 5),))]
     events = [ChannelMessage(T0, *sealed(seal, message, T0), "10.0.0.3") for message in said]
     for event in events:
@@ -131,11 +133,14 @@ def test_a_recording_of_an_absent_robot_does_not_bring_it_back_to_a_robot_that_r
     restarted = Team(a_seal(1, epoch=12))
     for event in events:
         restarted.receive(event)
-    assert set(restarted.peers) == {3}
+    assert restarted.peers == {}
     assert restarted.living(T0) == {}
+    assert restarted.logs.next_states() == ()
+    assert restarted.accepted == 0
     assert restarted.present(T0) == {1}
 
 
+@pytest.mark.row("S5")
 def test_a_recording_from_before_the_last_known_start_is_refused_as_a_whole() -> None:
     _, events = a_busy_team()
     restarted = Team(a_seal(1, epoch=12))
@@ -157,7 +162,7 @@ def test_everything_that_comes_in_is_counted_exactly_once() -> None:
         ChannelMessage(T0, "MBOT_ODOMETRY", b"x"),
         ChannelMessage(T0, *forged(a_status(), robot=1, epoch=99)),
         ChannelMessage(T0, *sealed(a_seal(3, epoch=12), a_status())),
-        ChannelMessage(T0 + 3 * SECOND, *sealed(a_seal(3, epoch=13), a_status())),
+        ChannelMessage(T0 + 3 * SECOND, *sealed(a_seal(3, epoch=13), a_status((Heard(*OWN, 5),)))),
         ChannelMessage(T0, *forged(a_status(), robot=4, epoch=2**62)),
         ChannelMessage(T0, *forged(an_entry(5_000), robot=4)),
         ChannelMessage(T0, *forged(a_status(), robot=4, utime=-1)),
@@ -196,12 +201,13 @@ def test_everything_that_comes_in_is_counted_exactly_once() -> None:
             "tag does not fit the team key",
         ),
         (ChannelMessage(T0, *forged(a_status(), robot=1, epoch=11)), "another robot uses this id"),
+        (ChannelMessage(T0, *forged(a_status())), "of a robot that has not answered this start"),
         (
             ChannelMessage(T0, *forged(an_entry(0), robot=1, epoch=11)),
             "of another start of this robot, repeated by a peer",
         ),
         (ChannelMessage(T0, *forged(an_entry(-1))), "content out of range"),
-        (ChannelMessage(T0, *forged(an_entry(1_024))), "entry far ahead of its log"),
+        (ChannelMessage(T0, *forged(an_entry(1_024), robot=4)), "entry far ahead of its log"),
         (
             ChannelMessage(T0, *forged(a_status(), epoch=2**53 + 2**32 + 1)),
             "of a start later than any clock can say",
@@ -212,7 +218,7 @@ def test_everything_that_comes_in_is_counted_exactly_once() -> None:
 def test_every_reason_has_a_counter_of_its_own(
     event: Datagram | ChannelMessage, reason: str
 ) -> None:
-    team = Team(a_seal(*OWN))
+    team = introduce(Team(a_seal(*OWN)), Chain(4, 1))
     assert team.receive(event) is None
     assert dict(team.refused) == {reason: 1}
     assert (team.accepted, team.own_echoes, team.repeats_heard) == (0, 0, 0)
@@ -230,12 +236,12 @@ def test_a_message_on_the_channel_of_another_robot_is_refused() -> None:
 @pytest.mark.row("S10")
 def test_a_relay_cannot_alter_an_entry() -> None:
     event = ChannelMessage(T0, *sealed(a_seal(3), kinds()["GRAPH"]))
-    team = Team(a_seal(*OWN))
+    team = introduce(Team(a_seal(*OWN)), Chain(3, 1))
     for bit in range(8 * len(event.payload)):
         altered = bytearray(event.payload)
         altered[bit // 8] ^= 1 << bit % 8
         assert team.receive(ChannelMessage(T0, event.channel, bytes(altered))) is None
-    assert team.logs.next_states() == ()
+    assert team.logs.next_states() == (LogState(3, 1, 0, 0, 0),)
     assert team.receive(event) is not None
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from acquainted import introduce
 from message_builders import COVARIANCE, HEADER, a_seal, a_status, an_entry, sealed
 
 from drslamd.config import OptimizerSection
@@ -33,6 +34,7 @@ def test_a_full_status_has_1361_bytes() -> None:
 def test_the_status_of_a_robot_that_hears_254_others_fits() -> None:
     team = Team(a_seal(0))
     for robot in range(1, 255):
+        introduce(team, Chain(robot, 1))
         team.receive(ChannelMessage(0, *sealed(a_seal(robot), a_status())))
     heard, logs = team.next_heard(0), team.logs.next_states()
     assert len(heard) == len(logs) == 28

@@ -117,6 +117,7 @@ def test_a_type_that_does_not_belong_to_the_channel_is_refused() -> None:
 
 @pytest.mark.row("N12")
 @pytest.mark.parametrize("version", [1, 3, 0, -2])
+@pytest.mark.row("N12")
 def test_another_version_is_refused(version: int) -> None:
     assert opened(a_seal(1), forged(a_status(), version=version)) is SealFault.WRONG_VERSION
 
@@ -213,6 +214,7 @@ def test_counters_in_any_order_are_accepted_once_each() -> None:
     )
 
 
+@pytest.mark.row("S3")
 def test_the_window_reaches_back_1023_counters_and_not_1024() -> None:
     assert counters(1000, 2000, 2000 - 1023, 2000 - 1024) == [True, True, True, False]
     moved = counters(1000, 2000, 2000 - 1023, 2001, 2001 - 1023, 2001 - 1024)
@@ -303,6 +305,7 @@ def test_the_windows_of_two_robots_are_apart() -> None:
 # our own id
 
 
+@pytest.mark.row("N11")
 def test_our_own_messages_come_back_as_own() -> None:
     seal = a_seal(3)
     message = sealed(seal, a_status())

@@ -11,8 +11,9 @@ from message_builders import SECOND, SECRET, a_seal, a_status, forged
 
 from drslamd.conventions import Chain
 from drslamd.events import ChannelMessage, Send
+from drslamd.gossip.message_types import Received
 from drslamd.gossip.seal import Seal
-from drslamd.gossip.team import Received, Team
+from drslamd.gossip.team import Team
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.robot_model import UNTOLD
 

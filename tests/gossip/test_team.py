@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from acquainted import introduce
 from message_builders import (
     MS,
     OTHER_SECRET,
@@ -33,7 +34,9 @@ def a_team() -> Team:
 
 
 def tell(team: Team, seal: Seal, message: Message, utime: int = T0, sender: str = "") -> bool:
-    """Robot `seal` says something; was it accepted?"""
+    """Robot `seal`, which has answered us, says something; was it accepted?"""
+    if seal.robot != team.own.robot:
+        introduce(team, seal, utime=utime)
     event = ChannelMessage(utime, *sealed(seal, message, utime), sender)
     return team.receive(event) is not None
 
@@ -49,7 +52,7 @@ def test_a_datagram_and_the_message_in_it_are_heard_alike() -> None:
     channel, payload = sealed(a_seal(3), a_status())
     datagram = Datagram(T0, lc02.encode(9, channel, payload))
     for event in (ChannelMessage(T0, channel, payload), datagram):
-        team = a_team()
+        team = introduce(a_team(), Chain(3, 1))
         received = team.receive(event)
         assert received is not None
         assert (received.origin, received.message) == (Chain(3, 1), a_status())
@@ -81,9 +84,11 @@ def test_our_own_messages_make_no_peer() -> None:
 
 def test_a_log_entry_says_nothing_of_whether_its_origin_lives() -> None:
     team = a_team()
-    assert tell(team, a_seal(3), an_entry(0, 1))
-    assert team.peers == {}
-    assert team.logs.next_states() == (LogState(3, 1, 0, 1, 1),)
+    introduce(team, Chain(4, 1), utime=T0)
+    tell(team, a_seal(4), hearing(logs=(LogState(3, 1, 0, 0, 0),)))
+    assert team.receive(ChannelMessage(T0, *sealed(a_seal(3), an_entry(0, 1)))) is not None
+    assert set(team.peers) == {4}
+    assert team.logs.next_states()[0] == LogState(3, 1, 0, 1, 1)
 
 
 @pytest.mark.parametrize(("newest", "taken"), [(3_977, True), (3_976, False)])
@@ -93,12 +98,14 @@ def test_an_entry_far_from_what_we_hold_is_taken_when_any_status_speaks_of_its_l
     """A newcomer may hear an old robot through others only."""
     team = a_team()
     tell(team, a_seal(4), hearing(logs=(LogState(3, 1, 0, newest, newest),)))
-    assert tell(team, a_seal(3), an_entry(5_000, 1)) == taken
+    event = ChannelMessage(T0, *sealed(a_seal(3), an_entry(5_000, 1)))
+    assert (team.receive(event) is not None) == taken
     assert dict(team.refused) == ({} if taken else {"entry far ahead of its log": 1})
 
 
 def test_a_log_entry_is_handed_out_once_whoever_sends_it() -> None:
     team, event = a_team(), ChannelMessage(T0, *sealed(a_seal(3), an_entry(0, 1)))
+    introduce(team, Chain(3, 1))
     assert team.receive(event) is not None
     assert team.receive(event) is None
     assert (team.accepted, team.repeats_heard, dict(team.refused)) == (1, 1, {})
@@ -112,7 +119,8 @@ def test_a_robot_that_starts_again_is_a_new_peer() -> None:
     assert team.peers[3].chain == Chain(3, 6)
     assert len(team.peers[3].track) == 0
     assert team.logs.next_states() == (LogState(3, 6, 0, 0, 0),)
-    assert not tell(team, a_seal(3, epoch=5), a_status())
+    past = ChannelMessage(T0, *sealed(a_seal(3, epoch=5), a_status((Heard(*OWN, 0),))))
+    assert team.receive(past) is None
     assert team.peers[3].chain == Chain(3, 6)
 
 
@@ -129,7 +137,7 @@ def test_a_status_that_was_overtaken_is_no_reason_to_repeat_anything() -> None:
 
 
 def test_a_message_goes_out_sealed_on_the_channel_of_its_robot() -> None:
-    team, other = a_team(), Team(a_seal(3))
+    team, other = a_team(), introduce(Team(a_seal(3)), OWN)
     send = team.send(a_status(), T0)
     assert send.channel == "DRSLAM_STATUS_001"
     received = other.receive(ChannelMessage(T0, send.channel, send.payload))
@@ -143,7 +151,7 @@ def test_our_entry_is_what_the_others_will_read() -> None:
     team = a_team()
     (entry,) = team.entries(model, an_entry(0, 5).keyframes, (), ())
     own, payload = team.append(entry, T0)
-    received = Team(a_seal(3)).receive(
+    received = introduce(Team(a_seal(3)), OWN).receive(
         ChannelMessage(T0, "DRSLAM_GRAPH_001", team.send_sealed(1, payload).payload)
     )
     assert received is not None
@@ -212,6 +220,7 @@ def test_we_vouch_for_those_whom_we_heard_of_late() -> None:
 def test_we_name_those_whom_we_hear_and_what_their_messages_took() -> None:
     team = a_team()
     for robot, arrived in ((5, 40 * MS), (3, 30 * MS), (4, 50 * MS)):
+        introduce(team, Chain(robot, 1))
         team.receive(ChannelMessage(T0 + arrived, *sealed(a_seal(robot), a_status(), T0)))
     named = (Heard(3, 1, 30 * MS), Heard(4, 1, 50 * MS), Heard(5, 1, 40 * MS))
     assert team.next_heard(T0 + 60 * MS) == named
@@ -384,6 +393,7 @@ def test_a_sender_without_a_name_is_called_unknown() -> None:
     assert "from an unknown sender" in str(dict(team.conditions(T0))["team.wrong_tag"])
 
 
+@pytest.mark.row("S8")
 def test_both_of_two_robots_with_one_id_say_so() -> None:
     first, second = Team(a_seal(3, epoch=5)), Team(a_seal(3, epoch=6))
     tell(first, second.seal, a_status())

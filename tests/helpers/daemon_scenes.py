@@ -17,6 +17,7 @@ CONFIG = """
 id = 1
 [team]
 insecure = true
+trust_everyone_on = "239.255.76.67"
 [uwb]
 port = "/dev/none"
 [wheels]

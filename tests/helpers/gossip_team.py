@@ -6,10 +6,12 @@ import random
 from collections import Counter
 from collections.abc import Callable, Iterable
 
+from acquainted import introduce
 from message_builders import MS, SECOND, a_seal, a_status
 
 from drslamd.events import ChannelMessage, Send
-from drslamd.gossip.team import Received, Team
+from drslamd.gossip.message_types import Received
+from drslamd.gossip.team import Team
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.robot_model import UNTOLD
 
@@ -40,6 +42,15 @@ class Air:
         self._random = random.Random(seed)
         self._steps = period // STEP
         self._phase = {robot: self._random.randrange(self._steps) for robot in self.teams}
+
+    def meet(self) -> Air:
+        """Everybody has answered everybody."""
+        for team in self.teams.values():
+            others = (other.own for other in self.teams.values() if other is not team)
+            introduce(team, *others, utime=self.utime)
+            for peer in team.peers.values():
+                peer.clock.on_message(self.utime, self.utime)
+        return self
 
     def say(self, robot: int, *, aloud: bool = True) -> None:
         """A robot adds an entry to its log, and sends it if `aloud`."""

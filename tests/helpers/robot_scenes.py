@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from acquainted import introduce
 from message_builders import SECRET, a_seal, a_status, sealed
 from pair_scenes import tracker
 from slam_scenes import Array, config
@@ -55,8 +56,13 @@ class RobotScene:
 
     # peers
 
-    def hear(self, peer: int, message: Message, epoch: int = 1) -> list[Effect]:
-        """A message of a peer arrives the moment it is sent."""
+    def hear(
+        self, peer: int, message: Message, epoch: int = 1, *, is_met: bool = True
+    ) -> list[Effect]:
+        """A message arrives the moment it is sent, of a peer that answered us if it `is_met`."""
+        team = self.robot.team
+        if is_met and peer != self.robot.own.robot and epoch >= team.seal.epochs.get(peer, 0):
+            introduce(team, Chain(peer, epoch), utime=self.utime)
         seal = self._seals.get(peer)
         if seal is None or seal.epoch != epoch:
             seal = self._seals[peer] = a_seal(peer, epoch)
@@ -68,7 +74,7 @@ class RobotScene:
         own = self.robot.own
         heard = (Heard(own.robot, own.epoch, 0),) if hears_us else ()
         ranged = (own.robot,) if ranges_to_us else ()
-        self.hear(peer, a_status(heard, uwb_id=peer, ranged=ranged))
+        self.hear(peer, a_status(heard, uwb_id=peer, ranged=ranged), is_met=hears_us)
 
     def follow(self, peer: int, steps: Sequence[Sequence[float]]) -> None:
         """The odometry of a peer, the last sample of which is now."""

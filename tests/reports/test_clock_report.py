@@ -39,7 +39,7 @@ def test_a_peer_that_hears_us_is_known_by_messages_over_all_the_time() -> None:
 
 def test_a_peer_that_does_not_hear_us_is_known_one_way() -> None:
     scene = RobotScene()
-    scene.meet(1, hears_us=False)
+    scene.hear(1, a_status())
     found = clock(scene.robot, PEER, scene.utime)
     assert found["source"] == "one way"
     assert found["readings"] == [[scene.utime, 0, ONE_WAY_UNCERTAINTY_US]]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from acquainted import introduce
 from frames import KOBUKI_REST, kobuki_core, kobuki_packet, ranging_stream
 from message_builders import a_seal, a_status, sealed
 from robot_scenes import RobotScene, saves, sends, status_in
@@ -103,6 +104,7 @@ def test_the_state_of_the_network_is_remembered_and_noted(up: bool, note: Note) 
 @pytest.mark.parametrize("is_framed", [True, False])
 def test_what_a_peer_adds_to_the_graph_is_taken_in_once(is_framed: bool) -> None:
     scene = RobotScene()
+    introduce(scene.robot.team, Chain(4, 1))
     entry = GraphEntry(0, keyframes=(Keyframe(7, 0, 0, 0, 0),))
     channel, payload = sealed(a_seal(4), entry)
     event: Datagram | ChannelMessage = ChannelMessage(scene.utime, channel, payload)

@@ -1,4 +1,4 @@
-"""Messages that this robot does not take: another key, another version, a made-up start."""
+"""Messages that this robot does not take: of another key or version, recorded, or made up."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from drslamd.machine.finding import Finding
 
 
 def team_key(patient: Patient) -> Iterator[Finding]:
-    keys = ("team.wrong_tag", "team.wrong_version", "team.beyond_clocks")
+    keys = ("team.recording", "team.wrong_tag", "team.wrong_version", "team.beyond_clocks")
     yield from patient.told("team key", *keys)

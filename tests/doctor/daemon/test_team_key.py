@@ -10,6 +10,7 @@ from drslamd.doctor.daemon.team_key import team_key
 def test_each_reason_is_told() -> None:
     case = Case()
     assert found(team_key, case) == []
-    for key in ("team.wrong_tag", "team.wrong_version", "team.beyond_clocks"):
+    keys = ["team.recording", "team.wrong_tag", "team.wrong_version", "team.beyond_clocks"]
+    for key in keys:
         case.say(key, key)
-    assert found(team_key, case) == ["team.wrong_tag", "team.wrong_version", "team.beyond_clocks"]
+    assert found(team_key, case) == keys

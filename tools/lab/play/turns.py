@@ -71,6 +71,9 @@ class Turns:
     def __init__(self, movers: Mapping[int, Mover], air: Air = CALM, seed: int = 0) -> None:
         self._movers = movers
         self._teams = {robot: Team(Seal(KEY, robot, EPOCH, {})) for robot in movers}
+        for robot, team in self._teams.items():
+            for other in movers.keys() - {robot}:
+                team.meet(Chain(other, EPOCH), 0, 0)
         self._phase = {robot: k * TICKS // len(movers) for k, robot in enumerate(movers)}
         self._air, self._rng = air, np.random.default_rng(seed)
         self._tick = TICKS
