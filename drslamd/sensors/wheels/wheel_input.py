@@ -56,7 +56,7 @@ def _kobuki(section: KobukiSection, _dbc_text: str) -> Source:
 
 
 def _roboteq(section: RoboteqSection, _dbc_text: str) -> Source:
-    driver = RoboteqDriver(section.poll_hz, section.swap_channels)
+    driver = RoboteqDriver(section.poll_hz, section.swap_channels, section.counter)
     return Source(driver, section.counts_per_metre)
 
 
