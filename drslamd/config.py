@@ -30,6 +30,9 @@ Metres = Annotated[float, Field(ge=-5, le=5)]
 RobotId = Annotated[int, Field(ge=0, le=MAX_ROBOT_ID)]
 Baud = Annotated[int, Field(ge=1200, le=4_000_000)]
 
+MAX_CAN_OPTIONS = 16
+"""No interface of python-can has more."""
+
 
 class Section(BaseModel):
     """Nothing is guessed: no unknown key, no "3" for 3, no 1 for true, no number without end."""
@@ -84,9 +87,21 @@ class UwbSection(Section):
 class CanSection(Section):
     interface: str = "socketcan"
     """A python-can interface name; `socketcan` on robots."""
-    channel: str = "can0"
+    channel: Union[str, int] = "can0"
     bitrate: Annotated[int, Field(ge=10_000, le=1_000_000)] | None = None
     """Only for adapters that python-can sets up itself; SocketCAN links come up configured."""
+    options: dict[str, Union[bool, int, float, str]] = {}
+    """What else python-can wants to know of this interface, by its own names (`index`, `host`,
+    `tty_baudrate`, `unique_hardware_id`, ...)."""
+
+    @field_validator("options")
+    @classmethod
+    def _options_are_few_and_other_ones(cls, value: dict[str, object]) -> dict[str, object]:
+        if twice := sorted(value.keys() & {"interface", "channel", "bitrate"}):
+            raise ValueError(f"no {twice[0]} in options, it has a key of its own")
+        if len(value) > MAX_CAN_OPTIONS:
+            raise ValueError(f"at most {MAX_CAN_OPTIONS} options")
+        return value
 
 
 class WheelSection(Section):
@@ -142,6 +157,8 @@ class OdriveSection(CanWheelSection):
 
 class AgilexSection(CanWheelSection):
     source: Literal["agilex"]
+    wheelbase_m: Annotated[float, Field(gt=0.05, le=10)] | None = None
+    """Distance between the axles, for a base that says how it steers (Hunter 2.0)."""
 
 
 class DbcSection(CanWheelSection):

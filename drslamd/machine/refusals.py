@@ -5,6 +5,7 @@ Nothing is judged here a second time: each look calls what the daemon itself wil
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 
 from drslamd.config import CanWheelSection, Config, ConfigError, DbcSection
@@ -16,6 +17,8 @@ from drslamd.machine.finding import Finding, Severity
 from drslamd.machine.folders import socket_path, socket_to_ask, state_dir
 from drslamd.parts import dbc_text, taped_calibration
 
+MICROSECONDS_NEED = 1 << 60
+"""Stamps and their products are 64-bit integers."""
 SECOND_DAEMON = "second daemon"
 """The check of which the findings end with an exit code of their own."""
 
@@ -67,6 +70,15 @@ def _error(check: str, fault: str) -> Finding:
     return Finding(check, Severity.ERROR, cause, remedy)
 
 
+def _word_size(_config: Config) -> None:
+    if sys.maxsize < MICROSECONDS_NEED:
+        fault = (
+            "this is a 32-bit system, on which numpy counts microseconds wrongly; install a 64-bit "
+            "one (Raspberry Pi OS 64-bit)"
+        )
+        raise ConfigError([fault])
+
+
 def _team_key(config: Config) -> None:
     if not config.team.insecure:
         read_key(config.team.key_file)
@@ -91,6 +103,7 @@ def _dbc(config: Config) -> None:
 
 
 LOOKS: dict[str, Callable[[Config], object]] = {
+    "computer": _word_size,
     "folders": state_dir,
     "team key": _team_key,
     "lcm": _transport,

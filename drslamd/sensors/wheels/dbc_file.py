@@ -92,7 +92,7 @@ class _Block:
 def _blocks(text: str) -> dict[str, list[_Block]]:
     starts = list(_MESSAGE.finditer(text))
     if not starts:
-        raise ConfigError([_not_readable("it has no messages")])
+        raise ConfigError([_not_readable("it has no line that begins with BO_")])
     ends = [match.start() for match in starts[1:]] + [len(text)]
     found: dict[str, list[_Block]] = {}
     for match, end in zip(starts, ends, strict=True):

@@ -19,10 +19,10 @@ def test_only_the_signals_asked_for_are_read() -> None:
 
 
 def test_a_file_without_messages_is_one_sentence() -> None:
-    with pytest.raises(ConfigError, match="it has no messages"):
+    with pytest.raises(ConfigError, match="no line that begins with BO_"):
         messages_of("text", {"left": "A.B"})
 
 
 def test_bytes_that_are_no_text_are_refused() -> None:
     with pytest.raises(ValueError, match="not a text file"):
-        decoded(b"A\0\0B")
+        decoded(b"A\0\0BC")
