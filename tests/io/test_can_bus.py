@@ -188,11 +188,12 @@ def heard_of(interface: str, *pieces: bytes, frames: int, **options: Any) -> lis
         events: list[Event] = []
         ours, theirs = os.openpty()
         tty.setraw(theirs)
+        # the adapter takes what it is told; what nobody reads would hold up the other side
+        asyncio.get_running_loop().add_reader(ours, os.read, ours, 1000)
         section = CanSection(interface=interface, channel=os.ttyname(theirs), options=options)
         task = asyncio.ensure_future(CanBus(section, MonotonicClock(), events.append).run())
         try:
             await until(lambda: len(events) > 0)
-            os.read(ours, 1000)  # what the adapter is told at its opening
             for piece in pieces:
                 os.write(ours, piece)
                 await asyncio.sleep(0.3)
@@ -201,6 +202,7 @@ def heard_of(interface: str, *pieces: bytes, frames: int, **options: Any) -> lis
         finally:
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
+            asyncio.get_running_loop().remove_reader(ours)
             os.close(ours)
             os.close(theirs)
         return events
