@@ -194,9 +194,9 @@ def heard_of(interface: str, *pieces: bytes, frames: int, **options: Any) -> lis
         task = asyncio.ensure_future(CanBus(section, MonotonicClock(), events.append).run())
         try:
             await until(lambda: len(events) > 0)
-            for piece in pieces:
+            for number, piece in enumerate(pieces):
+                await asyncio.sleep(0.3 if number else 0.0)
                 os.write(ours, piece)
-                await asyncio.sleep(0.3)
             await until(lambda: sum(isinstance(e, CanFrame) for e in events) >= frames, 4.0)
             assert not task.done()
         finally:
@@ -243,7 +243,7 @@ SERIAL = bytes.fromhex("aa6673000008010000001122334455667788bb")
 @pytest.mark.parametrize(
     ("interface", "good"), [("seeedstudio", SEEED), ("serial", SERIAL)], ids=["seeed", "serial"]
 )
-@pytest.mark.parametrize("cut", [1, 2, 5, 11])
+@pytest.mark.parametrize("cut", [1, 11])
 def test_a_frame_that_is_cut_on_a_serial_adapter_is_no_end(
     interface: str, good: bytes, cut: int
 ) -> None:

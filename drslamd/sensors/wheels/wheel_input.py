@@ -248,10 +248,10 @@ class WheelInput:
             return None
         if self.base.tally.received > self._samples_before:
             return _REMEDIES.get(self.base.trouble, "the wheel samples make no sense")
-        if self.driver.tally.refused[WheelRefusal.NOT_FINITE] > self._not_finite_before:
-            return _NOT_FINITE
         if why := self.driver.why_no_sample(utime):
             return why
+        if self.driver.tally.refused[WheelRefusal.NOT_FINITE] > self._not_finite_before:
+            return _NOT_FINITE
         seconds = (utime - self._trying_since) // SECOND_US
         if damaged := self._damaged():
             return f"input, but no usable {self.driver.expects} for {seconds} s: {damaged}"

@@ -84,6 +84,7 @@ def test_sides_of_different_rates_make_pairs_at_the_lower_one() -> None:
     assert all(pair.second == pytest.approx(pair.first) for pair in pairs)
 
 
+@pytest.mark.row("D10")
 def test_counters_are_interpolated_over_their_wrap() -> None:
     between = wrapping(16)
     assert between(65_530, 10, 0.5) == 2
