@@ -280,9 +280,20 @@ def test_an_interface_gets_the_keys_that_it_needs(monkeypatch: pytest.MonkeyPatc
     assert got == {"interface": "gs_usb", "channel": 2, "bitrate": 500_000, **options}
 
 
-def test_an_option_that_has_a_key_of_its_own_is_refused() -> None:
-    with pytest.raises(ValueError, match="no bitrate in options, it has a key of its own"):
-        CanSection(options={"bitrate": 500_000})
+def test_an_option_that_has_a_key_of_its_own_is_one_sentence() -> None:
+    said = opened(CanSection(interface="virtual", options={"interface": "slcan"}))
+    assert isinstance(said, str)
+    assert "multiple values for keyword argument 'interface'" in said
+
+
+@pytest.mark.parametrize(("count", "fits"), [(16, True), (17, False)])
+def test_options_are_few(count: int, fits: bool) -> None:
+    options: dict[str, Any] = {f"key{k}": k for k in range(count)}
+    if fits:
+        assert len(CanSection(options=options).options) == count
+    else:
+        with pytest.raises(ValueError, match="at most 16"):
+            CanSection(options=options)
 
 
 @pytest.mark.parametrize(("faults", "is_lost"), [(MOST_DAMAGED - 1, False), (MOST_DAMAGED, True)])
