@@ -88,8 +88,7 @@ class CanSection(Section):
     bitrate: Annotated[int, Field(ge=10_000, le=1_000_000)] | None = None
     """Only for adapters that python-can sets up itself; SocketCAN links come up configured."""
     options: Annotated[dict[str, Union[bool, int, float, str]], Field(max_length=16)] = {}
-    """What else python-can wants to know of this interface, by its own names (`index`, `host`,
-    `tty_baudrate`, `unique_hardware_id`, ...)."""
+    """What else python-can wants to know of this interface, by its own names (`index`, ...)."""
 
 
 class WheelSection(Section):
