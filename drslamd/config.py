@@ -94,9 +94,11 @@ class UwbSection(Section):
 class CanSection(Section):
     interface: str = "socketcan"
     """A python-can interface name; `socketcan` on robots."""
-    channel: str = "can0"
+    channel: Union[str, int] = "can0"
     bitrate: Annotated[int, Field(ge=10_000, le=1_000_000)] | None = None
     """Only for adapters that python-can sets up itself; SocketCAN links come up configured."""
+    options: Annotated[dict[str, Union[bool, int, float, str]], Field(max_length=16)] = {}
+    """What else python-can wants to know of this interface, by its own names (`index`, ...)."""
 
 
 class WheelSection(Section):
@@ -128,6 +130,8 @@ class RoboteqSection(SerialWheelSection):
     poll_hz: Annotated[float, Field(ge=1, le=100)] = 25.0
     swap_channels: bool = False
     """True when channel 1 drives the right wheels."""
+    counter: Literal["encoder", "hall"] = "encoder"
+    """What counts the turns: `?C` or, for motors with hall sensors alone, `?CB`."""
 
 
 class AsciiSection(SerialWheelSection):
@@ -150,6 +154,8 @@ class OdriveSection(CanWheelSection):
 
 class AgilexSection(CanWheelSection):
     source: Literal["agilex"]
+    wheelbase_m: Annotated[float, Field(gt=0.05, le=10)] | None = None
+    """Distance between the axles, for a base that says how it steers (Hunter 2.0)."""
 
 
 class DbcSection(CanWheelSection):
@@ -163,14 +169,20 @@ class DbcSection(CanWheelSection):
     angular: str = ""
     """`Message.Signal` of a twist: m/s and rad/s after `unit`."""
     counts_per_metre: Scale | None = None
-    counter_bits: Annotated[int, Field(ge=8, le=64)] = 32
+    counter_bits: Annotated[int, Field(ge=4, le=64)] | None = None
+    """At which power of two the counters wrap; the width of their signals when left out."""
     id_mask: Annotated[int, Field(ge=1, le=0x1FFFFFFF)] = 0x1FFFFFFF
     """Applied to an id before the look-up, for ids that hold a node number."""
     left_node: Annotated[int, Field(ge=0)] | None = None
     right_node: Annotated[int, Field(ge=0)] | None = None
     """Node numbers that tell the two sides apart: the bits outside `id_mask`, shifted down."""
-    unit: Scale = 1.0
-    """Factor from the unit of the speed signals to m/s (and rad/s)."""
+    unit: Scale | None = None
+    """Factor from the unit of the speed signals to m/s (and rad/s); what the DBC file says of its
+    units when left out."""
+    angular_unit: Scale | None = None
+    """Factor of `angular` to rad/s; `unit` when left out."""
+    reverse_angular: bool = False
+    """True when the base counts turns to the right."""
 
     @model_validator(mode="after")
     def _signals_fit_the_measure(self) -> DbcSection:
@@ -184,6 +196,8 @@ class DbcSection(CanWheelSection):
             raise ValueError('measures = "counts" needs counts_per_metre')
         if self.measures == "twist" and (self.reverse_left or self.reverse_right):
             raise ValueError('measures = "twist" has no sides to reverse')
+        if self.measures != "twist" and (self.reverse_angular or self.angular_unit is not None):
+            raise ValueError('angular_unit and reverse_angular are for measures = "twist"')
         return self
 
 

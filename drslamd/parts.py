@@ -22,6 +22,7 @@ from drslamd.io.serial_port import SerialPort
 from drslamd.io.state_store import read_key
 from drslamd.io.transport import Transport
 from drslamd.recording.encoder import Encoder
+from drslamd.sensors.wheels.dbc_file import decoded
 from drslamd.setup.calibration_file import MAX_BYTES, Taped, UnusableCalibration, read
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
 
@@ -98,8 +99,8 @@ def dbc_text(config: Config) -> str:
         return ""
     path = Path(config.wheels.dbc_file)
     try:
-        return path.read_text()
-    except (OSError, UnicodeDecodeError) as error:
+        return decoded(path.read_bytes())
+    except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         remedy = denied(path) if isinstance(error, PermissionError) else "correct the path"
         raise ConfigError([f"wheels.dbc_file = {str(path)!r}: {reason}; {remedy}"]) from None

@@ -118,7 +118,7 @@ def test_a_dbc_file_is_read_only_for_wheels_that_have_one(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("content", "sentence"), [(None, "No such file or directory"), (b"\xff\xfe", "not a text file")]
+    ("content", "sentence"), [(None, "No such file or directory"), (b"B\0\0\0O", "not a text file")]
 )
 def test_a_dbc_file_that_cannot_be_read_is_one_sentence(
     tmp_path: Path, content: bytes | None, sentence: str

@@ -1,12 +1,18 @@
 """A CAN bus through python-can, kept open for ever like a serial port.
 
 python-can's own Notifier is not used: an exception in its reader ends it without a word.
+
+Adapters raise what their authors left out: struct.error and TypeError at a frame that was cut,
+ValueError at a damaged line, USB errors, ImportError where a library is missing. None of it is a
+fault of ours, so all of it is caught here. A bus that raises is read on, since a damaged line is
+one line; one that does nothing but raise is opened anew.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from drslamd.config import CanSection, ConfigError
@@ -17,6 +23,8 @@ from drslamd.io.clock import Clock
 if TYPE_CHECKING:
     import can
 
+MOST_DAMAGED = 20
+"""Faults without a frame between them after which a bus is taken for lost."""
 PATIENCE_S = 0.2
 """How long a bus without a file descriptor is waited for at a time."""
 
@@ -45,6 +53,7 @@ class CanBus:
         self._section = section
         self._clock = clock
         self._deliver = deliver
+        self._damaged = 0
         self._last_state: tuple[PortCondition, str] | None = None
         self._read_from = -1
         self.reads = 0
@@ -81,9 +90,9 @@ class CanBus:
         try:
             read = self._read_in_a_thread if _descriptor(bus) < 0 else self._read_when_ready
             error = await read(bus)
-            self._state(PortCondition.LOST, f"{self.name}: {error}")
+            self._state(PortCondition.LOST, f"{self.name}: {_said(error)}")
         finally:
-            await asyncio.to_thread(bus.shutdown)
+            await asyncio.to_thread(_shut, bus)
 
     async def _read_when_ready(self, bus: can.BusABC) -> Exception:
         loop, descriptor = asyncio.get_running_loop(), _descriptor(bus)
@@ -92,10 +101,9 @@ class CanBus:
         def ready() -> None:
             self.reads += 1
             received = _receive(bus, 0.0)
-            if not isinstance(received, Exception):
-                self._take(received)
-            elif not failed.done():
-                failed.set_result(received)
+            end = self._end(bus, received)
+            if end is not None and not failed.done():
+                failed.set_result(end)
 
         loop.add_reader(descriptor, ready)
         self._read_from = descriptor
@@ -108,9 +116,22 @@ class CanBus:
     async def _read_in_a_thread(self, bus: can.BusABC) -> Exception:
         while True:
             received = await asyncio.to_thread(_receive, bus, PATIENCE_S)
-            if isinstance(received, Exception):
-                return received
+            end = self._end(bus, received)
+            if end is not None:
+                return end
+
+    def _end(self, bus: can.BusABC, received: can.Message | Exception | None) -> Exception | None:
+        """Deliver what came; the fault that is one too many."""
+        if not isinstance(received, Exception):
+            self._damaged = 0 if received is not None else self._damaged
             self._take(received)
+            return None
+        self._damaged += 1
+        if self._damaged >= MOST_DAMAGED:
+            self._damaged = 0
+            return received
+        _forget_the_damaged(bus)
+        return None
 
     def _take(self, message: can.Message | None) -> None:
         if message is None or message.is_error_frame or message.is_remote_frame:
@@ -134,15 +155,15 @@ def opened(section: CanSection) -> can.BusABC | str:
     """The bus, or why there is none."""
     import can
 
-    extra: dict[str, Any] = {}
+    extra: dict[str, Any] = dict(section.options)
     if section.bitrate is not None:
         extra["bitrate"] = section.bitrate
     if section.interface == "udp_multicast":
-        extra["hop_limit"] = 0
+        extra.setdefault("hop_limit", 0)
     try:
         return can.Bus(section.channel, interface=section.interface, **extra)
-    except (can.CanError, OSError, ValueError) as error:
-        return f"{_name(section)}: {error}"
+    except Exception as error:
+        return f"{_name(section)}: {_said(error)}"
 
 
 def _name(section: CanSection) -> str:
@@ -151,16 +172,32 @@ def _name(section: CanSection) -> str:
 
 def _receive(bus: can.BusABC, patience_s: float) -> can.Message | Exception | None:
     """One frame, nothing yet, or what ended the bus."""
-    import can
-
     try:
         return bus.recv(patience_s)
-    except (can.CanError, OSError, ValueError) as error:
+    except Exception as error:
         return error
 
 
 def _descriptor(bus: can.BusABC) -> int:
     try:
         return int(bus.fileno())
-    except NotImplementedError:
+    except Exception:
         return -1
+
+
+def _forget_the_damaged(bus: can.BusABC) -> None:
+    """python-can's slcan keeps bytes that it cannot decode, and fails on them for ever."""
+    kept = getattr(bus, "_buffer", None)
+    if isinstance(kept, bytearray):
+        kept.clear()
+
+
+def _shut(bus: can.BusABC) -> None:
+    """A bus that is lost may not let itself be closed, either."""
+    with suppress(Exception):
+        bus.shutdown()
+
+
+def _said(error: Exception) -> str:
+    """Its words, in one line, or its kind where it has none."""
+    return " ".join(str(error).split()) or type(error).__name__

@@ -146,7 +146,9 @@ class Multicast:
     def _heard_ourselves(self) -> None:
         self._unheard_since = None
         self._backoff.reset()
-        self._state(True, f"{self._section.group}:{self._section.port} on {self._where}")
+        address = own_address(self._section)
+        at = self._where if address == self._where else f"{self._where} ({address})"
+        self._state(True, f"{self._section.group}:{self._section.port} on {at}")
 
     def _fail(self, why: str) -> None:
         self._close()
@@ -173,6 +175,18 @@ def join_fault(section: GossipSection, error: OSError) -> str:
 def send_fault(section: GossipSection, error: OSError, sysfs: Path = SYSFS) -> str:
     """Why nothing can be sent to the group."""
     return f"cannot send on {_where(section)}: {_reason(section, error, sysfs)}"
+
+
+def own_address(section: GossipSection) -> str:
+    """The IPv4 address under which this robot sends to its group."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        try:
+            if section.interface:
+                return address_of(section.interface) or section.interface
+            sender.connect((section.group, section.port))
+            return str(sender.getsockname()[0])
+        except OSError as error:
+            return error.strerror or "no address"
 
 
 def _where(section: GossipSection) -> str:

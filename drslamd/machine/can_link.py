@@ -24,7 +24,7 @@ def can_link(config: Config, host: Host) -> Iterator[Finding]:
     else:
         bus.shutdown()
         cause = ""
-    remedy = _remedy(section.channel, host) if section.interface == "socketcan" else ""
+    remedy = _remedy(str(section.channel), host) if section.interface == "socketcan" else ""
     if cause or remedy:
         what = cause or f"wheels: nothing comes from {section.channel}"
         yield Finding("can", Severity.WARNING, what, remedy or _of_adapters(section.interface))
@@ -57,5 +57,8 @@ def _of_adapters(interface: str) -> str:
     import can
 
     if interface in can.VALID_INTERFACES:
-        return "plug the adapter in, or correct wheels.can"
+        return (
+            "plug the adapter in, or correct wheels.can; what else its interface wants to know, by "
+            "python-can's names, stands in wheels.can.options"
+        )
     return 'correct wheels.can.interface; it is "socketcan" on robots'

@@ -5,6 +5,7 @@ Nothing is judged here a second time: each look calls what the daemon itself wil
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 
 from drslamd.config import CanWheelSection, Config, ConfigError, DbcSection
@@ -15,6 +16,8 @@ from drslamd.machine.finding import Finding, Severity
 from drslamd.machine.folders import socket_path, socket_to_ask, state_dir
 from drslamd.parts import dbc_text, taped_calibration, team_secret
 
+MICROSECONDS_NEED = 1 << 60
+"""Stamps and their products are 64-bit integers."""
 SECOND_DAEMON = "second daemon"
 """The check of which the findings end with an exit code of their own."""
 
@@ -66,6 +69,15 @@ def _error(check: str, fault: str) -> Finding:
     return Finding(check, Severity.ERROR, cause, remedy)
 
 
+def _word_size(_config: Config) -> None:
+    if sys.maxsize < MICROSECONDS_NEED:
+        fault = (
+            "this is a 32-bit system, on which numpy counts microseconds wrongly; install a 64-bit "
+            "one (Raspberry Pi OS 64-bit)"
+        )
+        raise ConfigError([fault])
+
+
 def _transport(config: Config) -> None:
     if config.gossip.provider == "liblcm":
         require_lcm()
@@ -85,6 +97,7 @@ def _dbc(config: Config) -> None:
 
 
 LOOKS: dict[str, Callable[[Config], object]] = {
+    "computer": _word_size,
     "folders": state_dir,
     "team key": team_secret,
     "lcm": _transport,

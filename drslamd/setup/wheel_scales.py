@@ -55,7 +55,7 @@ def scale_key(wheels: WheelSection, longer: float) -> str:
         return f"wheels.counts_per_metre = {_rounded(wheels.counts_per_metre / longer)}"
     if isinstance(wheels, DbcSection) and wheels.measures == "counts":
         return f"wheels.counts_per_metre = {_rounded((wheels.counts_per_metre or 1) / longer)}"
-    if isinstance(wheels, DbcSection):
+    if isinstance(wheels, DbcSection) and wheels.unit is not None:
         return f"wheels.unit = {_rounded(wheels.unit * longer)}"
     return ""
 

@@ -193,7 +193,8 @@ def _dbc() -> list[Fault]:
     def misspelt(old: str, new: str) -> Make:
         return wheels(CAN + COUNTS.replace(old, new))
 
-    narrow = misspelt("Wheels.", "Short.")
+    short = COUNTS.replace("Wheels.", "Short.")
+    narrow = wheels(CAN + short + "counter_bits = 32\n")
     one_node = wheels(CAN + COUNTS + "left_node = 1\nid_mask = 31\n")
     return [
         Fault("no DBC", wheels(CAN + COUNTS, dbc=None), "base.dbc': No such", "correct the path"),

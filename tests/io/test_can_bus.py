@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import struct
+import tty
 from collections.abc import Callable
 from typing import Any
 
@@ -13,7 +15,7 @@ can = pytest.importorskip("can", reason="python-can is not installed")
 
 from drslamd.config import AgilexSection, CanSection, OdriveSection  # noqa: E402
 from drslamd.events import CanFrame, Event, PortCondition, PortState  # noqa: E402
-from drslamd.io.can_bus import CanBus  # noqa: E402
+from drslamd.io.can_bus import MOST_DAMAGED, CanBus, opened  # noqa: E402
 from drslamd.io.clock import MonotonicClock  # noqa: E402
 from drslamd.sensors.wheels.wheel_input import WheelInput  # noqa: E402
 
@@ -174,3 +176,134 @@ def test_a_bus_whose_reader_dies_is_opened_again(monkeypatch: pytest.MonkeyPatch
     states = [e.condition for e in events if isinstance(e, PortState)]
     assert states[:2] == [PortCondition.OPEN, PortCondition.LOST]
     assert any("adapter gone" in e.detail for e in events if isinstance(e, PortState))
+
+
+# adapters that raise
+
+
+def heard_of(interface: str, *pieces: bytes, frames: int, **options: Any) -> list[Event]:
+    """What the daemon's side delivers of bytes that come on a serial line, piece by piece."""
+
+    async def run() -> list[Event]:
+        events: list[Event] = []
+        ours, theirs = os.openpty()
+        tty.setraw(theirs)
+        # the adapter takes what it is told; what nobody reads would hold up the other side
+        asyncio.get_running_loop().add_reader(ours, os.read, ours, 1000)
+        section = CanSection(interface=interface, channel=os.ttyname(theirs), options=options)
+        task = asyncio.ensure_future(CanBus(section, MonotonicClock(), events.append).run())
+        try:
+            await until(lambda: len(events) > 0)
+            for number, piece in enumerate(pieces):
+                await asyncio.sleep(0.3 if number else 0.0)
+                os.write(ours, piece)
+            await until(lambda: sum(isinstance(e, CanFrame) for e in events) >= frames, 4.0)
+            assert not task.done()
+        finally:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+            asyncio.get_running_loop().remove_reader(ours)
+            os.close(ours)
+            os.close(theirs)
+        return events
+
+    return asyncio.run(asyncio.wait_for(run(), 20))
+
+
+GOOD_SLCAN = b"t3118FFFFFFC100000012\r"
+DAMAGED = [
+    pytest.param(b"t3118FFFFFFC10000001\r", id="a digit is missing"),
+    pytest.param(b"t311\r", id="the length is missing"),
+    pytest.param(b"t3", id="cut and then glued to the next line"),
+    pytest.param(b"\xff\xfe\r", id="noise"),
+    pytest.param(b"\x80", id="one byte that is no ASCII"),
+    pytest.param(b"\xff\x07T\x00zz\r\r\x07", id="rubbish"),
+]
+
+
+@pytest.mark.row("D3")
+@pytest.mark.parametrize("damage", DAMAGED)
+def test_a_damaged_line_of_slcan_costs_no_more_than_itself_and_the_one_it_ran_into(
+    damage: bytes,
+) -> None:
+    good = [GOOD_SLCAN] * 5
+    line = b"".join([GOOD_SLCAN, damage, *good])
+    events = heard_of("slcan", line, frames=5, sleep_after_open=0.0)
+    frames = [e for e in events if isinstance(e, CanFrame)]
+    assert len(frames) >= 5
+    assert all((f.can_id, f.data.hex()) == (0x311, "ffffffc100000012") for f in frames[-4:])
+    assert [e.condition for e in events if isinstance(e, PortState)] == [PortCondition.OPEN]
+
+
+SEEED = bytes.fromhex("aac8110312345678aabbccdd55")
+SERIAL = bytes.fromhex("aa6673000008010000001122334455667788bb")
+
+
+@pytest.mark.row("D3")
+@pytest.mark.parametrize(
+    ("interface", "good"), [("seeedstudio", SEEED), ("serial", SERIAL)], ids=["seeed", "serial"]
+)
+@pytest.mark.parametrize("cut", [1, 11])
+def test_a_frame_that_is_cut_on_a_serial_adapter_is_no_end(
+    interface: str, good: bytes, cut: int
+) -> None:
+    events = heard_of(interface, good[:cut], good, frames=1)
+    frame = next(e for e in events if isinstance(e, CanFrame))
+    assert len(frame.data) == 8
+    assert [e.condition for e in events if isinstance(e, PortState)] == [PortCondition.OPEN]
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [TypeError("no index"), struct.error("4 bytes"), ImportError("no usb"), KeyError("x"),
+     AssertionError(), RuntimeError("libusb"), can.CanInterfaceNotImplementedError("pcan")],
+    ids=lambda fault: type(fault).__name__,
+)  # fmt: skip
+def test_whatever_an_adapter_raises_at_its_opening_is_why_there_is_none(
+    monkeypatch: pytest.MonkeyPatch, fault: Exception
+) -> None:
+    def refuse(*_: Any, **__: Any) -> None:
+        raise fault
+
+    monkeypatch.setattr(can, "Bus", refuse)
+    said = opened(CanSection(interface="gs_usb", channel=0))
+    assert isinstance(said, str)
+    assert said.startswith("gs_usb 0: ")
+    assert len(said) > len("gs_usb 0: ")
+
+
+def test_an_interface_gets_the_keys_that_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    got: dict[str, Any] = {}
+    monkeypatch.setattr(can, "Bus", lambda channel, **keys: got.update(keys, channel=channel))
+    options: dict[str, Any] = {"index": 0, "rtscts": True, "host": "10.0.0.9", "timeout": 0.5}
+    opened(CanSection(interface="gs_usb", channel=2, bitrate=500_000, options=options))
+    assert got == {"interface": "gs_usb", "channel": 2, "bitrate": 500_000, **options}
+
+
+def test_an_option_that_has_a_key_of_its_own_is_one_sentence() -> None:
+    said = opened(CanSection(interface="virtual", options={"interface": "slcan"}))
+    assert isinstance(said, str)
+    assert "multiple values for keyword argument 'interface'" in said
+
+
+@pytest.mark.parametrize(("count", "fits"), [(16, True), (17, False)])
+def test_options_are_few(count: int, fits: bool) -> None:
+    options: dict[str, Any] = {f"key{k}": k for k in range(count)}
+    if fits:
+        assert len(CanSection(options=options).options) == count
+    else:
+        with pytest.raises(ValueError, match="at most 16"):
+            CanSection(options=options)
+
+
+@pytest.mark.parametrize(("faults", "is_lost"), [(MOST_DAMAGED - 1, False), (MOST_DAMAGED, True)])
+def test_a_bus_that_does_nothing_but_raise_is_lost(faults: int, is_lost: bool) -> None:
+    events: list[Event] = []
+    bus = CanBus(CanSection(interface="virtual"), MonotonicClock(), events.append)
+    frame = can.Message(arbitration_id=1, is_extended_id=False, data=b"a")
+    ends = [bus._end(frame, fault) for fault in [KeyError(1)] * faults]
+    assert (ends[-1] is not None) == is_lost
+    assert not any(ends[:-1])
+    bus._end(frame, frame)
+    assert len(events) == 1
+    assert bus._end(frame, KeyError(1)) is None

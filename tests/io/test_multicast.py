@@ -20,7 +20,7 @@ from drslamd.events import Datagram, NetworkState
 from drslamd.gossip import lc02
 from drslamd.io import multicast
 from drslamd.io.clock import MonotonicClock
-from drslamd.io.multicast import IP_MULTICAST_ALL, Multicast, open_group
+from drslamd.io.multicast import IP_MULTICAST_ALL, Multicast, open_group, own_address
 
 LONGEST_GAP_S = 0.05
 
@@ -294,6 +294,22 @@ async def test_where_it_cannot_join_is_named_in_one_sentence(where: str, why: st
         await asyncio.sleep(1.0)
     (state,) = ear.states
     assert state.detail.startswith(f"cannot join {GROUP} on {where}: {why}")
+
+
+@pytest.mark.parametrize(
+    ("interface", "address"), [("lo", "127.0.0.1"), ("127.0.0.1", "127.0.0.1"), ("wlan9", "wlan9")]
+)
+def test_the_own_address_is_that_of_the_interface(interface: str, address: str) -> None:
+    assert own_address(section(interface)) == address
+
+
+@in_a_loop
+async def test_where_it_is_up_its_interface_and_own_address_are_said() -> None:
+    where = section("lo")
+    transport, ear = native(where)
+    async with running(transport):
+        await spoken_until(transport, ear.is_up)
+    assert ear.states[-1].detail == f"{GROUP}:{where.port} on lo (127.0.0.1)"
 
 
 @in_a_loop

@@ -90,6 +90,7 @@ def test_what_is_written_reaches_the_device(tmp_path: Path) -> None:
     assert asked == [b"?C\r"]
 
 
+@pytest.mark.row("D5")
 def test_a_pulled_cable_is_told_once_and_the_port_comes_back(tmp_path: Path) -> None:
     async def script(cable: PseudoPort, _: SerialPort, events: list[Event]) -> None:
         cable.pull()
@@ -109,6 +110,7 @@ def test_a_pulled_cable_is_told_once_and_the_port_comes_back(tmp_path: Path) -> 
     ]
 
 
+@pytest.mark.row("D8")
 def test_a_port_that_another_program_holds_is_busy_until_it_lets_go(tmp_path: Path) -> None:
     async def run() -> None:
         cable = PseudoPort(tmp_path / "tty")
@@ -129,6 +131,7 @@ def test_a_port_that_another_program_holds_is_busy_until_it_lets_go(tmp_path: Pa
     asyncio.run(asyncio.wait_for(run(), 20))
 
 
+@pytest.mark.row("D8")
 @pytest.mark.skipif(os.getuid() == 0, reason="root may open everything")
 def test_a_port_without_permission_says_so(tmp_path: Path) -> None:
     forbidden = tmp_path / "tty"
@@ -166,6 +169,7 @@ def first_events(path: Path) -> list[Event]:
     return asyncio.run(run())
 
 
+@pytest.mark.row("D8")
 def test_a_port_that_is_not_there_is_told_once_not_at_every_try(tmp_path: Path) -> None:
     events = first_events(tmp_path / "nothing")
     assert conditions(events) == [PortCondition.MISSING]

@@ -54,3 +54,13 @@ def test_that_a_daemon_lives_stands_before_what_else_is_refused(config: Config) 
     (only,) = refusals(keyless)
     assert only.cause == "team.key_file = '/nowhere/key': No such file or directory"
     assert only.remedy.startswith("copy the team's key there")
+
+
+@pytest.mark.parametrize(("largest", "refused"), [(2**31 - 1, True), (2**63 - 1, False)])
+def test_a_32_bit_system_is_refused_in_one_sentence(
+    config: Config, monkeypatch: pytest.MonkeyPatch, largest: int, refused: bool
+) -> None:
+    monkeypatch.setattr("drslamd.machine.refusals.sys.maxsize", largest)
+    found = refusals(config)
+    assert [finding.check for finding in found] == (["computer"] if refused else [])
+    assert all("32-bit system" in finding.cause and "64-bit" in finding.remedy for finding in found)

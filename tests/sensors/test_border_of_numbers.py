@@ -39,7 +39,7 @@ BS_:
 BU_: Base
 BO_ 256 Both: 8 Base
  SG_ First : 0|32@1- (FACTOR,OFFSET) [0|0] "" X
- SG_ Second : 32|32@1- (1,0) [0|0] "" X
+ SG_ Second : 32|32@1- (OTHER,0) [0|0] "" X
 """
 FLOATS = "SIG_VALTYPE_ 256 First : 1;\nSIG_VALTYPE_ 256 Second : 1;\n"
 NO_FLOAT = "1" + "0" * 400
@@ -113,7 +113,8 @@ def say_integers(wheels: WheelInput, left: float, right: float, ms: int) -> list
 
 
 def dbc_text(factor: str = "1", offset: str = "0", is_float: bool = True) -> str:
-    text = DBC.replace("FACTOR", factor).replace("OFFSET", offset)
+    other = "1" if is_float else factor  # both counters have one
+    text = DBC.replace("FACTOR", factor).replace("OFFSET", offset).replace("OTHER", other)
     return text + (FLOATS if is_float else "")
 
 

@@ -66,6 +66,7 @@ def test_times_never_run_backwards_when_a_less_delayed_reading_comes() -> None:
     assert clock.to_host(80, 530 * MS) == 530 * MS
 
 
+@pytest.mark.row("D11")
 @pytest.mark.parametrize("ppm", [-200, 0, 200])
 def test_drift_stays_within_the_documented_bound(ppm: int) -> None:
     draw = random.Random(7)

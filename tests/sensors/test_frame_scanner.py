@@ -82,6 +82,7 @@ def test_a_read_far_larger_than_the_buffer_is_taken_whole() -> None:
     assert scanned([b"\x00" * 3 * MAX_BUFFER_BYTES + stream])[0] == frames
 
 
+@pytest.mark.row("D1")
 @settings(derandomize=True, max_examples=30, deadline=None)
 @given(st.binary(min_size=1, max_size=3 * MAX_BUFFER_BYTES))
 def test_never_more_than_the_buffer_is_held(data: bytes) -> None:
@@ -142,6 +143,7 @@ def test_an_unfinished_frame_waits_for_its_rest() -> None:
     assert scanner.feed(frame[17:], 0) == [frame]
 
 
+@pytest.mark.row("D4")
 @pytest.mark.parametrize("cut_at", range(1, 29))
 @pytest.mark.parametrize("pause", [0.1, 10.0, 600.0])
 def test_a_pause_inside_a_frame_does_not_lose_it(cut_at: int, pause: float) -> None:

@@ -217,6 +217,7 @@ def dbc_drivers(vectors: Path) -> dict[str, DbcDriver]:
             id_mask=0x1F,
             left_node=40,
             right_node=1,
+            unit=1.0,
         ),
         "vesc": dbc_driver(
             vesc,

@@ -8,6 +8,7 @@ has something to say is heard.
 from __future__ import annotations
 
 import re
+from enum import Enum
 from typing import Final, NamedTuple
 
 from drslamd.conventions import SECOND_US
@@ -55,6 +56,29 @@ _FAULT_REMEDIES: Final = {
 """In the order of what hurts most."""
 
 
+class Oddity(Enum):
+    """What good frames say that should not be so."""
+
+    LP_ROLES = (
+        "the UWB module has the role TAG and all its partners the role ANCHOR, as in the LP modes, "
+        "in which it ranges only to anchors: if nobody gave them these labels, " + _OUTPUT
+    )
+    OWN_ID = "another UWB module has id {detail}, too: give each module its own id with NAssistant"
+    TWICE = (
+        "two UWB modules have id {detail}: distances to both come in one frame; give each module "
+        "its own id with NAssistant"
+    )
+
+
+class _Odd(NamedTuple):
+    """The last oddity, and how often it came without a pause."""
+
+    oddity: Oddity
+    detail: str
+    times: int
+    utime: int
+
+
 class _Trouble(NamedTuple):
     """The last refusal, and how often it was for that reason without a pause or a good frame."""
 
@@ -77,6 +101,7 @@ class LinkTrackWatch:
         self._trying_since = 0
         self._trouble: _Trouble | None = None
         self._fault: tuple[ModuleFault, int] | None = None
+        self._odd: _Odd | None = None
         self._text = b""
         self.wrong_mode: str | None = None
 
@@ -104,12 +129,24 @@ class LinkTrackWatch:
         if reason is Refusal.LP_MODE:
             self.wrong_mode = detail
 
+    def on_odd(self, oddity: Oddity, detail: str, utime: int) -> None:
+        before, times = self._odd, 1
+        if before and before.oddity is oddity and utime - before.utime <= NO_FRAME_US:
+            times += before.times
+        self._odd = _Odd(oddity, detail, times, utime)
+
     def on_fault(self, faults: ModuleFault, utime: int) -> None:
         self._fault = (faults, utime)
 
     def advice(self, utime: int) -> str | None:
         """One sentence about the present trouble, or None."""
-        for judge in (self._silence, self._refusals, self._module_faults, self._no_frames):
+        for judge in (
+            self._silence,
+            self._refusals,
+            self._module_faults,
+            self._oddities,
+            self._no_frames,
+        ):
             if sentence := judge(utime):
                 return sentence
         return None
@@ -135,6 +172,12 @@ class LinkTrackWatch:
             return None
         faults = self._fault[0]
         return next((text for bit, text in _FAULT_REMEDIES.items() if bit in faults), None)
+
+    def _oddities(self, utime: int) -> str | None:
+        odd = self._odd
+        if odd is None or odd.times < REPEATED or utime - odd.utime > NO_FRAME_US:
+            return None
+        return odd.oddity.value.format(detail=odd.detail)
 
     def _no_frames(self, utime: int) -> str | None:
         seconds = (utime - self._trying_since) // SECOND_US

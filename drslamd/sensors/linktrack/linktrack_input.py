@@ -27,7 +27,7 @@ from drslamd.conventions import MILLISECOND_US
 from drslamd.sensors.device_clock import WINDOW_US, DeviceClock
 from drslamd.sensors.frame_scanner import FrameScanner
 from drslamd.sensors.linktrack.codec import LINKTRACK, Frame, Refusal, decode
-from drslamd.sensors.linktrack.linktrack_advice import LinkTrackWatch, shown_id
+from drslamd.sensors.linktrack.linktrack_advice import LinkTrackWatch, Oddity, shown_id
 from drslamd.sensors.linktrack.linktrack_frames import EMPTY_ID, Kind, ModuleFault
 from drslamd.sensors.samples import RangeSample
 from drslamd.sensors.tally import Tally
@@ -53,6 +53,10 @@ HEALTH_BITS: Final = (
     | ModuleFault.USER_DATA_TOO_LONG
 )
 
+ONE_MODULE_M: Final = 3.0
+"""Distances to one id in one frame differ by noise and reflections; by more, they are to two."""
+_TAG: Final = 2
+_ANCHOR: Final = 1
 _SHORT_IDS: Final = frozenset({Kind.NODE_FRAME2, Kind.NODE_FRAME3})
 _MEASURED: Final = ("distance_m", "fp_rssi_db", "rx_rssi_db")
 _RANGING: Final = _SHORT_IDS | {Kind.NODE_FRAME5}
@@ -185,7 +189,23 @@ class LinkTrackInput:
         self.voltage_v = values["voltage_v"]
         self._follow_system_time(frame)
         self._watch.on_good_frame(utime)
+        self._look_for_oddities(frame, utime)
         return self._samples(frame, measured)
+
+    def _look_for_oddities(self, frame: Frame, utime: int) -> None:
+        """The role is a free label in the DR modes: nothing is refused for it."""
+        nodes = frame.values["nodes"]
+        if nodes and frame.values["role"] == _TAG and all(n["role"] == _ANCHOR for n in nodes):
+            self._watch.on_odd(Oddity.LP_ROLES, "", utime)
+        heard: dict[int, list[float]] = {}
+        for node in nodes:
+            heard.setdefault(node["id"], []).append(node["distance_m"])
+        if self._uwb_id in heard:
+            self._watch.on_odd(Oddity.OWN_ID, shown_id(self._uwb_id), utime)
+        for uwb_id, metres in heard.items():
+            is_empty = uwb_id == EMPTY_ID and frame.kind in _SHORT_IDS
+            if not is_empty and max(metres) - min(metres) > ONE_MODULE_M:
+                self._watch.on_odd(Oddity.TWICE, shown_id(uwb_id), utime)
 
     def _refuse(self, reason: Refusal, detail: str, utime: int) -> list[RangeSample]:
         self.frames.refuse(reason)

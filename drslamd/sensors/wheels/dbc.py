@@ -1,45 +1,64 @@
 """Wheel odometry of any base that comes with a DBC file, which says where its signals are.
 
 The configuration names two signals: the counters or the speeds of both sides, or the two speeds of
-the body. When both are in one frame they make one sample; when they are in two, they are brought to
-a common time as in `side_pairing`. Counts are taken raw, since a scaled counter does not wrap at a
-power of two; speeds are taken scaled, must be finite, and are multiplied by ``unit``.
+the body. When both are in one frame they make one sample; when they are in two, or on two pages of
+one multiplexed message, they are brought to a common time as in `side_pairing`. Counts are taken
+raw, since a scaled counter does not wrap at a power of two, with the sign of their factor; counts
+that are floating point do not wrap. Speeds are taken scaled and multiplied by ``unit``, or by what
+the unit in the file says.
 
 Ids that hold a node number are masked by ``id_mask`` before the look-up; the node number is what
 stands outside the mask, shifted down (ODrive: mask 0x1F, node = axis; VESC: mask 0x1FFFFF00, node =
-controller id). `cantools` reads the file and the frames; it is imported only when a base needs it.
+controller id).
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from drslamd.config import ConfigError, DbcSection
+from drslamd.conventions import SECOND_US
 from drslamd.events import CanFrame
-from drslamd.sensors.samples import Twist, WheelCounts, WheelSample, WheelSpeeds
+from drslamd.sensors.samples import Twist, WheelCounts, WheelSample, WheelSpeeds, WheelTurns
 from drslamd.sensors.tally import Tally
+from drslamd.sensors.wheels.dbc_file import messages_of
+from drslamd.sensors.wheels.dbc_signal import SignalReader, Value
 from drslamd.sensors.wheels.side_pairing import Pair, Side, SidePairing, linear, wrapping
 from drslamd.sensors.wheels.wheel_driver import CanDriver, Outcome, WheelRefusal, tallied
 
 if TYPE_CHECKING:
-    from cantools.database import Database, Message
+    from cantools.database import Message
+    from cantools.database.can.signal import Signal
 
 _ID_BITS: Final = (1 << 29) - 1
-_NAMES_SHOWN: Final = 10
+HEARD_US: Final = 2 * SECOND_US
+"""A side that said something during this time speaks."""
+
+_SPEEDS: Final = {
+    "m/s": 1.0, "mps": 1.0, "cm/s": 0.01, "mm/s": 0.001, "km/h": 1 / 3.6, "kph": 1 / 3.6,
+    "kmh": 1 / 3.6, "mph": 0.44704, "": 1.0, "-": 1.0,
+}  # fmt: skip
+_TURN_RATES: Final = {
+    "rad/s": 1.0, "mrad/s": 0.001, "deg/s": math.pi / 180, "\u00b0/s": math.pi / 180,
+    "dps": math.pi / 180, "rpm": math.pi / 30, "": 1.0, "-": 1.0,
+}  # fmt: skip
+"""Units as DBC files write them; a file that names none is taken at its number."""
 
 
 class _Source(NamedTuple):
-    """Where one of the two values comes from."""
+    """Where one of the two values comes from, and its factor to counts, m/s or rad/s."""
 
     side: Side
+    key: str
     message: Message
-    signal: str
+    reader: SignalReader
     node: int | None
+    unit: float
 
 
 class DbcDriver(CanDriver):
-    """`WheelCounts`, `WheelSpeeds` or `Twist`, as ``measures`` says.
+    """`WheelCounts`, `WheelTurns`, `WheelSpeeds` or `Twist`, as ``measures`` and the file say.
 
     Args:
         section: which signals to read, and what they mean.
@@ -52,15 +71,29 @@ class DbcDriver(CanDriver):
     def __init__(self, section: DbcSection, dbc_text: str) -> None:
         self._section = section
         self._node_shift = _node_shift(section)
-        database = _database(dbc_text)
         keys = ("linear", "angular") if section.measures == "twist" else ("left", "right")
+        paths = {key: getattr(section, key) for key in keys}
+        messages = messages_of(dbc_text, paths)
+        signals = [_signal(messages[key], path) for key, path in paths.items()]
         nodes = (section.left_node, section.right_node)
+        if len(set(zip(paths.values(), nodes, strict=True))) < len(keys):
+            raise ConfigError(
+                [f'wheels.{keys[1]} = "{paths[keys[1]]}": the same as wheels.{keys[0]}']
+            )
         self._sources = [
-            _source(database, section, key, side, node)
-            for key, side, node in zip(keys, Side, nodes, strict=True)
+            _Source(
+                side,
+                key,
+                messages[key],
+                SignalReader(messages[key], signal.name),
+                node,
+                _unit(section, key, signal),
+            )
+            for side, key, signal, node in zip(Side, keys, signals, nodes, strict=True)
         ]
-        counts = section.measures == "counts"
-        self._pairing = SidePairing(wrapping(section.counter_bits) if counts else linear)
+        self._counts = section.measures == "counts"
+        self._bits = _counter_bits(section, keys, signals) if self._counts else None
+        self._pairing = SidePairing(linear if self._bits is None else wrapping(self._bits))
         self.expects = " and ".join(f"CAN id 0x{s.message.frame_id:X}" for s in self._sources)
         self.tally: Tally[WheelRefusal] = Tally()
 
@@ -70,19 +103,33 @@ class DbcDriver(CanDriver):
     def unpaired(self) -> int:
         return self._pairing.unpaired
 
-    def _decode(self, frame: CanFrame) -> Outcome:
-        sources = [source for source in self._sources if self._is_meant(frame, source)]
-        values: list[float] = []
-        for source in sources:
-            value = self._value(source, frame.data)
-            if value is None or isinstance(value, WheelRefusal):
-                return value
-            values.append(value)
-        if not sources:
+    def why_no_sample(self, utime: int) -> str | None:
+        last = self._pairing.last_utime
+        speaks = [s for s in self._sources if utime - last.get(s.side, -HEARD_US) < HEARD_US]
+        if len(speaks) != 1:
             return None
-        if len(sources) == 2:
-            return [self._sample(Pair(frame.utime, *values))]
-        pair = self._pairing.add(sources[0].side, frame.utime, values[0])
+        (heard,), (silent,) = speaks, [s for s in self._sources if s not in speaks]
+        node = "" if silent.node is None else f" of node {silent.node}"
+        return (
+            f"wheels.{heard.key} comes but wheels.{silent.key} "
+            f"(CAN id 0x{silent.message.frame_id:X}{node}) does not: check the power and the cable "
+            "of that side, and the name of its signal"
+        )
+
+    def _decode(self, frame: CanFrame) -> Outcome:
+        values: dict[Side, float] = {}
+        for source in self._sources:
+            value = self._value(source, frame)
+            if isinstance(value, WheelRefusal):
+                return value
+            if value is not None:
+                values[source.side] = value
+        if not values:
+            return None
+        if len(values) == len(self._sources):
+            return [self._sample(Pair(frame.utime, *values.values()))]
+        ((side, value),) = values.items()
+        pair = self._pairing.add(side, frame.utime, value)
         return [] if pair is None else [self._sample(pair)]
 
     def _is_meant(self, frame: CanFrame, source: _Source) -> bool:
@@ -94,50 +141,68 @@ class DbcDriver(CanDriver):
             and source.node in (None, node)
         )
 
-    def _value(self, source: _Source, data: bytes) -> float | WheelRefusal | None:
-        signals = _decoded(source.message, data, scaled=self._section.measures != "counts")
-        if isinstance(signals, WheelRefusal):
-            return signals
-        if source.signal not in signals:
-            return None if source.message.is_multiplexed() else WheelRefusal.SHORT
-        value = signals[source.signal]
-        if self._section.measures == "counts":
-            return int(value)  # a float would lose the last bits of a wide counter
-        return speed if math.isfinite(speed := _as_float(value)) else WheelRefusal.NOT_FINITE
+    def _value(self, source: _Source, frame: CanFrame) -> Value | WheelRefusal | None:
+        if not self._is_meant(frame, source):
+            return None
+        if self._counts:
+            return source.reader.raw(frame.data)  # a float would lose the last bits of a wide one
+        return source.reader.scaled(frame.data)
 
     def _sample(self, pair: Pair) -> WheelSample:
         utime, first, second = pair
-        if self._section.measures == "counts":
-            return WheelCounts(utime, int(first), int(second), self._section.counter_bits)
+        if self._counts:
+            if self._bits is None:
+                return WheelTurns(utime, first, second)
+            return WheelCounts(utime, int(first), int(second), self._bits)
         sample = Twist if self._section.measures == "twist" else WheelSpeeds
-        return sample(utime, first * self._section.unit, second * self._section.unit)
+        first_unit, second_unit = (source.unit for source in self._sources)
+        return sample(utime, first * first_unit, second * second_unit)
 
 
-def _decoded(message: Message, data: bytes, scaled: bool) -> dict[str, Any] | WheelRefusal:
-    from cantools.database import DecodeError
+def _signal(message: Message, path: str) -> Signal:
+    name = path.split(".")[1]
+    return next(signal for signal in message.signals if signal.name == name)
 
-    try:
-        # Of a short frame the signals that are there are good, if no other tells which they are.
-        signals = message.decode(
-            data,
-            decode_choices=False,
-            scaling=scaled,
-            allow_truncated=not message.is_multiplexed(),
+
+def _counter_bits(section: DbcSection, keys: tuple[str, str], signals: list[Signal]) -> int | None:
+    """How wide the counters are; None for floating point, which does not wrap."""
+    first, second = signals
+    if first.is_float != second.is_float:
+        raise ConfigError([f"wheels.{keys[0]}, {keys[1]}: one is an integer, the other is not"])
+    if second.scale not in (first.scale, -first.scale):
+        fault = (
+            "the DBC file gives the two sides different factors, but they need one and the same "
+            "wheels.counts_per_metre; correct the file"
         )
-    except DecodeError:
-        return WheelRefusal.MALFORMED
-    except OverflowError:  # a factor or an offset in the file that no float can hold
-        return WheelRefusal.NOT_FINITE
-    assert isinstance(signals, dict)  # only containers decode to anything else
-    return signals
+        raise ConfigError([f"wheels.{keys[0]}, {keys[1]}: {fault}"])
+    if first.is_float:
+        return None
+    narrowest = min(first.length, second.length)
+    if section.counter_bits is None:
+        return narrowest
+    if narrowest < section.counter_bits:
+        key = keys[0] if first.length < section.counter_bits else keys[1]
+        bits = f"{narrowest} bits, counter_bits = {section.counter_bits}"
+        raise ConfigError([f'wheels.{key} = "{getattr(section, key)}": the signal has only {bits}'])
+    return section.counter_bits
 
 
-def _as_float(value: float) -> float:
-    """A whole number that no float can hold is infinite."""
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf
+def _unit(section: DbcSection, key: str, signal: Signal) -> float:
+    """Factor from the number that the file means to m/s or rad/s, with its sign."""
+    if section.measures == "counts":
+        return 1.0
+    is_turn = key == "angular"
+    sign = -1 if is_turn and section.reverse_angular else 1
+    given = section.angular_unit if is_turn and section.angular_unit else section.unit
+    if given is not None:
+        return sign * given
+    known = _TURN_RATES if is_turn else _SPEEDS
+    name = (signal.unit or "").strip().lower()
+    if name not in known:
+        what = "angular_unit, the factor to rad/s" if is_turn else "unit, the factor to m/s"
+        fault = f'the DBC file gives it in "{signal.unit}"; give wheels.{what}'
+        raise ConfigError([f'wheels.{key} = "{getattr(section, key)}": {fault}'])
+    return sign * known[name]
 
 
 def _node_shift(section: DbcSection) -> int:
@@ -151,45 +216,3 @@ def _node_shift(section: DbcSection) -> int:
     if not outside:
         raise ConfigError(["wheels.left_node: needs an id_mask that leaves room for node numbers"])
     return (outside & -outside).bit_length() - 1
-
-
-def _database(dbc_text: str) -> Database:
-    try:
-        from cantools.database import Database, load_string
-        from cantools.database.errors import Error
-    except ImportError:
-        fault = 'wheels.source = "dbc": needs the package cantools (pip install drslamd[can])'
-        raise ConfigError([fault]) from None
-    try:
-        database = load_string(dbc_text, database_format="dbc")
-    except Error as error:
-        reason = " ".join(str(error).split())
-        raise ConfigError([f"wheels.dbc_file: not a DBC file that can be read: {reason}"]) from None
-    assert isinstance(database, Database)  # the other kind comes from CDD files
-    return database
-
-
-def _source(
-    database: Database, section: DbcSection, key: str, side: Side, node: int | None
-) -> _Source:
-    path: str = getattr(section, key)
-    message_name, signal_name = path.split(".")
-    messages = {message.name: message for message in database.messages}
-    message = messages.get(message_name)
-    if message is None:
-        raise ConfigError([_absent(key, path, "message", message_name, list(messages))])
-    signals = {signal.name: signal for signal in message.signals}
-    signal = signals.get(signal_name)
-    if signal is None:
-        raise ConfigError([_absent(key, path, "signal", signal_name, list(signals))])
-    if section.measures == "counts" and signal.is_float:
-        raise ConfigError([f'wheels.{key} = "{path}": counts must be an integer signal'])
-    if section.measures == "counts" and signal.length < section.counter_bits:
-        bits = f"{signal.length} bits, counter_bits = {section.counter_bits}"
-        raise ConfigError([f'wheels.{key} = "{path}": the signal has only {bits}'])
-    return _Source(side, message, signal_name, node)
-
-
-def _absent(key: str, path: str, what: str, name: str, there: list[str]) -> str:
-    shown = ", ".join(there[:_NAMES_SHOWN]) + (", ..." if len(there) > _NAMES_SHOWN else "")
-    return f'wheels.{key} = "{path}": no {what} {name} in the DBC file; there are {shown}'

@@ -25,6 +25,9 @@ class WheelRefusal(Enum):
     NOT_FINITE = "a value that is not a finite number"
     TIME = "a time of the base that does not continue the one before"
     OLD_PROTOCOL = "a protocol of the base that is not supported"
+    NOT_AVAILABLE = "a value that the base itself marks as not available"
+    STANDING = "a position that stands while its speed says that the wheel turns"
+    NO_ODOMETRY = "values of a way of driving that cannot be integrated"
 
 
 Outcome = Union[list[WheelSample], WheelRefusal, None]
@@ -57,6 +60,11 @@ class WheelDriver(Protocol):
 
     def fault(self) -> str | None:
         """One sentence about what the base itself reports to be wrong, with a remedy, or None."""
+        return None
+
+    def why_no_sample(self, utime: int) -> str | None:
+        """Asked when input has given no sample for a while: one sentence with a remedy, or None
+        when it cannot be told from what was decoded."""
         return None
 
     def unpaired(self) -> int:

@@ -8,6 +8,7 @@ with a remedy.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
@@ -56,7 +57,7 @@ def _kobuki(section: KobukiSection, _dbc_text: str) -> Source:
 
 
 def _roboteq(section: RoboteqSection, _dbc_text: str) -> Source:
-    driver = RoboteqDriver(section.poll_hz, section.swap_channels)
+    driver = RoboteqDriver(section.poll_hz, section.swap_channels, section.counter)
     return Source(driver, section.counts_per_metre)
 
 
@@ -69,8 +70,10 @@ def _odrive(section: OdriveSection, _dbc_text: str) -> Source:
     return Source(driver, section.gear / (2 * math.pi * section.wheel_radius_m))
 
 
-def _agilex(_section: AgilexSection, _dbc_text: str) -> Source:
-    return Source(AgilexDriver(), agilex.COUNTS_PER_METRE)
+def _agilex(section: AgilexSection, _dbc_text: str) -> Source:
+    base, track = section.wheelbase_m, section.track_m
+    steering = agilex.Steering(base, track) if base is not None else None
+    return Source(AgilexDriver(steering), agilex.COUNTS_PER_METRE)
 
 
 def _dbc(section: DbcSection, dbc_text: str) -> Source:
@@ -97,6 +100,20 @@ _NOT_FINITE: Final = (
     "the wheels send values that are not finite numbers: does the base report a fault, are the "
     "factors of its DBC file and wheels.unit right?"
 )
+
+REPEATED: Final = 3
+"""So many refusals for one reason are a finding; noise is refused in fewer."""
+_DAMAGES: Final = {
+    WheelRefusal.CHECKSUM: "they come with wrong checksums; check the cable, below 2 m, and its "
+    "shield",
+    WheelRefusal.MALFORMED: "they are not of the form of the protocol; is wheels.source right, has "
+    "the base another firmware?",
+    WheelRefusal.SHORT: "the frames are too short; is wheels.source right, does the DBC file "
+    "belong to this base?",
+    WheelRefusal.NOT_AVAILABLE: "the base marks its values as not available; does it report a "
+    "fault, is it switched on?",
+    WheelRefusal.TIME: "the time of the base does not go on; does it restart again and again?",
+}
 
 _REMEDIES: Final[dict[Gap | ReadingRefusal | None, str]] = {
     ReadingRefusal.TOO_FAST: _TOO_FAST,
@@ -144,6 +161,7 @@ class WheelInput:
         self._trying_since = 0
         self._samples_before = 0
         self._not_finite_before = 0
+        self._refused_before: Counter[WheelRefusal] = Counter()
         self.last_motion_utime: int | None = None
 
     def feed(self, data: bytes, utime: int) -> list[Motion]:
@@ -206,6 +224,7 @@ class WheelInput:
         if any(not motion.gap for motion in motions):
             self.last_motion_utime = self._trying_since = utime
             self._samples_before = self.base.tally.received
+            self._refused_before = self.driver.tally.refused.copy()
             self._not_finite_before = self.driver.tally.refused[WheelRefusal.NOT_FINITE]
         return motions
 
@@ -218,13 +237,23 @@ class WheelInput:
         seconds = silent_us // SECOND_US
         return f"nothing from the wheels for {seconds} s: check the power of the base and the cable"
 
+    def _damaged(self) -> str | None:
+        """What is wrong with most of what was meant for us and came to nothing."""
+        refused = self.driver.tally.refused - self._refused_before
+        worst = max(_DAMAGES, key=lambda reason: refused[reason])
+        return _DAMAGES[worst] if refused[worst] >= REPEATED else None
+
     def _no_motion(self, utime: int) -> str | None:
         if utime - self._trying_since < NO_MOTION_US:
             return None
         if self.base.tally.received > self._samples_before:
             return _REMEDIES.get(self.base.trouble, "the wheel samples make no sense")
+        if why := self.driver.why_no_sample(utime):
+            return why
         if self.driver.tally.refused[WheelRefusal.NOT_FINITE] > self._not_finite_before:
             return _NOT_FINITE
         seconds = (utime - self._trying_since) // SECOND_US
+        if damaged := self._damaged():
+            return f"input, but no usable {self.driver.expects} for {seconds} s: {damaged}"
         remedy = "is wheels.baud right?" if self._serial else "is this the bus of the base?"
         return f"input, but no {self.driver.expects} for {seconds} s: {remedy}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 
 import pytest
@@ -9,10 +10,12 @@ from frames import SECOND_US
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drslamd.config import AgilexSection
 from drslamd.events import CanFrame
 from drslamd.sensors.samples import Twist, WheelCounts
-from drslamd.sensors.wheels.agilex import AgilexDriver
+from drslamd.sensors.wheels.agilex import AgilexDriver, Steering
 from drslamd.sensors.wheels.wheel_driver import WheelRefusal
+from drslamd.sensors.wheels.wheel_input import WheelInput
 
 MS = 1000
 T0 = 100 * SECOND_US
@@ -125,3 +128,104 @@ def test_no_frames_make_an_agilex_base_raise(frames: list[tuple[int, bool, bytes
         utime += pause
         driver.on_frame(CanFrame(utime, can_id, extended, data))
     assert driver.tally.received == len(frames)
+
+
+# models that say otherwise how they move
+
+
+def full(utime: int, linear: int, angular: int, sideways: int, steering: int) -> CanFrame:
+    return agilex(0x221, struct.pack(">hhhh", linear, angular, sideways, steering), utime)
+
+
+def hunter(steering: Steering | None) -> tuple[AgilexDriver, list[Twist]]:
+    """A Hunter 2.0 at 1 m/s with its inner wheel at 0.3 rad to the left, for ten seconds."""
+    driver = AgilexDriver(steering)
+    samples = [
+        s for k in range(500) for s in driver.on_frame(full(T0 + k * 20 * MS, 1000, 0, 0, 300))
+    ]
+    assert all(isinstance(sample, Twist) for sample in samples)
+    return driver, samples  # type: ignore[return-value]
+
+
+def test_a_hunter_2_turns_by_the_angle_of_its_inner_wheel() -> None:
+    driver, samples = hunter(Steering(0.65, 0.605))
+    # the inner front wheel stands 0.65 m before an axle on which it turns about the same point
+    radius = 0.65 / math.tan(0.3) + 0.605 / 2
+    assert [s.angular_radps for s in samples] == pytest.approx([1 / radius] * 474)
+    assert driver.fault() is None
+
+
+def test_to_the_right_it_turns_as_much() -> None:
+    steering = Steering(0.65, 0.605)
+    assert steering.yaw_rate(1.0, -0.3) == -steering.yaw_rate(1.0, 0.3)
+    assert steering.yaw_rate(-1.0, 0.3) == -steering.yaw_rate(1.0, 0.3)
+
+
+def test_a_hunter_2_without_a_wheelbase_is_refused_in_a_sentence() -> None:
+    driver, samples = hunter(None)
+    assert samples == []
+    assert driver.tally.refused[WheelRefusal.NO_ODOMETRY] == 474
+    said = driver.fault()
+    assert said is not None
+    assert "wheels.wheelbase_m" in said
+
+
+@pytest.mark.parametrize(("steering", "refused"), [(3, False), (4, True)])
+def test_an_angle_too_small_to_show_as_a_turn_is_no_reason(steering: int, refused: bool) -> None:
+    driver = AgilexDriver()
+    driver.on_frame(full(T0, 1000, 0, 0, steering))
+    samples = driver.on_frame(full(T0 + SECOND_US, 1000, 0, 0, steering))
+    assert len(samples) == (not refused)
+
+
+def test_a_base_that_says_how_it_turns_may_steer_too() -> None:
+    driver = AgilexDriver()
+    driver.on_frame(full(T0, 1000, 300, 0, 300))
+    assert driver.on_frame(full(T0 + SECOND_US, 1000, 300, 0, 300)) == [
+        Twist(T0 + SECOND_US, 1.0, 0.3)
+    ]
+
+
+@pytest.mark.parametrize("mode", [1, 2, 3, 4])
+def test_a_ranger_in_another_mode_is_refused_and_begins_anew_after_it(mode: int) -> None:
+    wheels = WheelInput(AgilexSection(source="agilex", track_m=0.4))
+    frames = [odometry(T0 + k * 20 * MS, 10 * k, 10 * k) for k in range(10)]
+    frames.append(agilex(0x291, bytes([mode, 0]), T0 + 200 * MS))
+    frames += [odometry(T0 + k * 20 * MS, 10 * k, 10 * k) for k in range(11, 20)]
+    motions = [m for frame in frames for m in wheels.on_frame(frame)]
+    said = wheels.advice(T0 + 400 * MS)
+    assert said is not None
+    assert f"motion mode {mode}" in said
+    frames = [agilex(0x291, bytes([0, 0]), T0 + 400 * MS)]
+    frames += [odometry(T0 + k * 20 * MS, 10 * k, 10 * k) for k in range(21, 30)]
+    motions += [m for frame in frames for m in wheels.on_frame(frame)]
+    assert sum(m.distance_m for m in motions) == pytest.approx(0.09 + 0.08)
+    assert [m.gap for m in motions].count(True) == 3
+
+
+def test_a_change_of_the_mode_is_no_odometry() -> None:
+    driver = AgilexDriver()
+    driver.on_frame(agilex(0x291, bytes([0, 1])))
+    assert driver.on_frame(odometry(T0 + MS, 1, 1)) == []
+    driver.on_frame(agilex(0x291, bytes([0, 0]), T0 + 2 * MS))
+    assert driver.on_frame(odometry(T0 + 3 * MS, 1, 1)) != []
+
+
+@pytest.mark.parametrize(("sideways", "refused"), [(49, False), (50, True), (-50, True)])
+def test_a_base_that_moves_sideways_is_refused_meanwhile(sideways: int, refused: bool) -> None:
+    driver = AgilexDriver()
+    driver.on_frame(odometry(T0, 0, 0))
+    driver.on_frame(full(T0 + MS, 0, 0, sideways, 0))
+    assert (driver.on_frame(odometry(T0 + 2 * MS, 1, 1)) == []) == refused
+    assert (driver.fault() is not None) == refused
+    driver.on_frame(full(T0 + 502 * MS, 0, 0, 0, 0))
+    assert driver.on_frame(odometry(T0 + 503 * MS, 1, 1)) != []
+
+
+def test_a_state_without_odometry_has_its_own_sentence() -> None:
+    driver = AgilexDriver()
+    assert driver.why_no_sample(T0) is None
+    driver.on_frame(agilex(0x211, bytes(8)))
+    said = driver.why_no_sample(T0 + MS)
+    assert said is not None
+    assert "neither 0x311 nor 0x221" in said

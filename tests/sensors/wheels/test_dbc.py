@@ -13,12 +13,13 @@ from hypothesis import strategies as st
 
 from drslamd.config import ConfigError, DbcSection
 from drslamd.events import CanFrame
-from drslamd.sensors.samples import Twist, WheelCounts, WheelSample, WheelSpeeds
+from drslamd.sensors.samples import Twist, WheelCounts, WheelSample, WheelSpeeds, WheelTurns
 from drslamd.sensors.wheels.wheel_driver import WheelRefusal
 
 pytest.importorskip("cantools")
 
 from drslamd.sensors.wheels.dbc import DbcDriver
+from drslamd.sensors.wheels.dbc_file import decoded
 
 MS = 1000
 T0 = 100 * SECOND_US
@@ -166,6 +167,7 @@ def test_the_node_is_what_stands_outside_the_mask_shifted_down() -> None:
             id_mask=0x1F,
             left_node=1,
             right_node=63,
+            unit=1.0,
         ),
         DBC,
     )
@@ -194,7 +196,8 @@ def test_a_short_frame_is_used_as_far_as_it_goes(length: int, used: bool) -> Non
 
 def test_a_speed_that_is_not_finite_is_refused() -> None:
     driver = DbcDriver(
-        section(measures="wheel_speeds", left="Estimates.Rate", right="Estimates.Turns"), DBC
+        section(measures="wheel_speeds", left="Estimates.Rate", right="Estimates.Turns", unit=1.0),
+        DBC,
     )
     for value in (float("nan"), float("inf")):
         assert driver.on_frame(frame(9, struct.pack("<ff", value, 1.0))) == []
@@ -210,11 +213,17 @@ def test_another_page_of_a_multiplexed_message_is_ignored() -> None:
     assert driver.tally.ignored == 1
 
 
-@pytest.mark.parametrize("data", [b"", b"\x01", bytes([7, 0, 0, 0, 0, 0, 0, 0])])
+def test_a_page_that_the_file_does_not_have_is_nobody_s_trouble() -> None:
+    driver = counts(left="Muxed.MuxL", right="Muxed.MuxR", counter_bits=16)
+    assert driver.on_frame(frame(0x104, bytes([7, 0, 0, 0, 0, 0, 0, 0]))) == []
+    assert (driver.tally.ignored, driver.tally.received) == (1, 1)
+
+
+@pytest.mark.parametrize("data", [b"", b"\x01"])
 def test_a_multiplexed_message_that_cannot_be_read_is_refused(data: bytes) -> None:
     driver = counts(left="Muxed.MuxL", right="Muxed.MuxR", counter_bits=16)
     assert driver.on_frame(frame(0x104, data)) == []
-    assert driver.tally.refused == {WheelRefusal.MALFORMED: 1}
+    assert driver.tally.refused == {WheelRefusal.SHORT: 1}
 
 
 @pytest.mark.parametrize(
@@ -223,7 +232,9 @@ def test_a_multiplexed_message_that_cannot_be_read_is_refused(data: bytes) -> No
         ({"left": "Nothing.Count"}, 'wheels.left = "Nothing.Count": no message Nothing in the DBC'),
         ({"right": "Encoders.X"}, "no signal X in the DBC file; there are CountL, CountR"),
         ({"counter_bits": 32}, "the signal has only 24 bits, counter_bits = 32"),
-        ({"left": "Estimates.Turns"}, "counts must be an integer signal"),
+        ({"left": "Estimates.Turns"}, "one is an integer, the other is not"),
+        ({"right": "Encoders.CountL"}, 'wheels.right = "Encoders.CountL": the same as wheels.left'),
+        ({"left": "WideLeft.Count"}, "gives the two sides different factors"),
         ({"left_node": 1}, "give both left_node and right_node"),
         ({"left_node": 1, "right_node": 2}, "needs an id_mask that leaves room"),
     ],
@@ -251,6 +262,181 @@ def test_without_cantools_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setitem(sys.modules, "cantools.database", None)
     with pytest.raises(ConfigError, match=r"pip install drslamd\[can\]"):
         counts()
+
+
+# files as tools write them
+
+
+HEAD = 'VERSION ""\nNS_ :\nBS_:\nBU_: A\n'
+TWO = (
+    'BO_ 528 Wheels: 8 A\n SG_ L : 0|32@1- (1,0) [0|0] "tick" A\n'
+    ' SG_ R : 32|32@1- (1,0) [0|0] "tick" A\n'
+)
+
+
+def of_two(text: str, **keys: Any) -> DbcDriver:
+    both = {"left": "Wheels.L", "right": "Wheels.R", "counts_per_metre": 1.0}
+    return DbcDriver(section(**{**both, **keys}), text)
+
+
+@pytest.mark.parametrize(
+    "elsewhere",
+    [
+        'BO_ 530 S: 8 A\n SG_ F : 0|8@1+ (1,0) [0|255] "" A\n SG_ G : 0|4@1+ (1,0) [0|15] "" A\n',
+        'BO_ 530 S: 8 A\n SG_ F : 70|8@1+ (1,0) [0|255] "" A\n',
+        'BO_ 530 S: 8 A\n SG_ F : 0|0@1+ (1,0) [0|255] "" A\n',
+        "BO_ 530 S: 8 A\n SG_ F : 0|8@1+ (1,0) [|] C A\n",
+        'BO_ 530 S: 8 A\n SG_ F-\u00e4 : 0|8@1+ (1,0) [0|0] "" A\n',
+        "BO_ 4000 TooWide: 8 A\n",
+        'VAL_ 99 Gone 1 "a" ;\n',
+        "SIG_VALTYPE_ 99 Gone : 1;\n",
+        'BA_ "unknown" BO_ 528 1;\n',
+        'CM_ BO_ 528 "see also\nBO_ 529 Wheels: 8 A\n";\n',
+        "something else;\n",
+    ],
+)
+def test_faults_where_nobody_asked_cost_nothing(elsewhere: str) -> None:
+    data = struct.pack("<ii", -3, 4)
+    for text in (HEAD + TWO + elsewhere, HEAD + elsewhere + TWO):
+        assert of_two(text).on_frame(frame(528, data)) == [WheelCounts(T0, -3, 4, 32)]
+
+
+def test_an_overlap_of_the_signals_asked_for_is_one_sentence() -> None:
+    with pytest.raises(ConfigError, match=r"wheels\.dbc_file: .*overlapping"):
+        of_two(HEAD + TWO.replace("32|32", "31|32"))
+
+
+def test_two_messages_of_the_name_asked_for_are_one_sentence() -> None:
+    with pytest.raises(ConfigError, match="has 2 messages of this name"):
+        of_two(HEAD + TWO + TWO.replace("528", "529"))
+
+
+@pytest.mark.parametrize(
+    "encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16", "utf-16-le", "utf-16-be"]
+)
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_a_file_is_read_in_the_encoding_of_its_tool(encoding: str, end: str) -> None:
+    text = HEAD + TWO + 'BO_ 529 T: 8 A\n SG_ M : 0|8@1+ (1,0) [0|0] "\u00b0C" A\n'
+    read = decoded(text.replace("\n", end).encode(encoding))
+    assert read == text
+    assert of_two(read).on_frame(frame(528, bytes(8)))
+
+
+def test_bytes_that_no_encoding_has_spoil_only_their_own_text() -> None:
+    assert decoded((HEAD + TWO).encode() + b'CM_ "\x81\xff" ;') == HEAD + TWO + 'CM_ "\x81\xff" ;\n'
+
+
+# sides in every shape
+
+
+def test_the_two_sides_on_two_pages_of_one_id_are_brought_to_a_common_time() -> None:
+    text = (
+        HEAD + 'BO_ 640 W: 8 A\n SG_ I M : 0|8@1+ (1,0) [0|3] "" A\n'
+        ' SG_ L m0 : 8|32@1- (1,0) [0|0] "" A\n SG_ R m1 : 8|32@1- (1,0) [0|0] "" A\n'
+    )
+    driver = of_two(text, left="W.L", right="W.R")
+    samples: list[WheelSample] = []
+    for k in range(6):  # a page every 25 ms, and both sides one count each 25 ms
+        data = struct.pack("<Bi3x", k % 2, k)
+        samples += driver.on_frame(frame(640, data, T0 + 25 * k * MS))
+    assert samples == [WheelCounts(T0 + 25 * k * MS, k, k, 32) for k in (2, 4)]
+
+
+def test_counters_every_100_ms_and_50_ms_apart_are_a_motion() -> None:
+    driver = counts(left="LeftWheel.Count", right="RightWheel.Count", counter_bits=32)
+    samples: list[WheelSample] = []
+    for k in range(40):  # 100 counts a side each 100 ms
+        can_id = 0x102 + k % 2
+        samples += driver.on_frame(frame(can_id, struct.pack("<I", 50 * k), T0 + 50 * k * MS))
+    assert samples[-1] == WheelCounts(T0 + 1900 * MS, 1900, 1900, 32) or samples[-1] == WheelCounts(
+        T0 + 1800 * MS, 1800, 1800, 32
+    )
+    assert len(samples) == 19
+
+
+@pytest.mark.parametrize(
+    ("line", "sent", "read"),
+    [
+        ("0|12@1+ (1,0)", (0xFFF).to_bytes(8, "little"), 0xFFF),
+        ("0|12@1- (1,0)", (0xFFF).to_bytes(8, "little"), -1),
+        ("3|17@1- (1,0)", ((1 << 16 | 5) << 3).to_bytes(8, "little"), 5 - (1 << 16)),
+        ("7|24@0- (1,0)", bytes([0xFF, 0xFF, 0xFE, 0, 0, 0, 0, 0]), -2),
+        ("3|20@0+ (1,0)", bytes([0x0A, 0xBC, 0xDE, 0, 0, 0, 0, 0]), 0xABCDE),
+        ("0|16@1- (-1,0)", struct.pack("<h6x", 7), -7),
+        ("0|16@1- (-0.001,0)", struct.pack("<h6x", 7), -7),
+    ],
+)
+def test_counters_of_every_width_order_and_sign(line: str, sent: bytes, read: int) -> None:
+    text = HEAD + "".join(
+        f'BO_ {number} {name}: 8 A\n SG_ C : {line} [0|0] "" A\n'
+        for number, name in ((1, "Left"), (2, "Right"))
+    )
+    driver = of_two(text, left="Left.C", right="Right.C")
+    driver.on_frame(frame(1, sent))
+    (sample,) = driver.on_frame(frame(2, sent))
+    assert isinstance(sample, WheelCounts)
+    width = int(line.split("|")[1].split("@")[0])
+    assert sample.bits == width
+    assert (sample.left, sample.right) == (read, read)
+
+
+def test_counts_as_floating_point_do_not_wrap() -> None:
+    driver = counts(left="Estimates.Turns", right="Estimates.Rate", counter_bits=None)
+    assert driver.on_frame(frame(9, struct.pack("<ff", 1.5, -2.5))) == [WheelTurns(T0, 1.5, -2.5)]
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("km/h", 1 / 3.6), ("mm/s", 0.001), ("m/s", 1.0), ("", 1.0)]
+)
+def test_the_unit_is_what_the_file_says(unit: str, factor: float) -> None:
+    text = HEAD + TWO.replace('"tick"', f'"{unit}"')
+    (sample,) = of_two(text, measures="wheel_speeds").on_frame(
+        frame(528, struct.pack("<ii", 36, -18))
+    )
+    assert isinstance(sample, WheelSpeeds)
+    assert (sample.left_mps, sample.right_mps) == pytest.approx((36 * factor, -18 * factor))
+
+
+def test_a_unit_that_is_not_known_must_be_given() -> None:
+    with pytest.raises(ConfigError, match=r'gives it in "tick"; give wheels\.unit'):
+        of_two(HEAD + TWO, measures="wheel_speeds")
+
+
+def test_a_turn_in_degrees_to_the_right_is_a_turn() -> None:
+    text = HEAD + TWO.replace('"tick"', '"km/h"', 1).replace('"tick"', '"deg/s"')
+    keys = {"measures": "twist", "linear": "Wheels.L", "angular": "Wheels.R"}
+    driver = of_two(text, **keys, reverse_angular=True)
+    (sample,) = driver.on_frame(frame(528, struct.pack("<ii", 36, 90)))
+    assert isinstance(sample, Twist)
+    assert (sample.linear_mps, sample.angular_radps) == pytest.approx((10.0, -1.5707963))
+
+
+@pytest.mark.parametrize(
+    ("line", "marked"),
+    [("0|16@1+ (1,0) [0|64255]", True), ("0|16@1+ (1,0) [0|0]", False),
+     ("0|16@1+ (1,0) [0|65535]", False)],
+)  # fmt: skip
+def test_a_value_that_the_file_excludes_by_its_range_is_none(line: str, marked: bool) -> None:
+    text = HEAD + TWO.replace("0|32@1- (1,0) [0|0]", line, 1)
+    driver = of_two(text, counter_bits=16)
+    assert len(driver.on_frame(frame(528, struct.pack("<H2xi", 0xFFFF, 1)))) == (not marked)
+    assert driver.tally.refused[WheelRefusal.NOT_AVAILABLE] == marked
+
+
+def test_a_value_that_the_file_names_so_is_none() -> None:
+    driver = of_two(HEAD + TWO + 'VAL_ 528 L -1 "SNA" 0 "Zero" ;\n')
+    assert len(driver.on_frame(frame(528, struct.pack("<ii", 0, 0)))) == 1
+    assert driver.on_frame(frame(528, struct.pack("<ii", -1, 0))) == []
+    assert driver.tally.refused == {WheelRefusal.NOT_AVAILABLE: 1}
+
+
+def test_a_side_that_is_silent_is_named() -> None:
+    driver = counts(left="LeftWheel.Count", right="RightWheel.Count", counter_bits=32)
+    assert driver.why_no_sample(T0) is None
+    driver.on_frame(frame(0x102, bytes(4)))
+    said = driver.why_no_sample(T0 + SECOND_US)
+    assert said is not None
+    assert "wheels.left comes but wheels.right (CAN id 0x103) does not" in said
 
 
 @settings(derandomize=True, max_examples=200, deadline=None)

@@ -138,3 +138,58 @@ def test_whole_and_byte_by_byte_and_random_reads_give_the_same(seed: int) -> Non
 def test_no_bytes_make_the_driver_raise(data: bytes) -> None:
     for stream in (data, b"C=" + data + b"\r"):
         roboteq().feed(stream, T0)
+
+
+# counters that are none
+
+
+def zeros(driver: RoboteqDriver, seconds: int, also: bytes = b"") -> bytes:
+    """All that is asked while every answer is 0:0 (and `also`)."""
+    asked = b""
+    for k in range(seconds * 25 + 1):
+        asked += driver.poll(T0 + k * 40 * MS)
+        driver.feed(b"C=0:0\r" + also, T0 + k * 40 * MS)
+    return asked
+
+
+def test_hall_sensors_that_count_beside_encoders_at_zero_are_named() -> None:
+    driver = roboteq()
+    asked = zeros(driver, 2)
+    assert asked.count(b"?CB\r") == 2
+    assert driver.fault() is None
+    driver.feed(b"CB=512:-77\r", T0 + 3 * SECOND_US)
+    said = driver.fault()
+    assert said is not None
+    assert 'wheels.counter = "hall"' in said
+
+
+@pytest.mark.parametrize(("seconds", "is_said"), [(9, False), (10, True)])
+def test_counters_that_stay_at_zero_are_worth_a_word(seconds: int, is_said: bool) -> None:
+    driver = roboteq()
+    zeros(driver, seconds)
+    assert (driver.fault() is not None) == is_said
+    driver.feed(b"C=1:0\r", T0 + 20 * SECOND_US)
+    assert driver.fault() is None
+
+
+def test_a_base_that_has_not_moved_by_any_counter_is_no_fault() -> None:
+    driver = roboteq()
+    zeros(driver, 20, also=b"CB=0:0\r")
+    assert driver.fault() is None
+
+
+def test_hall_counters_are_asked_for_and_read() -> None:
+    driver = RoboteqDriver(25.0, swap_channels=False, counter="hall")
+    assert driver.poll(T0) == b"^ECHOF 1\r?CB\r"
+    assert driver.feed(b"CB=5:-6\rC=1:1\r", T0) == [WheelCounts(T0, 5, -6, 32)]
+    assert driver.expects == "answers CB=<left>:<right> to the query ?CB"
+
+
+def test_a_refusal_has_its_own_sentence() -> None:
+    driver = roboteq()
+    assert driver.why_no_sample(T0) is None
+    driver.feed(b"-\r", T0)
+    said = driver.why_no_sample(T0 + SECOND_US)
+    assert said is not None
+    assert "refuses the query ?C" in said
+    assert driver.why_no_sample(T0 + 2 * SECOND_US) is None

@@ -43,7 +43,7 @@ def test_each_value_of_the_first_side_is_used_once() -> None:
 
 @pytest.mark.parametrize(("apart", "found"), [(MAX_APART_US, 1), (MAX_APART_US + 1, 0)])
 def test_values_too_far_apart_are_no_pair(apart: int, found: int) -> None:
-    pairs, unpaired = paired((SECOND, 0, 1.0), (FIRST, apart, 7.0), (SECOND, 3 * apart, 2.0))
+    pairs, unpaired = paired((SECOND, 0, 1.0), (FIRST, 1, 7.0), (SECOND, apart, 2.0))
     assert (len(pairs), unpaired) == (found, 1 - found)
 
 
@@ -63,6 +63,28 @@ def test_a_value_of_the_first_side_that_is_overtaken_counts_as_unpaired() -> Non
     assert (pairs, unpaired) == ([Pair(2, 6.0, 2.0)], 1)
 
 
+@pytest.mark.parametrize(
+    ("period_ms", "apart_ms"), [(50, 11), (100, 50), (20, 1), (200, 199), (7, 3), (500, 250)]
+)
+def test_sides_that_speak_in_turn_make_a_pair_each_period(period_ms: int, apart_ms: int) -> None:
+    values: list[tuple[Side, int, float]] = []
+    for k in range(20):
+        values.append((FIRST, k * period_ms * 1000, k * period_ms))
+        values.append((SECOND, (k * period_ms + apart_ms) * 1000, k * period_ms + apart_ms))
+    pairs, unpaired = paired(*values)
+    assert (len(pairs), unpaired) == (19, 1)
+    assert all(pair.second == pytest.approx(pair.first) for pair in pairs)
+
+
+def test_sides_of_different_rates_make_pairs_at_the_lower_one() -> None:
+    values = [(FIRST, k * 10_000, k * 10.0) for k in range(100)]
+    values += [(SECOND, k * 130_000 + 3_000, k * 130.0 + 3) for k in range(7)]
+    pairs, _ = paired(*sorted(values, key=lambda value: value[1]))
+    assert len(pairs) == 6
+    assert all(pair.second == pytest.approx(pair.first) for pair in pairs)
+
+
+@pytest.mark.row("D10")
 def test_counters_are_interpolated_over_their_wrap() -> None:
     between = wrapping(16)
     assert between(65_530, 10, 0.5) == 2

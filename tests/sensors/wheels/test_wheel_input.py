@@ -219,3 +219,72 @@ def test_counters_have_flat_names() -> None:
         "samples.ignored": 0,
         "gaps.START": 1,
     }
+
+
+# input that is no usable odometry
+
+
+def odrive_section() -> OdriveSection:
+    return OdriveSection(
+        source="odrive", track_m=0.5, left_axis=0, right_axis=1, wheel_radius_m=0.1
+    )
+
+
+def said_after_six_seconds(wheels: WheelInput, *frames: tuple[int, bytes]) -> str:
+    for k in range(60):
+        for can_id, data in frames:
+            wheels.on_frame(CanFrame(T0 + k * 100 * MS, can_id, False, data))
+    return wheels.advice(T0 + 6 * SECOND_US) or ""
+
+
+@pytest.mark.parametrize(
+    ("frames", "sentence"),
+    [
+        ([(0x001, bytes(8)), (0x021, bytes(8))], "heartbeats but no encoder estimates"),
+        ([(0x009, struct.pack("<ff", math.nan, 0.0))], "are no numbers"),
+        ([(0x009, bytes(4)), (0x029, bytes(4))], "the frames are too short"),
+        ([(0x7FF, bytes(8))], "is this the bus of the base?"),
+    ],
+)
+def test_what_an_odrive_sends_without_odometry_has_its_own_sentence(
+    frames: list[tuple[int, bytes]], sentence: str
+) -> None:
+    assert sentence in said_after_six_seconds(WheelInput(odrive_section()), *frames)
+
+
+def test_an_odrive_at_50_ms_with_axes_11_ms_apart_moves() -> None:
+    wheels = WheelInput(odrive_section())
+    motions: list[Motion] = []
+    for k in range(200):  # one turn a second, for ten seconds
+        for axis, apart in ((0, 0), (1, 11)):
+            ms = 50 * k + apart
+            data = struct.pack("<ff", ms / 1000, 1.0)
+            motions += wheels.on_frame(CanFrame(T0 + ms * MS, axis << 5 | 9, False, data))
+    path = sum(m.distance_m for m in motions)
+    assert path == pytest.approx(9.9 * 2 * math.pi * 0.1, abs=0.04)
+    assert abs(sum(m.turn_rad for m in motions)) < 1e-3
+    assert wheels.advice(T0 + 10 * SECOND_US) is None
+
+
+@pytest.mark.parametrize(
+    ("packet", "sentence"),
+    [
+        (kobuki_packet(kobuki_core(1, 2, 3))[:-1] + b"\x00", "wrong checksums"),
+        (kobuki_packet(b"\x01\x03abc"), "not of the form of the protocol"),
+        (b"something else\r\n", "is wheels.baud right?"),
+    ],
+)
+def test_what_a_kobuki_sends_without_odometry_has_its_own_sentence(
+    packet: bytes, sentence: str
+) -> None:
+    wheels = kobuki()
+    for k in range(300):
+        wheels.feed(packet, T0 + k * 20 * MS)
+    assert sentence in (wheels.advice(T0 + 6 * SECOND_US) or "")
+
+
+def test_a_roboteq_that_refuses_has_its_own_sentence() -> None:
+    wheels = roboteq()
+    for k in range(300):
+        wheels.feed(b"-\r", T0 + k * 20 * MS)
+    assert "refuses the query ?C" in (wheels.advice(T0 + 6 * SECOND_US) or "")

@@ -7,6 +7,7 @@ import pytest
 from drslamd.sensors.wheels.wrapping import wrapped_difference
 
 
+@pytest.mark.row("D10")
 @pytest.mark.parametrize("bits", [16, 32, 64])
 def test_a_difference_is_taken_from_the_half_range_around_zero(bits: int) -> None:
     full, half = 2**bits, 2 ** (bits - 1)
