@@ -8,7 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from drslamd.config import Config, ConfigError, DbcSection, GossipSection, SerialWheelSection
+from drslamd.config import Config, ConfigError, GossipSection
+from drslamd.config_wheels import DbcSection, SerialWheelSection
 from drslamd.host.owners import denied
 from drslamd.host.plain_file import read_plain
 from drslamd.io.can_bus import CanBus, require_python_can

@@ -10,7 +10,8 @@ from deploy_helpers import EXAMPLE
 from pydantic import BaseModel
 
 from drslamd import config
-from drslamd.config import SOURCES, CanWheelSection, Config, ConfigError, parse
+from drslamd.config import Config, ConfigError, parse
+from drslamd.config_wheels import SOURCES, CanWheelSection
 
 WRONG = [
     *("3", "3.5", "nan", "-1e300", "true", '"magic"', "''", "[1]", "[[1]]", "{x = 1}"),

@@ -16,7 +16,7 @@ GENERATED = PACKAGE / "lcmtypes"
 LAB = REPOSITORY / "tools" / "lab"
 
 RINGS = {
-    "vocabulary": ["conventions", "events", "config_faults", "config"],
+    "vocabulary": ["conventions", "events", "config_faults", "config_wheels", "config"],
     "pure": [
         "sensors",
         "slam",
@@ -36,8 +36,6 @@ RINGS = {
         "robot",
         "reports",
         "report",
-        "status_text",
-        "status_table",
     ],
     "shell": ["host", "io", "export"],
     "entry": ["parts", "machine", "doctor", "daemon", "view", "feed", "cli", "__main__"],
@@ -75,8 +73,8 @@ SLAM_ORDER = [
 
 OPTIMIZER_ORDER = [
     "bias_prior",
-    "sensor_priors",
     "mounting_prior",
+    "sensor_priors",
     "problem",
     "complex_factors",
     "vertex_cover",

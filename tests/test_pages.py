@@ -17,7 +17,8 @@ from places import REPOSITORY
 
 from drslamd import cli
 from drslamd.cli.check import toml_lines
-from drslamd.config import SOURCES, Config, ConfigError, parse
+from drslamd.config import Config, ConfigError, parse
+from drslamd.config_wheels import SOURCES
 
 PAGES = pages()
 

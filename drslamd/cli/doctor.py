@@ -88,7 +88,7 @@ def _print(as_json: bool, found: list[Finding], no_answer: str, code: int) -> No
 
 def _lines(found: list[Finding], no_answer: str) -> list[str]:
     from drslamd.doctor.rounds import names
-    from drslamd.status_table import span
+    from drslamd.reports.status_table import span
 
     out = []
     for finding in found:

@@ -12,8 +12,9 @@ from pydantic import ValidationError
 
 from drslamd.cli.exit_codes import CANNOT_CREATE, OK, UNAVAILABLE
 from drslamd.cli.parser import Verbs, load, verb
-from drslamd.config import ConfigError, GossipSection, Section
+from drslamd.config import ConfigError, GossipSection
 from drslamd.config_faults import sentences
+from drslamd.config_wheels import Section
 
 SAY_EVERY_S = 1.0
 

@@ -38,7 +38,7 @@ def _status(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(answer, indent=2))
     else:
-        from drslamd.status_text import lines
+        from drslamd.reports.status_text import lines
 
         print("\n".join(lines(answer)))
     return OK

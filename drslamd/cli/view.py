@@ -14,8 +14,9 @@ from pydantic import ValidationError
 
 from drslamd.cli.exit_codes import OK, UNAVAILABLE, USAGE
 from drslamd.cli.parser import Verbs, load, verb
-from drslamd.config import GossipSection, Section
+from drslamd.config import GossipSection
 from drslamd.config_faults import sentences
+from drslamd.config_wheels import Section
 
 if TYPE_CHECKING:
     from drslamd.view.live_map import Listening

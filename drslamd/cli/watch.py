@@ -13,7 +13,7 @@ from typing import Any
 
 from drslamd.cli.ask import NoAnswer, answer
 from drslamd.cli.exit_codes import OK
-from drslamd.status_table import fitted, table
+from drslamd.reports.status_table import fitted, table
 
 PERIOD_S = 1.0
 ENTER = "\x1b[?1049h\x1b[?25l"

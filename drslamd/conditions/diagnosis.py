@@ -7,7 +7,8 @@ from typing import Protocol
 
 from drslamd.conditions import contradictions
 from drslamd.conditions.ports import port_cause, port_remedy
-from drslamd.config import Config, SerialWheelSection
+from drslamd.config import Config
+from drslamd.config_wheels import SerialWheelSection
 from drslamd.conventions import SECOND_US
 from drslamd.events import NetworkState, Port, PortCondition, PortState, Slept
 from drslamd.gossip.outbox import Outbox

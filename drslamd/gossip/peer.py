@@ -14,6 +14,7 @@ from drslamd.gossip.message_types import (
     MAX_HEARD,
     NOTHING_WANTED,
     UNANSWERED,
+    UNKNOWN_CLOCK,
     Heard,
     OdometryBatch,
     Pose,
@@ -40,6 +41,8 @@ LOSS_STATUSES = 30
 """Heartbeats over which the loss is counted: the last half minute or so."""
 LATEST_STATUSES = 10
 """Of which it is taken how much is usually lost."""
+NOT_KNOWN = -(1 << 40)
+"""As the newest entry of a log: no entry lies near it."""
 REMEMBERED_US = 40 * SECOND_US
 """How long it counts that a peer named a robot, when it hears too many for one status: 254 take ten
 heartbeats, which come every three seconds at the slowest; a few may be lost. In such a crowd it
@@ -106,6 +109,17 @@ class Peer:
             1 - (b.came - a.came) / max(1, b.sent - a.sent) for a, b in pairwise(latest)
         )
         return max(0.0, losses[len(losses) // 2]) if losses else 0.0
+
+    def newest_of(self, origin: Chain) -> int:
+        """How far its latest status knows a log; far below any entry where it does not."""
+        logs = self.status.logs if self.status else ()
+        return max((log.newest for log in logs if (log.id, log.epoch) == origin), default=NOT_KNOWN)
+
+    def compare_radio_clock(self, own_minus_system: int, utime: int) -> None:
+        """Use LinkTrack's system_time, where both sides know their clock against it."""
+        theirs = self.status.uwb_clock_us if self.status else UNKNOWN_CLOCK
+        if theirs != UNKNOWN_CLOCK and self.is_alive(utime):
+            self.clock.radio(own_minus_system, theirs, utime)
 
     def answered(self, counter: int) -> None:
         """It named this start of ours in the message with this counter."""

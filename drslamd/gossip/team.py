@@ -16,7 +16,7 @@ from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.membership.acquaintance import Acquaintance, vouched
 from drslamd.gossip.membership.refusals import Refusals
 from drslamd.gossip.message_types import UNANSWERED, Received
-from drslamd.gossip.messages import UNKNOWN_CLOCK, Heard, Message, OdometryBatch, Pose, Status
+from drslamd.gossip.messages import Heard, Message, OdometryBatch, Pose, Status
 from drslamd.gossip.peer import Peer, carrier, shared_module
 from drslamd.gossip.replicated_log import AHEAD
 from drslamd.gossip.seal import Header, Seal, SealFault
@@ -251,11 +251,8 @@ class Team:
 
     def _is_near(self, origin: Chain, seq: int) -> bool:
         """Is it near the end of its log as we, or the latest status of any peer, know it?"""
-        statuses = (peer.status for peer in self.peers.values() if peer.status is not None)
         return self.logs.is_near(origin, seq) or any(
-            (log.id, log.epoch) == origin and seq < log.newest + AHEAD
-            for status in statuses
-            for log in status.logs
+            seq < peer.newest_of(origin) + AHEAD for peer in self.peers.values()
         )
 
     def _refuse(self, fault: SealFault | StartFault, event: Datagram | ChannelMessage) -> None:
@@ -293,8 +290,7 @@ class Team:
         if not peer.take_status(status, counter, self.own, utime):
             return
         if not peer.waits_for(self.own):
-            losses = [p.usual_loss for p in self.living(utime).values()]
-            self.logs.repeats.pace.reckon(losses)
+            self.logs.repeats.pace.reckon([p.usual_loss for p in self.living(utime).values()])
             self.logs.on_states(status.logs, peer.chain.robot, utime)
             self._chapters.on_states(self.own, status.logs)
         self.starts.on_status(peer.chain.robot, status, self._next_seq, utime)
@@ -311,30 +307,20 @@ class Team:
 
     def living(self, utime: int) -> dict[int, Peer]:
         """Peers that are alive and hear us."""
-        return {
-            robot: peer
-            for robot, peer in self.peers.items()
-            if peer.is_alive(utime) and peer.hears(self.own)
-        }
+        return {r: p for r, p in self.peers.items() if p.is_alive(utime) and p.hears(self.own)}
 
     def present(self, utime: int) -> set[int]:
         """Robots that live: those we talk to, and those that they vouch for."""
         direct = self.living(utime)
-        vouched = {
-            chain.robot
-            for peer in direct.values()
-            for chain in peer.audible
-            if chain.epoch == self.logs.epoch(chain.robot)
-        }
-        return set(direct) | vouched | {self.own.robot}
+        audible = {chain for peer in direct.values() for chain in peer.audible}
+        vouched_for = {c.robot for c in audible if c.epoch == self.logs.epoch(c.robot)}
+        return set(direct) | vouched_for | {self.own.robot}
 
     def compare_radio_clocks(self, own_minus_system: int | None, utime: int) -> None:
         """Use LinkTrack's system_time, where both sides know their clock against it."""
-        for peer in self.peers.values():
-            theirs = peer.status.uwb_clock_us if peer.status else UNKNOWN_CLOCK
-            known = own_minus_system is not None and theirs != UNKNOWN_CLOCK
-            if own_minus_system is not None and known and peer.is_alive(utime):
-                peer.clock.radio(own_minus_system, theirs, utime)
+        if own_minus_system is not None:
+            for peer in self.peers.values():
+                peer.compare_radio_clock(own_minus_system, utime)
 
     def begin_clocks_again(self, utime: int) -> None:
         """Our own clock may have jumped."""

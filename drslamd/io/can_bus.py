@@ -15,7 +15,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from drslamd.config import CanSection, ConfigError
+from drslamd.config import ConfigError
+from drslamd.config_wheels import CanSection
 from drslamd.events import CanFrame, Event, PortCondition, PortState
 from drslamd.io.backoff import Backoff
 from drslamd.io.clock import Clock

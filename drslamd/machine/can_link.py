@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from drslamd.conditions.ports import port_cause
-from drslamd.config import CanWheelSection, Config
+from drslamd.config import Config
+from drslamd.config_wheels import CanWheelSection
 from drslamd.events import PortCondition
 from drslamd.host.interfaces import CAN_TYPE, interfaces
 from drslamd.host.kernel import Host

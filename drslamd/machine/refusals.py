@@ -8,7 +8,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 
-from drslamd.config import CanWheelSection, Config, ConfigError, DbcSection
+from drslamd.config import Config, ConfigError
+from drslamd.config_wheels import CanWheelSection, DbcSection
 from drslamd.io.can_bus import require_python_can
 from drslamd.io.claim import holder, is_held
 from drslamd.io.liblcm import require_lcm

@@ -11,7 +11,8 @@ from pathlib import Path
 import serial
 
 from drslamd.conditions.ports import port_cause, port_key, port_remedy
-from drslamd.config import Config, SerialWheelSection
+from drslamd.config import Config
+from drslamd.config_wheels import SerialWheelSection
 from drslamd.events import Port, PortCondition
 from drslamd.host.kernel import Host
 from drslamd.host.owners import barrier, group_name, permissions, user_name

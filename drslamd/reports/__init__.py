@@ -1,1 +1,1 @@
-"""What a robot knows of clocks and graph, as plain dictionaries for whoever asks."""
+"""What a robot knows, as plain dictionaries for whoever asks, and as text and tables of them."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Union
 
-from drslamd.config import SOURCES, SerialWheelSection
+from drslamd.config_wheels import SOURCES, SerialWheelSection
 from drslamd.conventions import MAX_ROBOT_ID
 from drslamd.sensors.recognition import Device, Recognised
 

@@ -26,7 +26,7 @@ from collections.abc import Sequence
 from statistics import median
 from typing import Final, NamedTuple, Union
 
-from drslamd.config import WheelSection
+from drslamd.config_wheels import WheelSection
 from drslamd.sensors.samples import RangeSample
 from drslamd.setup.way import Way
 from drslamd.setup.wheel_scales import (

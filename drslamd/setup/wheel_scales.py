@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from drslamd.config import (
+from drslamd.config_wheels import (
     AgilexSection,
     AsciiSection,
     DbcSection,

@@ -4,14 +4,8 @@ from __future__ import annotations
 
 import math
 
-from drslamd.config import (
-    AgilexSection,
-    Config,
-    DbcSection,
-    OdometrySection,
-    RelativePoseSection,
-    WheelSection,
-)
+from drslamd.config import Config, OdometrySection, RelativePoseSection
+from drslamd.config_wheels import AgilexSection, DbcSection, WheelSection
 from drslamd.conventions import SECOND_US, Chain
 from drslamd.slam.closure_method import ClosureMethod, drslamd_method, paper_method
 from drslamd.slam.odometry.noise import OdometryNoise

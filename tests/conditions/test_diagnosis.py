@@ -32,7 +32,17 @@ def test_everything_is_looked_after_from_the_sensors_to_the_budget() -> None:
     keys = [key for key, _ in conditions(scene.robot, scene.utime)]
     team = [key for key in keys if key.startswith("team.")]
     of_poses = ["pose", "doubt", "partners", "mounting"]
-    assert keys == ["uwb", "wheels", "network", *team, *of_poses, "load", "budget", "state"]
+    assert keys == [
+        "uwb",
+        "wheels",
+        "network",
+        "sleep",
+        *team,
+        *of_poses,
+        "load",
+        "budget",
+        "state",
+    ]
     assert len(team) >= 4
 
 

@@ -12,15 +12,8 @@ from deploy_helpers import EXAMPLE
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from drslamd.config import (
-    SOURCES,
-    CanWheelSection,
-    Config,
-    SerialWheelSection,
-    TeamSection,
-    WheelSection,
-    parse,
-)
+from drslamd.config import Config, TeamSection, parse
+from drslamd.config_wheels import SOURCES, CanWheelSection, SerialWheelSection, WheelSection
 
 SHARED_BY_BASES = {"max_speed_mps", "reverse_left", "reverse_right"}
 """Shown once for all bases, and so is what is below `can.`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from drslamd.config import SOURCES, WheelSection
+from drslamd.config_wheels import SOURCES, WheelSection
 
 SECTIONS: dict[str, dict[str, Any]] = {
     "kobuki": {"port": "/p"},

@@ -13,7 +13,7 @@ import pytest
 
 can = pytest.importorskip("can", reason="python-can is not installed")
 
-from drslamd.config import AgilexSection, CanSection, OdriveSection  # noqa: E402
+from drslamd.config_wheels import AgilexSection, CanSection, OdriveSection  # noqa: E402
 from drslamd.events import CanFrame, Event, PortCondition, PortState  # noqa: E402
 from drslamd.io.can_bus import MOST_DAMAGED, CanBus, opened  # noqa: E402
 from drslamd.io.clock import MonotonicClock  # noqa: E402

@@ -122,7 +122,7 @@ def test_after_a_stall_nothing_is_said_in_a_burst_and_odometry_goes_on(seconds: 
         else:
             feed(one, port, data)
 
-    simulator.feed = late  # type: ignore[method-assign]
+    simulator.feed = late  # type: ignore[method-assign, assignment]
     tick, member.tick_at = member.tick_at, -1
     team.run(12.0 + seconds)
     simulator.feed = feed  # type: ignore[method-assign]

@@ -16,7 +16,8 @@ from frames import SECOND_US, Peer, ascii_line, kobuki_core, kobuki_packet, node
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drslamd.config import SOURCES, ConfigError, WheelSection, parse
+from drslamd.config import ConfigError, parse
+from drslamd.config_wheels import SOURCES, WheelSection
 from drslamd.events import CanFrame
 from drslamd.sensors.linktrack import linktrack_input
 from drslamd.sensors.linktrack.codec import Frame, decode

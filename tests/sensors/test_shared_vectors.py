@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from frames import SECOND_US, cut
 
-from drslamd.config import DbcSection
+from drslamd.config_wheels import DbcSection
 from drslamd.events import CanFrame
 from drslamd.sensors.frame_scanner import FrameScanner
 from drslamd.sensors.linktrack.codec import LINKTRACK, Frame, Refusal, decode

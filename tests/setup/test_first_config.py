@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from drslamd.config import SOURCES, parse
+from drslamd.config import parse
+from drslamd.config_wheels import SOURCES
 from drslamd.setup.choices import UwbChoice, WheelsChoice
 from drslamd.setup.first_config import FirstConfig, toml
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from wheel_sections import SPEEDS, TWIST, wheels
 
-from drslamd.config import WheelSection
+from drslamd.config_wheels import WheelSection
 from drslamd.sensors.samples import RangeSample
 from drslamd.setup.taped_steps import (
     LEAST_RANGES,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from wheel_sections import COUNTS, SPEEDS, TWIST, wheels
 
-from drslamd.config import WheelSection
+from drslamd.config_wheels import WheelSection
 from drslamd.setup.wheel_scales import (
     as_configured,
     has_two_sides,

@@ -10,7 +10,8 @@ from typing import Any
 
 from drslamd.cli.exit_codes import CANNOT_CREATE, OK, USAGE
 from drslamd.cli.parser import Verbs, verb
-from drslamd.config import SOURCES, ConfigError, parse
+from drslamd.config import ConfigError, parse
+from drslamd.config_wheels import SOURCES
 
 FOLDER = Path("/etc/drslamd")
 EXAMPLES = """\

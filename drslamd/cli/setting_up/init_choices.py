@@ -14,8 +14,9 @@ import tomli
 from pydantic import ValidationError
 
 from drslamd.cli.setting_up.asking import ask, one_of, show
-from drslamd.config import SOURCES, ConfigError
+from drslamd.config import ConfigError
 from drslamd.config_faults import sentences
+from drslamd.config_wheels import SOURCES
 from drslamd.conventions import MAX_ROBOT_ID
 from drslamd.host.interfaces import CAN_TYPE, interfaces
 from drslamd.io.ports.found_ports import devices_at, found_ports

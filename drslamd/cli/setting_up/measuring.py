@@ -12,7 +12,8 @@ from contextlib import asynccontextmanager
 from enum import Enum
 from typing import Any, NamedTuple, Union
 
-from drslamd.config import Config, SerialWheelSection
+from drslamd.config import Config
+from drslamd.config_wheels import SerialWheelSection
 from drslamd.conventions import SECOND_US
 from drslamd.events import CanFrame, Event, PortCondition, PortState, SerialData
 from drslamd.io.clock import Clock, MonotonicClock
@@ -165,7 +166,7 @@ def _port_fault(heard: list[PortState], config: Config) -> NotMeasured | None:
 
 def _wheel_port(config: Config) -> str:
     wheels = config.wheels
-    return wheels.port if isinstance(wheels, SerialWheelSection) else wheels.can.channel
+    return wheels.port if isinstance(wheels, SerialWheelSection) else str(wheels.can.channel)
 
 
 def _silence(wheels: WheelInput, begin: int, now: int) -> NotMeasured | None:

@@ -8,7 +8,8 @@ import subprocess
 from collections.abc import Iterator
 from typing import Any
 
-from drslamd.config import CanWheelSection, Config
+from drslamd.config import Config
+from drslamd.config_wheels import CanWheelSection
 from drslamd.host.kernel import Host
 from drslamd.machine.finding import Finding, Severity
 
@@ -28,7 +29,7 @@ def can_state(config: Config, host: Host) -> Iterator[Finding]:
     wheels = config.wheels
     if not isinstance(wheels, CanWheelSection) or wheels.can.interface != "socketcan":
         return
-    name = wheels.can.channel
+    name = str(wheels.can.channel)
     state = _details(name).get("state", "")
     if state in REMEDIES:
         severity = Severity.ERROR if state in ("BUS-OFF", "STOPPED") else Severity.WARNING

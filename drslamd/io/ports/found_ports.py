@@ -6,7 +6,7 @@ import asyncio
 import os
 from collections.abc import Callable, Sequence
 
-from drslamd.config import RoboteqSection
+from drslamd.config_wheels import RoboteqSection
 from drslamd.io.ports.listening import LISTEN_S, Listened, answers_as_roboteq, listen
 from drslamd.io.ports.serial_devices import SerialDevice, described
 from drslamd.sensors.recognition import LINKTRACK_BAUDS

@@ -17,7 +17,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from drslamd.config import ConfigError, DbcSection
+from drslamd.config import ConfigError
+from drslamd.config_wheels import DbcSection
 from drslamd.conventions import SECOND_US
 from drslamd.events import CanFrame
 from drslamd.sensors.samples import Twist, WheelCounts, WheelSample, WheelSpeeds, WheelTurns

@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
-from drslamd.config import (
+from drslamd.config_wheels import (
     AgilexSection,
     AsciiSection,
     DbcSection,

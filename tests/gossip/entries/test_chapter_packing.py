@@ -143,7 +143,7 @@ def test_damaged_bytes_give_a_chapter_or_a_value_error_and_nothing_else() -> Non
 def test_a_minute_of_driving_has_a_sixth_of_the_bytes_of_its_entries() -> None:
     """As 60 entries: 70 bytes of each, and 54 for each of two ranges."""
     chance = random.Random(2)
-    frames, ranges = [], list[Placed[RangeMeasurement]]()
+    frames, ranges = list[Keyframe](), list[Placed[RangeMeasurement]]()
     for k in range(60):
         step = (round(chance.gauss(4_000, 300)), round(chance.gauss(0, 300)), 50)
         last = frames[-1] if frames else Keyframe(0, 0, 0, 0, 0)

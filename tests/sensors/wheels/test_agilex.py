@@ -10,7 +10,7 @@ from frames import SECOND_US
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drslamd.config import AgilexSection
+from drslamd.config_wheels import AgilexSection
 from drslamd.events import CanFrame
 from drslamd.sensors.samples import Twist, WheelCounts
 from drslamd.sensors.wheels.agilex import AgilexDriver, Steering

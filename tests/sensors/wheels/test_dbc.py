@@ -11,7 +11,8 @@ from frames import SECOND_US, i24
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drslamd.config import ConfigError, DbcSection
+from drslamd.config import ConfigError
+from drslamd.config_wheels import DbcSection
 from drslamd.events import CanFrame
 from drslamd.sensors.samples import Twist, WheelCounts, WheelSample, WheelSpeeds, WheelTurns
 from drslamd.sensors.wheels.wheel_driver import WheelRefusal

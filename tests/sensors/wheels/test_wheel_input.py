@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from frames import SECOND_US, ascii_line, kobuki_core, kobuki_packet
 
-from drslamd.config import (
+from drslamd.config_wheels import (
     SOURCES,
     AgilexSection,
     AsciiSection,

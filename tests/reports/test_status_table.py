@@ -8,8 +8,8 @@ from made_up_answers import answer
 
 from drslamd import report
 from drslamd.config import parse
+from drslamd.reports.status_table import columns, fitted, span, table
 from drslamd.robot import Robot
-from drslamd.status_table import columns, fitted, span, table
 
 CONFIG = """
 robot.id = 3

@@ -9,8 +9,8 @@ from made_up_answers import answer
 
 from drslamd import report
 from drslamd.config import parse
+from drslamd.reports.status_text import lines
 from drslamd.robot import Robot
-from drslamd.status_text import lines
 
 CONFIG = """
 robot.id = 3

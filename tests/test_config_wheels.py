@@ -1,0 +1,48 @@
+"""Which base is which section of the configuration, and what one that is read by DBC must name."""
+
+from __future__ import annotations
+
+import pytest
+from pydantic import TypeAdapter, ValidationError
+
+from drslamd.config_wheels import SOURCES, DbcSection, Wheels
+
+WHEELS = TypeAdapter(Wheels)
+DBC = {"source": "dbc", "dbc_file": "base.dbc", "track_m": 0.5}
+COUNTS = {**DBC, "measures": "counts", "left": "A.L", "right": "A.R", "counts_per_metre": 100.0}
+TWIST = {**DBC, "measures": "twist", "linear": "A.V", "angular": "A.W"}
+
+
+def fault(section: dict[str, object]) -> str:
+    with pytest.raises(ValidationError) as caught:
+        WHEELS.validate_python(section)
+    return str(caught.value)
+
+
+def test_the_source_tells_the_base() -> None:
+    for source, kind in SOURCES.items():
+        assert str(kind.model_fields["source"].annotation) == f"typing.Literal['{source}']"
+    assert isinstance(WHEELS.validate_python(COUNTS), DbcSection)
+    assert "abacus" in fault({**COUNTS, "source": "abacus"})
+
+
+@pytest.mark.parametrize("key", ["left", "right"])
+def test_counts_need_a_signal_of_each_side(key: str) -> None:
+    assert f'needs {key} as "Message.Signal"' in fault({**COUNTS, key: ""})
+    assert f'needs {key} as "Message.Signal"' in fault({**COUNTS, key: "Signal"})
+
+
+def test_counts_need_their_number_per_metre_and_speeds_do_not() -> None:
+    named = {key: value for key, value in COUNTS.items() if key != "counts_per_metre"}
+    assert "needs counts_per_metre" in fault(named)
+    speeds = WHEELS.validate_python({**named, "measures": "wheel_speeds"})
+    assert isinstance(speeds, DbcSection)
+    assert speeds.counts_per_metre is None
+
+
+def test_only_a_twist_has_a_turn_to_reverse_and_only_wheels_have_sides() -> None:
+    twist = WHEELS.validate_python({**TWIST, "reverse_angular": True})
+    assert isinstance(twist, DbcSection)
+    assert twist.reverse_angular
+    assert "has no sides to reverse" in fault({**TWIST, "reverse_left": True})
+    assert "reverse_angular are for" in fault({**COUNTS, "reverse_angular": True})
