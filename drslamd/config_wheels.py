@@ -10,6 +10,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_valida
 Scale = Annotated[float, Field(ge=1e-9, le=1e9)]
 """Between two units; beyond it products with what a sensor says could overflow."""
 Baud = Annotated[int, Field(ge=1200, le=4_000_000)]
+MAX_CHANNEL = 255
+"""No adapter has more."""
 MAX_OPTIONS = 16
 """No python-can interface has more."""
 
@@ -28,13 +30,23 @@ class Section(BaseModel):
         return value
 
 
+def _text_or_number(given: object) -> object:
+    """Some interfaces name their channels, some number them."""
+    if isinstance(given, int) and not isinstance(given, bool):
+        fits = 0 <= given <= MAX_CHANNEL
+    else:
+        fits = isinstance(given, str)
+    if not fits:
+        raise ValueError(f"text in quotes, or a whole number from 0 to {MAX_CHANNEL}")
+    return given
+
+
 def _named_values(given: object) -> object:
     """Of an adapter; what it does with them is its own affair."""
-    fits = isinstance(given, dict) and len(given) <= MAX_OPTIONS
-    if not (fits and all(map(_is_value, given.values()))):
-        raise ValueError(
-            f"a table of at most {MAX_OPTIONS} names with a number, text or a bool each"
-        )
+    if not isinstance(given, dict) or len(given) > MAX_OPTIONS:
+        raise ValueError(f"at most {MAX_OPTIONS} names, each with a number, text or true or false")
+    if not all(map(_is_value, given.values())):
+        raise ValueError("each name takes a finite number, printable text, or true or false")
     return given
 
 
@@ -47,7 +59,7 @@ def _is_value(one: object) -> bool:
 class CanSection(Section):
     interface: str = "socketcan"
     """A python-can interface name; `socketcan` on robots."""
-    channel: Union[str, int] = "can0"
+    channel: Annotated[Union[str, int], BeforeValidator(_text_or_number)] = "can0"
     bitrate: Annotated[int, Field(ge=10_000, le=1_000_000)] | None = None
     """Only for adapters that python-can sets up itself; SocketCAN links come up configured."""
     options: Annotated[dict[str, Union[bool, int, float, str]], BeforeValidator(_named_values)] = {}
@@ -149,8 +161,8 @@ class DbcSection(CanWheelSection):
             raise ValueError('measures = "counts" needs counts_per_metre')
         if self.measures == "twist" and (self.reverse_left or self.reverse_right):
             raise ValueError('measures = "twist" has no sides to reverse')
-        if self.measures != "twist" and (self.reverse_angular or self.angular_unit is not None):
-            raise ValueError('angular_unit and reverse_angular are for measures = "twist"')
+        if self.measures != "twist" and self.reverse_angular:
+            raise ValueError('reverse_angular is for measures = "twist"')
         return self
 
 

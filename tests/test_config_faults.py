@@ -99,7 +99,7 @@ def test_a_value_in_the_place_of_a_section_is_told_what_stands_there(
 def test_what_belongs_to_a_section_inside_a_section_is_told_as_well() -> None:
     (sentence,) = faults(file_with("wheels", 'source = "agilex"\ntrack_m = 0.5\ncan = "can0"'))
     assert sentence == (
-        "wheels.can = 'can0': a section, [wheels.can], with interface, channel, bitrate"
+        "wheels.can = 'can0': a section, [wheels.can], with interface, channel, bitrate, options"
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from drslamd.config_wheels import SOURCES, DbcSection, Wheels
+from drslamd.config_wheels import MAX_OPTIONS, SOURCES, DbcSection, Wheels
 
 WHEELS = TypeAdapter(Wheels)
 DBC = {"source": "dbc", "dbc_file": "base.dbc", "track_m": 0.5}
@@ -40,9 +40,21 @@ def test_counts_need_their_number_per_metre_and_speeds_do_not() -> None:
     assert speeds.counts_per_metre is None
 
 
+def test_an_adapter_takes_a_few_named_values_and_nothing_else() -> None:
+    def can(options: object) -> dict[str, object]:
+        return {**COUNTS, "can": {"options": options}}
+
+    assert WHEELS.validate_python(can({"index": 1, "fd": False, "serial": "A1"}))
+    assert WHEELS.validate_python(can({f"key{k}": k for k in range(MAX_OPTIONS)}))
+    for many in ({f"key{k}": k for k in range(MAX_OPTIONS + 1)}, 3, [1]):
+        assert "at most 16 names" in fault(can(many))
+    for value in ([1], float("inf"), "\x00"):
+        assert "each name takes a finite number" in fault(can({"x": value}))
+
+
 def test_only_a_twist_has_a_turn_to_reverse_and_only_wheels_have_sides() -> None:
     twist = WHEELS.validate_python({**TWIST, "reverse_angular": True})
     assert isinstance(twist, DbcSection)
     assert twist.reverse_angular
     assert "has no sides to reverse" in fault({**TWIST, "reverse_left": True})
-    assert "reverse_angular are for" in fault({**COUNTS, "reverse_angular": True})
+    assert "reverse_angular is for" in fault({**COUNTS, "reverse_angular": True})

@@ -33,7 +33,7 @@ def add(verbs: Verbs) -> None:
     feed = configured_verb(
         verbs, "feed", _feed, "tell pose and peers to other programs, until Ctrl-C", EXAMPLES
     )
-    feed.add_argument("kind", choices=KINDS, help="whose words")
+    feed.add_argument("kind", choices=tuple(KINDS), help="whose words")
     feed.add_argument(
         "--to", metavar="HOST:PORT", default="127.0.0.1:14550", help="mavlink: where to (UDP)"
     )

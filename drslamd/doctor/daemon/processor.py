@@ -15,6 +15,7 @@ LATE_MS = 100.0
 
 def processor(patient: Patient) -> Iterator[Finding]:
     yield from patient.told("processor", "load")
+    yield from patient.told("processor", "sleep")
     cpu = patient.rate("cpu_s")
     if cpu > MOST_CPU:
         yield warning(

@@ -10,8 +10,6 @@ from lab.matrix import page
 from lab.matrix.rows import ROWS
 from lab.soak import results
 
-KNOWN_MISSING: set[str] = {"O10", "O13"}
-"""Rows whose tests are still to come."""
 COUNTS = {"D": 11, "M": 10, "N": 12, "S": 12, "T": 5, "O": 14}
 
 
@@ -25,8 +23,7 @@ def test_no_test_names_a_row_that_is_none() -> None:
 
 def test_every_row_has_a_test() -> None:
     absent = set(page.missing(page.named_rows()))
-    assert absent - KNOWN_MISSING == set()
-    assert KNOWN_MISSING - absent == set(), "these have one by now: take them out"
+    assert absent == set()
 
 
 def test_the_page_is_what_the_markers_say() -> None:

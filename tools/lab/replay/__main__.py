@@ -12,8 +12,9 @@ import sys
 import time
 from pathlib import Path
 
-from drslamd import report, status_text
+from drslamd import report
 from drslamd.config import ConfigError
+from drslamd.reports import status_text
 from lab.progress import Progress
 from lab.recordings.recording import BadRecording
 from lab.replay.exact import Replayed, Replayer
