@@ -253,7 +253,9 @@ class WheelInput:
         if self.driver.tally.refused[WheelRefusal.NOT_FINITE] > self._not_finite_before:
             return _NOT_FINITE
         seconds = (utime - self._trying_since) // SECOND_US
-        if damaged := self._damaged():
-            return f"input, but no usable {self.driver.expects} for {seconds} s: {damaged}"
         remedy = "is wheels.baud right?" if self._serial else "is this the bus of the base?"
+        if damaged := self._damaged():
+            # (noise at a wrong rate has frames too, now and then)
+            cause = f"{damaged.rstrip('?')}, {remedy}" if self._serial else damaged
+            return f"input, but no usable {self.driver.expects} for {seconds} s: {cause}"
         return f"input, but no {self.driver.expects} for {seconds} s: {remedy}"

@@ -43,7 +43,7 @@ class EndCalibration(NamedTuple):
 
     Attributes:
         scale: of its odometry, a fraction; turn: by which fraction turns are longer; yaw: which
-            turn is not there, rad/m.
+            turn is not there, rad/m, where it is unusual.
         antenna: (2,) of its antenna beside its place, m.
     """
 
@@ -54,12 +54,13 @@ class EndCalibration(NamedTuple):
 
     @staticmethod
     def of(estimate: TeamEstimate, robot: int) -> EndCalibration:
+        yaw = estimate.yaw.get(robot, Learned()).value
         x, y = estimate.antenna_m.get(robot, (Learned(), Learned()))
         return EndCalibration(
             estimate.scale.get(robot, Learned()),
             estimate.turn.get(robot, Learned()).value,
             (x.value, y.value),
-            estimate.yaw.get(robot, Learned()).value,
+            yaw if abs(yaw) > ODD_YAW else 0.0,
         )
 
     @staticmethod
@@ -72,7 +73,7 @@ class EndCalibration(NamedTuple):
     @property
     def correction(self) -> Correction:
         """Of a long way, where wheels are not as configured; a usual scale is noise."""
-        is_odd = self.turn or abs(self.yaw) > ODD_YAW
+        is_odd = self.turn or self.yaw
         return Correction(self.scale.value, self.yaw, self.turn) if is_odd else Correction()
 
     def path(self, poses: Array, before: int) -> Array:

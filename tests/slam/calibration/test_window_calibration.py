@@ -12,6 +12,7 @@ from slam_scenes import NOISE, Array, curved_window, inverted, product, same_pos
 from drslamd.conventions import Segment
 from drslamd.slam.calibration.window_calibration import (
     LEAST_SCALE,
+    ODD_YAW,
     EndCalibration,
     PairCalibration,
     calibrated_window,
@@ -134,6 +135,21 @@ def test_a_long_way_is_corrected_where_turns_are_not_as_configured(
     known: EndCalibration, correction: Correction
 ) -> None:
     assert known.correction == correction
+
+
+@pytest.mark.parametrize(("of_usual", "is_out"), [(0.99, False), (1.01, True)])
+def test_a_yaw_rate_is_taken_out_where_it_is_unusual(of_usual: float, is_out: bool) -> None:
+    """Of a window and of a long way: straight on by odometry, and really along a circle."""
+    rate = of_usual * ODD_YAW
+    estimate = TeamEstimate(Segment(0, 1, 0), {}, yaw={2: Learned(rate, 0.001)})
+    end = EndCalibration.of(estimate, 2)
+    straight = np.column_stack([np.arange(1, 1001) / 100, np.zeros(1000), np.zeros(1000)])
+    x, y, theta = end.path(straight, 0)[-1]
+    turned = -10 * rate if is_out else 0.0
+    assert theta == pytest.approx(turned)
+    assert y == pytest.approx((math.cos(turned) - 1) / -rate if is_out else 0.0, abs=0.01)
+    assert x == pytest.approx(math.sin(-turned) / rate if is_out else 10.0, abs=0.01)
+    assert end.correction.yaw == (rate if is_out else 0.0)
 
 
 def test_what_was_never_measured_changes_nothing() -> None:
