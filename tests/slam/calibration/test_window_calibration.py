@@ -147,7 +147,7 @@ def test_a_yaw_rate_is_taken_out_where_it_is_unusual(of_usual: float, is_out: bo
     x, y, theta = end.path(straight, 0)[-1]
     turned = -10 * rate if is_out else 0.0
     assert theta == pytest.approx(turned)
-    assert y == pytest.approx((math.cos(turned) - 1) / -rate if is_out else 0.0, abs=0.01)
+    assert y == pytest.approx((math.cos(turned) - 1) / rate if is_out else 0.0, abs=0.01)
     assert x == pytest.approx(math.sin(-turned) / rate if is_out else 10.0, abs=0.01)
     assert end.correction.yaw == (rate if is_out else 0.0)
 

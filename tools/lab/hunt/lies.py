@@ -33,7 +33,7 @@ SAMPLES = 2**31 - 2
 
 
 class Liar:
-    """Robot `robot` of a team; never says anything true.
+    """Robot `robot` of a team; never says anything true but that it hears the others.
 
     Its own chain is nonsense, its closures and ranges to others are, its clock jumps. The UWB
     modules that it names are carried by nobody: where two robots claim one, both are told.
@@ -79,6 +79,9 @@ class Liar:
     def _status(self) -> Status:
         known = range(self._int(0, 5))
         heard = tuple(Heard(*self._chain(), self._int(-(2**40), 2**40)) for _ in known)
+        if self._rng.random() < 0.5:
+            # who wants to be believed answers everybody's present start
+            heard = tuple(Heard(*chain, 0) for chain in self._epochs.items())
         numbers = [sorted(self._int(0, SAMPLES) for _ in range(3)) for _ in known]
         logs = tuple(LogState(*self._chain(), *three) for three in numbers)
         return Status(

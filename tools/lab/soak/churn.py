@@ -153,7 +153,7 @@ def hours(seed: int, count: float, progress: Callable[[float], None]) -> Iterato
     day = Day(seed)
     stage = DayStage(day.block(0), np.random.default_rng([seed, 3]), 0.0, float("inf"), day=day)
     stage.radio.troubles.append(radio.Trouble(0, 2**62, radio.lossy(LOSS)))
-    until_s = round(count * 3600)
+    until_s = LOOK_S * round(count * 3600 / LOOK_S)
     faults.stranger(stage, STRANGE_PER_S, until_s)
     bench = Bench(stage, seed, RATES)
     invariants = Invariants(bench, keeps_journal=False)
