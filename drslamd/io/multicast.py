@@ -21,7 +21,7 @@ from pathlib import Path
 from drslamd.config import GossipSection
 from drslamd.events import Datagram, Event, NetworkState
 from drslamd.gossip import lc02
-from drslamd.host.interfaces import NO_ADDRESS, SYSFS, address_of, fault_of, interfaces
+from drslamd.host.interfaces import NO_ADDRESS, SYSFS, address_of, fault_of
 from drslamd.io.backoff import Backoff
 from drslamd.io.clock import Clock
 
@@ -61,6 +61,7 @@ class Multicast:
         self._backoff = Backoff()
         self._last_state: tuple[bool, str] | None = None
         self._own_addresses: set[str] = set()
+        """That were heard since the group was joined; no computer has many."""
         self.dropped = self.reads = 0
 
     async def run(self) -> None:
@@ -106,7 +107,7 @@ class Multicast:
             return False
         self._failed.clear()
         self._unheard_since = None
-        self._own_addresses = {interface.address for interface in interfaces()}
+        self._own_addresses.clear()
         asyncio.get_running_loop().add_reader(self._socket.fileno(), self._read)
         return True
 
@@ -140,8 +141,9 @@ class Multicast:
             self._deliver(Datagram(self._clock.now(), data, sender[0]))
 
     def _is_of_this_host(self, address: str) -> bool:
-        own = address in self._own_addresses or address == self._section.interface
-        return own or address.startswith("127.")
+        if address not in self._own_addresses and is_own(address):
+            self._own_addresses.add(address)
+        return address in self._own_addresses
 
     def _heard_ourselves(self) -> None:
         self._unheard_since = None
@@ -233,3 +235,13 @@ def open_group(section: GossipSection) -> socket.socket:
         udp.close()
         raise
     return udp
+
+
+def is_own(address: str) -> bool:
+    """Is it an address of this computer? Only such a one can be bound; interfaces come and go."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind((address, 0))
+        except OSError:
+            return False
+    return True

@@ -7,9 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+from acquainted import introduce
 from transport_helpers import GROUP, Ear, native, running, section, spoken_until, until
 
 from drslamd.config import GossipSection
+from drslamd.conventions import Chain
 from drslamd.events import ChannelMessage
 from drslamd.gossip import lc02, messages
 from drslamd.gossip.message_types import Pose, PoseState
@@ -274,6 +276,7 @@ async def lcm_logger_records_what_we_say(folder: str) -> None:
         await logger.wait()
     said = []
     events = lcm.EventLog(str(log))
+    introduce(listener, Chain(3, 1))
     for event in events:
         if event.channel == "DRSLAM_POSE_003":
             said.append(messages.decode("POSE", event.data))

@@ -20,7 +20,7 @@ from drslamd.events import Datagram, NetworkState
 from drslamd.gossip import lc02
 from drslamd.io import multicast
 from drslamd.io.clock import MonotonicClock
-from drslamd.io.multicast import IP_MULTICAST_ALL, Multicast, open_group, own_address
+from drslamd.io.multicast import IP_MULTICAST_ALL, Multicast, is_own, open_group, own_address
 
 LONGEST_GAP_S = 0.05
 
@@ -163,6 +163,13 @@ async def test_another_group_on_the_same_port_is_not_heard() -> None:
         await until(lambda: ("DRSLAM_POSE_002", b"from b") in heard_by_b.messages)
     assert ("DRSLAM_POSE_002", b"from b") not in heard_by_a.messages
     assert ("DRSLAM_POSE_001", b"from a") not in heard_by_b.messages
+
+
+@pytest.mark.parametrize(
+    ("address", "is_ours"), [("127.0.0.1", True), ("192.0.2.77", False), ("0.0.0.256", False)]
+)
+def test_an_address_is_ours_if_it_can_be_bound(address: str, is_ours: bool) -> None:
+    assert is_own(address) is is_ours
 
 
 @pytest.mark.parametrize("ttl", [0, 1, 32])
