@@ -19,6 +19,9 @@ from drslamd.io.can_bus import MOST_DAMAGED, CanBus, opened  # noqa: E402
 from drslamd.io.clock import MonotonicClock  # noqa: E402
 from drslamd.sensors.wheels.wheel_input import WheelInput  # noqa: E402
 
+with can.Bus("nobody", interface="virtual"):
+    """What python-can reads once of the computer, it reads before a loop waits for it."""
+
 
 async def until(so: Callable[[], bool], within_s: float = 8.0) -> None:
     for _ in range(int(within_s / 0.01)):
