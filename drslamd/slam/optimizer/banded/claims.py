@@ -37,11 +37,17 @@ def covariances(
     poses = layout.poses[wanted].ravel()
     joint = None if factor is None else factor.joint_covariance(poses)
     sigmas = np.full(layout.band + layout.border, np.sqrt(UNKNOWN))
-    if factor is None or joint is None:
+    if factor is None or joint is None or not _is_known(joint):
         return UNKNOWN * np.eye(len(poses)), layout.calibration(sigmas)
     learned = np.linalg.inv(factor.schur + equations.bias_belief(point))
     sigmas[layout.band :] = np.sqrt(np.diag(learned))
     return joint, layout.calibration(sigmas)
+
+
+def _is_known(joint: Array) -> bool:
+    """Of a system that is singular rounding may leave a factor, and no sense in its inverse."""
+    sigmas2 = np.diag(joint)
+    return bool(np.isfinite(joint).all() and sigmas2.min() > 0 and sigmas2.max() < UNKNOWN)
 
 
 def scatter_of(problem: Problem, point: Point) -> Array:
