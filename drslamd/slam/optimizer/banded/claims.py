@@ -46,8 +46,8 @@ def covariances(
 
 def _is_known(joint: Array) -> bool:
     """Of a system that is singular rounding may leave a factor, and no sense in its inverse."""
-    sigmas2 = np.diag(joint)
-    return bool(np.isfinite(joint).all() and sigmas2.min() > 0 and sigmas2.max() < UNKNOWN)
+    squares = np.diag(joint)
+    return bool((np.isfinite(squares) & (squares > 0) & (squares < UNKNOWN)).all())
 
 
 def scatter_of(problem: Problem, point: Point) -> Array:
