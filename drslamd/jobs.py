@@ -18,6 +18,7 @@ RELATIVE_POSE = "relative_pose"
 CONSISTENCY = "consistency"
 OPTIMIZER = "optimizer"
 WHAT_IF = "what_if"
+RELOCATION = "relocation"
 
 REST = 4
 """How many times as long as it computed a module rests."""
@@ -85,6 +86,10 @@ class Jobs:
         return any(
             job.module == module and pair in (None, job.pair) for job in self._under_way.values()
         )
+
+    def is_free(self, module: str, utime: int) -> bool:
+        """Does it neither compute nor rest?"""
+        return not (self.is_busy(module) or self.is_resting(module, utime))
 
     def is_resting(self, module: str, utime: int) -> bool:
         return utime < self.cycles.get(module, DutyCycle()).until

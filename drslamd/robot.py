@@ -19,7 +19,7 @@ from drslamd.broadcast import Broadcast
 from drslamd.conditions import diagnosis
 from drslamd.conditions.health import Health
 from drslamd.config import Config
-from drslamd.conventions import MILLISECOND_US, SECOND_US, Chain
+from drslamd.conventions import SECOND_US, Chain
 from drslamd.events import (
     CanFrame,
     ChannelMessage,
@@ -46,7 +46,7 @@ from drslamd.gossip.bounds import is_sayable
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
-from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, WHAT_IF, Job, Jobs
+from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, RELOCATION, WHAT_IF, Job, Jobs
 from drslamd.memory import Memory
 from drslamd.near.surroundings import Surroundings
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
@@ -63,17 +63,9 @@ from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.settings import closure_method
 from drslamd.slam.tuning import DEFAULTS, Tuning
 from drslamd.standing import Standing
-from drslamd.timers import Action, Timers
+from drslamd.timers import PLACE_US, POLL_US, REPEAT_US, SAVE_US, TURN_US, Action, Timers
 from drslamd.whereabouts import Whereabouts
 
-POLL_US = 10 * MILLISECOND_US
-"""How finely the wheels that must be asked are asked; their driver knows its own rate."""
-REPEAT_US = 100 * MILLISECOND_US
-"""Between two looks for log entries that somebody lacks."""
-TURN_US = 40 * MILLISECOND_US
-"""The same where robots take turns, and wait for each other."""
-SAVE_US = 60 * SECOND_US
-"""Between two looks whether there is anything new to keep over a restart."""
 GOODBYES = 3
 """Last messages of an orderly stop; at 30 % loss one gets through in 97 % of cases."""
 
@@ -142,6 +134,7 @@ class Robot:
             self._repeat: TURN_US if config.optimizer.algorithm == "rbcd" else REPEAT_US,
             self._send_status: SECOND_US,
             self._send_odometry: SECOND_US,
+            self._relocate: PLACE_US,
             self._extend_log: SECOND_US,
             self._relative_poses: round(SECOND_US / config.relative_pose.rate_hz),
             self._what_if: SECOND_US,
@@ -266,7 +259,7 @@ class Robot:
 
     def _what_if(self, utime: int) -> list[Effect]:
         """Where windows disagree again and again: which mistake in the mountings explains them?"""
-        if self.jobs.is_busy(WHAT_IF) or self.jobs.is_resting(WHAT_IF, utime):
+        if not self.jobs.is_free(WHAT_IF, utime):
             return []
         asked = self.front.what_if(self.neighbours(utime), self.back.graph, utime)
         return [self.jobs.begin(Job(WHAT_IF, w.pair, w.request), w.run) for w in asked]
@@ -280,22 +273,32 @@ class Robot:
 
     def _optimize(self, utime: int) -> list[Effect]:
         """Module 3: the team's pose graph."""
-        if self.jobs.is_busy(OPTIMIZER) or self.jobs.is_resting(OPTIMIZER, utime):
+        if not self.jobs.is_free(OPTIMIZER, utime):
             return []
         run = self.back.begin(self.team.present(utime), set(self.team.living(utime)), utime)
         return [self.jobs.begin(Job(OPTIMIZER), run)] if run else []
 
+    def _relocate(self, utime: int) -> list[Effect]:
+        """After a hole in our odometry: where do ranges to localised peers place us?"""
+        run = self.standing.relocate(self.neighbours(utime), utime)
+        is_free = self.jobs.is_free(RELOCATION, utime)
+        return [self.jobs.begin(Job(RELOCATION), run)] if run and is_free else []
+
     def _take_turn(self, utime: int) -> list[Effect]:
         """With `rbcd`: move if it is our turn now, and say what others wait for."""
         exchange = self.back.exchange
-        is_due = exchange.is_waiting or self.back.is_urgent
-        effects = self._optimize(utime) if is_due else []
+        effects = self._optimize(utime) if exchange.is_waiting or self.back.is_urgent else []
         would_move = exchange.is_waiting and not self.jobs.is_resting(OPTIMIZER, utime)
         at_rest = not would_move and not self.jobs.is_busy(OPTIMIZER)
         return [*effects, *self.broadcast.public(exchange.answers(utime, at_rest), utime)]
 
     def _on_job(self, event: JobDone) -> list[Effect]:
-        if self.jobs.finish(event).tell_pair(event.result):
+        job = self.jobs.finish(event)
+        if job.module == RELOCATION:
+            is_found = self.standing.on_relocated(event.result, event.utime)
+            actions = (self._extend_log, self._optimize) if is_found else ()
+            return [effect for action in actions for effect in action(event.utime)]
+        if job.tell_pair(event.result):
             return []
         said = self.back.on_solution(event.result, event.utime)
         public = self.broadcast.public(said, event.utime)
@@ -343,5 +346,5 @@ class Robot:
     def _on_stop(self, event: Stop) -> list[Effect]:
         state = self.whereabouts(event.utime).state
         goodbye = self.broadcast.make_status([], None, state, event.utime, leaving=True)
-        sends = [self.team.send(goodbye, event.utime) for _ in range(GOODBYES)]
+        sends = (self.team.send(goodbye, event.utime) for _ in range(GOODBYES))
         return [*sends, Save(self.memory.state())]

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from drslamd.config import Config
 from drslamd.conventions import Chain
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.doubt import Doubt, Partners, doubt_of, doubted_partners
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.graph.estimate import PoseNow
+from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.pose_now import pose_now
-from drslamd.whereabouts import Whereabouts, whereabouts
+from drslamd.slam.relative_pose.pair_end import PairEnd
+from drslamd.slam.relocation.relocation import Found
+from drslamd.whereabouts import Whereabouts, likely_speeds, whereabouts
 
 
 class Standing:
@@ -18,6 +23,7 @@ class Standing:
     def __init__(self, config: Config, own: Chain, front: FrontEnd, back: BackEnd) -> None:
         self._most_mps, self._robot = config.wheels.max_speed_mps, own.robot
         self._front, self._back = front, back
+        self._ranges_solve = config.optimizer.algorithm == "banded"
 
     def pose(self) -> PoseNow | None:
         """Our latest pose in the frame of the team; None while we are not localised."""
@@ -32,7 +38,30 @@ class Standing:
     def whereabouts(self, utime: int) -> Whereabouts:
         """What that pose is worth now."""
         track, gap_m = self._front.reckoning.track, self._front.watch.gap_m
-        return whereabouts(self.pose(), track, self._most_mps, self._doubt(), utime, gap_m)
+        by_ranges = self._front.relocation.by_ranges(utime)
+        return whereabouts(
+            self.pose(), track, self._most_mps, self._doubt(), utime, gap_m, by_ranges
+        )
+
+    def relocate(self, neighbours: list[PeerInRange], utime: int) -> Callable[[], Found] | None:
+        """After a hole in our odometry, see `Relocation.look`; only where module 3 then goes on by
+        ranges, not where it would have nothing but that closure."""
+        if not self._ranges_solve:
+            return None
+        front, back = self._front, self._back
+        track = front.reckoning.track
+        return front.relocation.look(
+            neighbours, front.ranges, track, back.graph, back.estimate, self._speed, utime
+        )
+
+    def _speed(self) -> float:
+        return likely_speeds(self._front.reckoning.track, self._most_mps)[0]
+
+    def on_relocated(self, found: Found, utime: int) -> bool:
+        """See `Relocation.on_found`."""
+        data = self._back.graph.chains.get(self._robot)
+        own = PairEnd(self._front.reckoning.track, data) if data is not None else None
+        return self._front.relocation.on_found(found, own, utime)
 
     def is_doubted(self) -> tuple[bool, bool]:
         """Does odometry of ours, or of anybody, say less than what was ranged?"""

@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from drslamd.conventions import MILLISECOND_US, SECOND_US
 from drslamd.events import Effect
+
+POLL_US = 10 * MILLISECOND_US
+"""How finely the wheels that must be asked are asked; their driver knows its own rate."""
+REPEAT_US = 100 * MILLISECOND_US
+"""Between two looks for log entries that somebody lacks."""
+TURN_US = 40 * MILLISECOND_US
+"""The same where robots take turns, and wait for each other."""
+SAVE_US = 60 * SECOND_US
+"""Between two looks whether there is anything new to keep over a restart."""
+PLACE_US = SECOND_US // 4
+"""After a hole in odometry: between two looks at where ranges place us."""
 
 Action = Callable[[int], list[Effect]]
 """Gets the time, us, and says what follows."""

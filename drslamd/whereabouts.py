@@ -3,12 +3,13 @@
 Without odometry a robot may stand still or drive on. It drives as it drove: the fastest second of
 its last ten minutes bounds how far it can have come, in any direction. So after t seconds sigma is
 that speed times t, and the state says `STALE`. What the wheels could do at most would be true as
-well and help nobody; it is used for a robot that has not driven yet.
+well and help nobody; it is used for a robot that has not driven yet. Where ranges to localised
+robots tell more (`slam/relocation`) their position is said, without a heading, until the robot has
+its place again.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ from drslamd.gossip.message_types import PoseState
 from drslamd.slam.doubt import Doubt
 from drslamd.slam.graph.estimate import PoseNow
 from drslamd.slam.odometry.track import RESOLUTION, Track
+from drslamd.slam.relocation.relocation import ANY_HEADING_RAD, ByRanges
 
 VALID_US = SECOND_US
 """An older pose is not that of now; the slowest base of any use sends twice a second."""
@@ -27,8 +29,6 @@ LOOK_BACK = 600 * GRID_HZ
 """Samples, ten minutes of them."""
 STANDING_MPS = 0.05
 """Who never was faster has not driven yet."""
-ANY_HEADING_RAD = math.pi / math.sqrt(3)
-"""Sigma of a heading of which nothing is known."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,7 @@ def whereabouts(
     doubt: Doubt | None,
     utime: int,
     gap_m: float = 0.0,
+    by_ranges: ByRanges | None = None,
 ) -> Whereabouts:
     """What to say of a robot at `utime`.
 
@@ -73,7 +74,11 @@ def whereabouts(
         doubt: what speaks against that pose.
         gap_m: how far all ranges of this second are off: the pose is as wrong as that, whatever the
             reason, and long before anybody can say which.
+        by_ranges: where it is without odometry, as ranges have it.
     """
+    is_old = found is None or utime - found.utime > VALID_US
+    if is_old and by_ranges is not None:
+        return Whereabouts(PoseState.STALE, by_ranges.pose, by_ranges.age_us)
     if found is None:
         return NOWHERE
     age_us = utime - found.utime

@@ -106,3 +106,14 @@ def test_pairs_that_are_computed_one_after_the_other_rest_for_all_of_them() -> N
     since, until = jobs.cycles[RELATIVE_POSE]
     assert since == T0
     assert until == T0 + TOOK + 3 * REST * TOOK
+
+
+def test_a_module_is_free_when_it_neither_computes_nor_rests() -> None:
+    jobs = Jobs()
+    assert jobs.is_free(OPTIMIZER, T0)
+    solve = jobs.begin(Job(OPTIMIZER), lambda: None)
+    assert not jobs.is_free(OPTIMIZER, T0)
+    assert jobs.is_free(RELATIVE_POSE, T0)
+    jobs.finish(JobDone(T0, solve.job_id, None, TOOK))
+    assert not jobs.is_free(OPTIMIZER, T0 + REST * TOOK - 1)
+    assert jobs.is_free(OPTIMIZER, T0 + REST * TOOK)

@@ -56,6 +56,7 @@ SLAM_ORDER = [
     "pose_now",
     "peer_in_range",
     "relative_pose",
+    "relocation",
     "consistency",
     "calibration",
     "optimizer",

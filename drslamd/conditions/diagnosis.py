@@ -156,6 +156,17 @@ def why_not_localised(robot: Stages, utime: int) -> str | None:
     where = robot.whereabouts(utime)
     if where.is_old:
         seconds = where.age_us // SECOND_US
+        relocation = robot.front.relocation
+        if relocation.by_ranges(utime) is not None and relocation.verdict:
+            return (
+                f"odometry was interrupted {seconds} s ago: ranges say where it is, not yet how it "
+                f"stands ({relocation.verdict}); drive a metre or two"
+            )
+        if relocation.by_ranges(utime) is not None:
+            return (
+                f"no odometry for {seconds} s: the position is that of ranges to other robots, the "
+                "heading is not known; check the wheels"
+            )
         return (
             f"no odometry for {seconds} s: the pose is that of then, and its sigma grows as fast "
             "as the robot drives; check the wheels"

@@ -42,7 +42,8 @@ class PoseState(IntEnum):
     DOUBTFUL = 2
     """There is a pose, but what was measured contradicts it."""
     STALE = 3
-    """The last pose, as uncertain as the way that may have been driven since without odometry."""
+    """No odometry: a position by ranges, whose heading means nothing (its sigma is that of any), or
+    the last pose, as uncertain as the way that may have been driven since."""
 
 
 @dataclass(frozen=True)

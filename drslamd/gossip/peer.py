@@ -18,6 +18,7 @@ from drslamd.gossip.message_types import (
     Heard,
     OdometryBatch,
     Pose,
+    PoseState,
     Status,
 )
 from drslamd.gossip.peer_clock import PeerClock
@@ -241,6 +242,7 @@ class Peer:
             of_us.heard.wanted_n if of_us else NOTHING_WANTED,
             of_us.utime if of_us else utime,
             self.clock.since,
+            self.status.frame if self.status.state is PoseState.LOCALISED else None,
         )
 
 

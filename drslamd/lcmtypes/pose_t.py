@@ -29,8 +29,8 @@ class pose_t(object):
         0 not localised: the other fields then say nothing
         1 localised: the pose is at most a second old and the covariance is meant
         2 doubtful: there is a pose, but what was measured contradicts it
-        3 stale: no odometry for more than a second; the last pose, with a covariance that grows as
-        fast as the robot drove
+        3 stale: no odometry for more than a second; a position by ranges, with the sigma of any
+        heading, or the last pose, with a covariance that grows as fast as the robot drove
         LCM Type: int8_t
         """
 

@@ -49,6 +49,7 @@ class BackEnd:
         self._own = own
         self._optimizer = settings.optimizer(config, own, tuning)
         self._takes_turns = config.optimizer.algorithm == "rbcd"
+        self._looks_back = config.optimizer.algorithm == "banded"
         self.exchange = PoseExchange(own)
         self.graph = PoseGraph(tuning.recent_s)
         self.history = History()
@@ -102,8 +103,7 @@ class BackEnd:
             self._known = now
             return None
         current = Segment(*self._own, int(chain.keyframes.segment[-1]))
-        groups = [group for group in team_frame.groups(self.graph) if current in group]
-        self.group = groups[0] if groups else set()
+        self.group = team_frame.group_of(current, self.graph, self._looks_back)
         gauge = team_frame.gauge_segment(self.group, present)
         if gauge is None:
             self.estimate, self._known = None, now

@@ -7,7 +7,7 @@ from functools import partial
 from typing import NamedTuple
 
 from drslamd.config import Config
-from drslamd.conventions import SECOND_US, Chain
+from drslamd.conventions import Chain
 from drslamd.sensors.samples import Motion, RangeSample
 from drslamd.slam import settings
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
@@ -26,17 +26,14 @@ from drslamd.slam.range_watch import Partner, RangeWatch
 from drslamd.slam.relative_pose import what_if
 from drslamd.slam.relative_pose.estimate import PairNoise, RelativePoseEstimate
 from drslamd.slam.relative_pose.pair_end import PairEnd
-from drslamd.slam.relative_pose.range_buffer import RangeBuffer
+from drslamd.slam.relative_pose.range_buffer import RANGES_FRESH_US, RangeBuffers
 from drslamd.slam.relative_pose.range_sampler import RangeSampler
 from drslamd.slam.relative_pose.what_if import Case
 from drslamd.slam.relative_pose.window_request import WindowRequest, request
+from drslamd.slam.relocation.relocation import Relocation
+from drslamd.slam.relocation.sightings import Own
 from drslamd.slam.se2 import Array
 from drslamd.slam.tuning import DEFAULTS, Tuning
-
-MAX_UWB_IDS = 64
-"""Modules whose ranges are remembered, 2 MB; a radio cell holds no more."""
-RANGES_FRESH_US = 3 * SECOND_US
-"""A module that was silent for longer is not in range."""
 
 
 class Measurable(NamedTuple):
@@ -99,9 +96,12 @@ class FrontEnd:
         noise = known.narrowed(settings.odometry_noise(config.odometry))
         self.model = known.mounted(settings.robot_model(config, noise))
         self.reckoning = DeadReckoning()
-        self.ranges: dict[int, RangeBuffer] = {}
+        self.ranges = RangeBuffers(self._nlos_db, self._range_model)
         self.pairs: dict[int, PairTracker] = {}
         self.watch = RangeWatch(section.range_sigma_m, tuning.ranges)
+        self.relocation = Relocation(
+            Own(own.robot, self.model, section.range_sigma_m, tuning.ranges)
+        )
         self._keyframes = KeyframeSelector()
 
     # sensors
@@ -114,24 +114,11 @@ class FrontEnd:
         self.reckoning.interrupt()
 
     def on_range(self, sample: RangeSample) -> None:
-        if sample.peer_uwb_id not in self.ranges:
-            if len(self.ranges) >= MAX_UWB_IDS and not self._forget_silent(sample.utime):
-                return
-            self.ranges[sample.peer_uwb_id] = RangeBuffer(self._nlos_db, self._range_model)
-        buffer = self.ranges[sample.peer_uwb_id]
-        buffer.add(sample.utime, sample.range_m, sample.power_gap_db)
-
-    def _forget_silent(self, utime: int) -> bool:
-        """Make room: forget the module that was silent longest, unless all are heard."""
-        oldest = min(self.ranges, key=lambda uwb_id: self.ranges[uwb_id].newest or 0)
-        if self.ranges[oldest].is_fresh(utime, RANGES_FRESH_US):
-            return False
-        del self.ranges[oldest]
-        return True
+        self.ranges.add(sample)
 
     def ranged(self, utime: int) -> list[int]:
         """UWB ids to which ranges came in of late."""
-        return [u for u, b in self.ranges.items() if b.is_fresh(utime, RANGES_FRESH_US)]
+        return self.ranges.fresh(utime)
 
     def make_keyframe(self, is_doubted: bool = False) -> Keyframe | None:
         """See `KeyframeSelector.next`."""
@@ -166,7 +153,8 @@ class FrontEnd:
     def needed(self, neighbours: list[PeerInRange], utime: int) -> set[int]:
         """Robots whose odometry our windows need."""
         mine = self.ranged(utime)
-        return {p.chain.robot for p in neighbours if self._owns(p) and p.uwb_id in mine}
+        lost = self.relocation.is_lost
+        return {p.chain.robot for p in neighbours if (lost or self._owns(p)) and p.uwb_id in mine}
 
     def update_pairs(self, neighbours: list[PeerInRange], graph: PoseGraph, utime: int) -> None:
         """Begin to track the pairs that we own, and those of a peer that started again."""
@@ -345,4 +333,6 @@ class FrontEnd:
 
     def tell_closures(self) -> list[ClosureMeasurement]:
         """Closures to tell the team, and to withdraw."""
-        return [c for pair in self.pairs.values() for c in pair.tell(not self._has_ranges_in_graph)]
+        every = not self._has_ranges_in_graph
+        told = [c for pair in self.pairs.values() for c in pair.tell(every)]
+        return [*told, *self.relocation.tell()]

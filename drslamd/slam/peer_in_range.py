@@ -17,6 +17,7 @@ class PeerInRange:
         ranges_to_us: does it measure ranges to us?
         track: its odometry of the last minutes.
         ahead_us: its clock minus ours; None while that is not known well enough.
+        frame: robot in whose frame it says that it is localised, None while it does not.
         wanted_n: first sample of our odometry that it lacked and needed when it last said so, at
             wanted_at, us; -1 when it needs none.
         clocks_since_us: from when on our clock that holds; either clock jumped before.
@@ -30,3 +31,4 @@ class PeerInRange:
     wanted_n: int = -1
     wanted_at: int = 0
     clocks_since_us: int = 0
+    frame: int | None = None

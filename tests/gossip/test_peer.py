@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from message_builders import MS, SECOND, a_status
@@ -302,3 +304,13 @@ def test_a_clock_that_is_known_worse_than_a_grid_step_is_not_used(
     peer.on_message(T0, T0 + 96_800)
     peer.take_status(a_status((Heard(*OWN, 96_800 + excess_us),)), 1, OWN, T0)
     assert (peer.neighbour(OWN, T0).ahead_us is not None) == known
+
+
+@pytest.mark.parametrize("state", PoseState)
+def test_only_who_says_that_it_is_localised_can_tell_others_where_they_are(
+    state: PoseState,
+) -> None:
+    peer = a_peer()
+    peer.take_status(replace(a_status(), state=state, frame=2), 1, OWN, T0)
+    expected = 2 if state is PoseState.LOCALISED else None
+    assert peer.neighbour(OWN, T0).frame == expected

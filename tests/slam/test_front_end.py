@@ -16,15 +16,12 @@ from drslamd.sensors.samples import Motion, RangeSample
 from drslamd.slam.calibration.sensor_calibration import CHANGED_BIAS_M, SensorCalibration
 from drslamd.slam.closure_method import AGREEMENT, CONFIRM_US
 from drslamd.slam.consistency.pair import PairTracker
-from drslamd.slam.front_end import (
-    MAX_UWB_IDS,
-    RANGES_FRESH_US,
-    FrontEnd,
-)
+from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.relative_pose.estimate import PairNoise, RelativePoseEstimate
+from drslamd.slam.relative_pose.range_buffer import MAX_UWB_IDS, RANGES_FRESH_US
 
 UNKNOWN_CLOCK = "clock of the peer not known well enough"
 KNOWN = SensorCalibration(Learned(0.1, 0.005), Learned(0.02, 0.001), {1: Learned(0.4, 0.01)})

@@ -53,6 +53,18 @@ def groups(graph: PoseGraph) -> list[set[Segment]]:
     return distinct
 
 
+def group_of(current: Segment, graph: PoseGraph, looks_back: bool) -> set[Segment]:
+    """The group of a robot that is in `current`, empty where it is in none.
+
+    Args:
+        looks_back: as long as nothing joins that segment, the group of what it drove before.
+    """
+    found = groups(graph)
+    mine = {s for group in found for s in group if s.chain == current.chain and s <= current}
+    last = max(mine, default=None) if looks_back else current
+    return next((group for group in found if last in group), set())
+
+
 class Joint(NamedTuple):
     """Two segments, and the closures that join them."""
 

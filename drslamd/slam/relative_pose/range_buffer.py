@@ -1,4 +1,4 @@
-"""The ranges to one peer of the last half minute or so, thinned to the 10 Hz grid."""
+"""The ranges to each module of the last half minute or so, thinned to the 10 Hz grid."""
 
 from __future__ import annotations
 
@@ -9,12 +9,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from drslamd.conventions import GRID_US
+from drslamd.conventions import GRID_US, SECOND_US
+from drslamd.sensors.samples import RangeSample
 from drslamd.slam.range_model import LINKTRACK, RangeModel
 from drslamd.slam.se2 import Array
 
 KEEP_S = 130
 """The longest window that a configuration may ask for, and some delay."""
+MAX_UWB_IDS = 64
+"""Modules whose ranges are remembered, 2 MB; a radio cell holds no more."""
+RANGES_FRESH_US = 3 * SECOND_US
+"""A module that was silent for longer is not in range."""
 RAW_IN_BIN = 32
 """LinkTrack's fastest rate is 200 Hz, 20 in a tenth of a second."""
 
@@ -90,3 +95,31 @@ class RangeBuffer:
 
     def is_fresh(self, utime: int, within_us: int) -> bool:
         return self.newest is not None and utime - self.newest < within_us
+
+
+class RangeBuffers(dict[int, RangeBuffer]):
+    """By UWB id, the modules that were heard of late."""
+
+    def __init__(self, nlos_db: float = 0.0, model: RangeModel = LINKTRACK) -> None:
+        super().__init__()
+        self._nlos_db, self._model = nlos_db, model
+
+    def add(self, sample: RangeSample) -> None:
+        """Keep a range, unless it is to one module more than can be heard."""
+        if sample.peer_uwb_id not in self:
+            if len(self) >= MAX_UWB_IDS and not self._forget_silent(sample.utime):
+                return
+            self[sample.peer_uwb_id] = RangeBuffer(self._nlos_db, self._model)
+        self[sample.peer_uwb_id].add(sample.utime, sample.range_m, sample.power_gap_db)
+
+    def fresh(self, utime: int) -> list[int]:
+        """Modules to which ranges came in of late."""
+        return [u for u, b in self.items() if b.is_fresh(utime, RANGES_FRESH_US)]
+
+    def _forget_silent(self, utime: int) -> bool:
+        """Make room: forget the module that was silent longest, unless all are heard."""
+        oldest = min(self, key=lambda uwb_id: self[uwb_id].newest or 0)
+        if self[oldest].is_fresh(utime, RANGES_FRESH_US):
+            return False
+        del self[oldest]
+        return True

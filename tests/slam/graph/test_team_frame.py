@@ -25,7 +25,14 @@ from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.tables import KeyframeTable
-from drslamd.slam.graph.team_frame import Group, by_odometry, gauge_segment, groups, placed
+from drslamd.slam.graph.team_frame import (
+    Group,
+    by_odometry,
+    gauge_segment,
+    group_of,
+    groups,
+    placed,
+)
 from drslamd.slam.odometry.correction import Correction
 
 CHAINS = [Chain(r, 10 + r) for r in range(5)]
@@ -296,3 +303,18 @@ def test_joints_name_the_segments_that_they_join() -> None:
     graph.insert(A, GraphEntry(9, closures=(closure(5, 70, B, 70, (1, 0, 0)),)))
     found = [(j.a, j.b, j.closures.number.tolist()) for j in team_frame.joints(graph)]
     assert found == [(segment(A), segment(B, 0), [0]), (segment(A), segment(B, 1), [5])]
+
+
+@pytest.mark.parametrize(
+    ("current", "joined"),
+    [(segment(A), True), (segment(A, 1), True), (segment(C, 1), False), (segment(E), False)],
+    ids=["in it", "after a hole", "a hole of who was in none", "alone"],
+)
+def test_who_has_a_hole_is_in_the_group_of_what_it_drove_before(
+    current: Segment, joined: bool
+) -> None:
+    graph = team_of((A, B), breaks=(A, C))
+    expected = {segment(A), segment(B)} if joined else set()
+    assert group_of(current, graph, looks_back=True) == expected
+    at_once = joined and current.segment == 0
+    assert group_of(current, graph, looks_back=False) == (expected if at_once else set())

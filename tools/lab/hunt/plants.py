@@ -157,9 +157,8 @@ SURVIVORS = (
     ),
     Plant(
         "bound-of-modules",
-        "slam/front_end.py",
-        "            if len(self.ranges) >= MAX_UWB_IDS and not self._forget_silent("
-        "sample.utime):\n"
+        "slam/relative_pose/range_buffer.py",
+        "            if len(self) >= MAX_UWB_IDS and not self._forget_silent(sample.utime):\n"
         "                return\n",
         "",
         ("slam/test_front_end.py",),

@@ -27,7 +27,7 @@ from drslamd.gossip.message_types import Pose, PoseState
 from drslamd.gossip.replicated_log import MAX_ENTRIES
 from drslamd.robot import Robot
 from drslamd.sensors.frame_scanner import MAX_BUFFER_BYTES
-from drslamd.slam.front_end import MAX_UWB_IDS
+from drslamd.slam.relative_pose.range_buffer import MAX_UWB_IDS
 from lab.play.simulator import Member, Simulator
 from lab.soak import agreement
 

@@ -1,0 +1,249 @@
+"""Where a segment of odometry lies, by ranges to peers whose places are known.
+
+    r_i = | p_i - (c + R(theta) q_i) | + bias of the peer
+
+Module 1's problem with several peers at once and a place to begin from. All minima are looked for
+and judged under the full noise of the ranges; while two cannot be told apart none is named.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from drslamd.slam import se2
+from drslamd.slam.odometry.noise import OdometryNoise
+from drslamd.slam.range_model import RangeModel
+from drslamd.slam.relative_pose.solver import EXCLUDED_CHI2
+from drslamd.slam.relocation.sightings import Sightings
+from drslamd.slam.se2 import Array
+
+HEADINGS = 12
+"""Of starts at each place: a basin is wider than 30 degrees unless the way is long."""
+RINGS = (0.0, 0.5, 1.0)
+"""Starts lie on these shares of how far the robot may have come, six on each ring."""
+FIRST_STEPS, STEPS = 4, 16
+CARRIED = 32
+"""Starts that are carried on after the first steps."""
+DAMPING = 1e-3
+LONGEST = 1.0
+"""m, rad: what one step may do."""
+MERGE_M, MERGE_RAD = 0.2, 0.15
+"""Minima that are nearer are one."""
+CANDIDATES = 6
+POOR_FIT = 3.0
+"""Chi-squared per range beyond which the model does not explain them."""
+MOST_OFF = 0.25
+"""Share of ranges that may be off by more than `RangeModel.cauchy_sigmas`: bursts, and no more."""
+MAX_SIGMA_M, MAX_SIGMA_RAD = 0.4, np.radians(8.0)
+"""What is vaguer is not said yet."""
+FEWEST = 10
+"""Ranges."""
+
+
+class Prior(NamedTuple):
+    """Where the robot was when the segment began: (2,) in w, (2, 2), and how far from there the
+    search must look, m.
+
+    It is a witness among others: what it says against a minimum grows like a logarithm.
+    """
+
+    place: Array
+    covariance: Array
+    reach_m: float
+
+
+@dataclass(frozen=True)
+class WayUnder:
+    """The odometry under k sightings.
+
+    Attributes:
+        antenna: (k, 2) in the odometry frame; begin: (2,) the body's first place there.
+        way_m: (k,) driven since.
+        noise: of this odometry.
+    """
+
+    antenna: Array
+    begin: Array
+    way_m: Array
+    noise: OdometryNoise
+
+
+class Placed(NamedTuple):
+    """w_T_o (3,) of the odometry frame, and (3, 3) of x, y, theta of the robot's place at `at` in
+    it, where that is known best."""
+
+    w_T_o: Array
+    covariance: Array
+    at: Array
+
+
+def place(seen: Sightings, stretch: WayUnder, prior: Prior, model: RangeModel) -> Placed | str:
+    """The only pose that the sightings allow, or why none is named."""
+    if len(seen) < FEWEST:
+        return "too few ranges"
+    problem = _Problem(seen, stretch, prior, model)
+    x = problem.descended(problem.starts(), FIRST_STEPS)
+    best = np.argsort(problem.cost(x), kind="stable")[:CARRIED]
+    x = problem.descended(x[best], STEPS)
+    x = x[np.argsort(problem.cost(x), kind="stable")]
+    judged = [problem.judged(row) for row in _distinct(x)[:CANDIDATES]]
+    judged.sort(key=lambda one: one.chi2)
+    first = judged[0]
+    is_poor = not first.chi2 <= POOR_FIT * len(seen) or problem.share_off(first.x) > MOST_OFF
+    if is_poor:
+        return "ranges and odometry disagree"
+    rivals = [one for one in judged[1:] if one.chi2 < first.chi2 + EXCLUDED_CHI2]
+    if len(_distinct(np.array([one.x for one in (first, *rivals)]))) > 1:
+        return "ambiguous"
+    sigma_m = np.sqrt(np.linalg.eigvalsh(first.covariance[:2, :2])[-1])
+    if sigma_m > MAX_SIGMA_M or np.sqrt(first.covariance[2, 2]) > MAX_SIGMA_RAD:
+        return "not enough motion"
+    return problem.placed(first)
+
+
+class _Judged(NamedTuple):
+    """A minimum (3,) with its covariance (3, 3) and chi-squared."""
+
+    x: Array
+    covariance: Array
+    chi2: float
+
+
+class _Problem:
+    """Unknown is x: the place c of the middle of the antenna's way, and the heading theta."""
+
+    def __init__(self, seen: Sightings, stretch: WayUnder, prior: Prior, model: RangeModel) -> None:
+        self._seen, self._stretch, self._prior, self._model = seen, stretch, prior, model
+        self._middle = stretch.antenna.mean(axis=0)
+        self._q = _complex(stretch.antenna - self._middle)
+        self._p = _complex(seen.place)
+        self._begin = complex(*(stretch.begin - self._middle))
+        self._wide = np.hypot(seen.sigma_m, seen.bias_m)
+        self._root = np.linalg.inv(np.linalg.cholesky(prior.covariance + 1e-4 * np.eye(2)))
+
+    def starts(self) -> Array:
+        """(m, 3)."""
+        angles = np.arange(6) * np.pi / 3
+        ring = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        places = [
+            self._prior.place + share * self._prior.reach_m * ring[: 6 if share else 1]
+            for share in RINGS
+        ]
+        headings = np.arange(HEADINGS) * 2 * np.pi / HEADINGS
+        at = np.repeat(np.concatenate(places), HEADINGS, axis=0)
+        theta = np.tile(headings, len(at) // HEADINGS)
+        middle = _complex(at) - np.exp(1j * theta) * self._begin
+        return np.column_stack([middle.real, middle.imag, theta])
+
+    def _linear(self, x: Array) -> tuple[Array, Array]:
+        """Residuals (m, k) and their derivatives (m, k, 3)."""
+        turn = np.exp(1j * x[:, 2])[:, None]
+        arm = turn * self._q
+        sight = self._p - (x[:, 0] + 1j * x[:, 1])[:, None] - arm
+        distance = np.maximum(np.abs(sight), 1e-6)
+        u = sight / distance
+        by_turn = -(np.conj(u) * 1j * arm).real
+        return distance - self._seen.range_m, np.stack([-u.real, -u.imag, by_turn], axis=-1)
+
+    def _before(self, x: Array) -> tuple[Array, Array]:
+        """The whitened distance (m, 2) to where the robot was, and its derivatives (m, 2, 3)."""
+        arm = np.exp(1j * x[:, 2]) * self._begin
+        off = np.stack([x[:, 0] + arm.real, x[:, 1] + arm.imag], axis=-1) - self._prior.place
+        j = np.zeros((len(x), 2, 3))
+        j[:, 0, 0] = j[:, 1, 1] = 1.0
+        j[:, 0, 2], j[:, 1, 2] = -arm.imag, arm.real
+        return off @ self._root.T, np.einsum("ij,mjk->mik", self._root, j)
+
+    def cost(self, x: Array) -> Array:
+        """(m,) 2 log-likelihood, robust, as if all ranges were independent."""
+        e, _ = self._linear(x)
+        before, _ = self._before(x)
+        of_ranges = self._robust((e / self._wide) ** 2).sum(axis=1)
+        return np.asarray(of_ranges + self._robust((before**2).sum(axis=1)))
+
+    def _robust(self, squares: Array) -> Array:
+        c2 = self._model.cauchy_sigmas**2
+        return np.asarray(c2 * np.log1p(squares / c2))
+
+    def _weight(self, squares: Array) -> Array:
+        return np.asarray(1 / (1 + squares / self._model.cauchy_sigmas**2))
+
+    def descended(self, x: Array, steps: int) -> Array:
+        """Gauss-Newton's steps from (m, 3), damped and bounded."""
+        for _ in range(steps):
+            e, j = self._linear(x)
+            before, by = self._before(x)
+            w = self._weight((e / self._wide) ** 2) / self._wide**2
+            v = self._weight((before**2).sum(axis=1))[:, None]
+            normal = np.einsum("mki,mk,mkj->mij", j, w, j)
+            normal = normal + np.einsum("mki,mkj->mij", by * v[..., None], by)
+            g = np.einsum("mki,mk->mi", j, w * e) + np.einsum("mki,mk->mi", by, v * before)
+            diagonal = np.einsum("mii->mi", normal)
+            normal = normal + (DAMPING * diagonal + 1e-9)[:, :, None] * np.eye(3)
+            step = -np.linalg.solve(normal, g[..., None])[..., 0]
+            size = np.abs(step).max(axis=1, keepdims=True)
+            x = x + step * np.minimum(1.0, LONGEST / (size + 1e-12))
+        return x
+
+    def judged(self, x: Array) -> _Judged:
+        """A minimum (3,) under the noise of all ranges together."""
+        for _ in range(3):
+            e, j = (part[0] for part in self._linear(x[None]))
+            before, by = (part[0] for part in self._before(x[None]))
+            covariance = self._noise(e, j, x)
+            weighted = np.linalg.solve(covariance, np.column_stack([j, e]))
+            v = float(self._weight(before @ before))
+            normal = j.T @ weighted[:, :3] + v * by.T @ by
+            spread = np.linalg.inv(normal + 1e-9 * np.eye(3))
+            step = -spread @ (j.T @ weighted[:, 3] + v * by.T @ before)
+            x = x + step * min(1.0, LONGEST / (float(np.abs(step).max()) + 1e-12))
+        chi2 = float(e @ weighted[:, 3] + self._robust(before @ before))
+        x[2] = float(se2.wrap(x[2]))
+        return _Judged(x, spread, chi2)
+
+    def _noise(self, e: Array, j: Array, x: Array) -> Array:
+        """(k, k) of the residuals: ranges share their errors with those before, with all of the
+        same peer, and all of them the scale of the odometry."""
+        seen, noise, model = self._seen, self._stretch.noise, self._model
+        seconds = (seen.utime - seen.utime[0]) / 1e6
+        same = seen.peer[:, None] == seen.peer
+        covariance = model.correlated_covariance(seconds, 1.0)
+        covariance = covariance * np.outer(seen.sigma_m, seen.sigma_m)
+        covariance = np.where(same, covariance + np.outer(seen.bias_m, seen.bias_m), 0.0)
+        arm = np.exp(1j * x[2]) * self._q
+        by_scale = (np.conj(_complex(j[:, :2])) * arm).real
+        covariance += noise.scale**2 * np.outer(by_scale, by_scale)
+        way = np.abs(self._stretch.way_m - self._stretch.way_m.mean())
+        drift = noise.translation_per_sqrt_m**2 * way + noise.yaw_rad_per_sqrt_m**2 * way**3 / 3
+        beyond = np.maximum(e**2 - (model.cauchy_sigmas * self._wide) ** 2, 0.0)
+        return np.asarray(covariance + np.diag(drift + beyond))
+
+    def share_off(self, x: Array) -> float:
+        """Share of ranges that (3,) does not explain."""
+        e, _ = self._linear(x[None])
+        return float(np.mean(np.abs(e[0]) > self._model.cauchy_sigmas * self._wide))
+
+    def placed(self, found: _Judged) -> Placed:
+        c, theta = found.x[:2], found.x[2]
+        xy = c - se2.rotate(theta, self._middle)
+        return Placed(np.append(xy, theta), found.covariance, self._middle)
+
+
+def _distinct(x: Array) -> Array:
+    """Rows (m, 3), best first, that are not near a better one."""
+    kept: list[Array] = []
+    for row in x:
+        near = any(
+            np.hypot(*(row - other)[:2]) < MERGE_M and abs(se2.wrap(row[2] - other[2])) < MERGE_RAD
+            for other in kept
+        )
+        if not near:
+            kept.append(row)
+    return np.array(kept)
+
+
+def _complex(points: Array) -> Array:
+    return np.asarray(points[..., 0] + 1j * points[..., 1])

@@ -1,0 +1,91 @@
+"""A segment of odometry is placed by ranges to peers whose places are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drslamd.slam.odometry.noise import OdometryNoise
+from drslamd.slam.range_model import LINKTRACK
+from drslamd.slam.relocation.placing import FEWEST, Placed, Prior, WayUnder, place
+from drslamd.slam.relocation.sightings import Sightings
+
+NOISE = OdometryNoise(0.02, 0.002, 0.01, 0.008)
+W_T_O = np.array([4.0, -1.0, 2.2])
+
+
+def driven(
+    way_m: float, off_m: float = 0.0, every: int = 4, count: int = 20
+) -> tuple[Sightings, WayUnder]:
+    """A quarter of a circle as long as that, under ranges to two peers that stand; one range
+    in so many is off."""
+    along = np.linspace(0, 1, count)
+    radius = max(way_m, 1e-3) / (np.pi / 2)
+    q = radius * np.stack([np.sin(along * np.pi / 2), 1 - np.cos(along * np.pi / 2)], axis=-1)
+    turn = np.array([[np.cos(2.2), -np.sin(2.2)], [np.sin(2.2), np.cos(2.2)]])
+    true = W_T_O[:2] + q @ turn.T
+    beacons = np.array([[0.0, 0.0], [6.0, 5.0]])[np.arange(count) % 2]
+    metres = np.hypot(*(true - beacons).T)
+    metres[::every] += off_m
+    seconds = along * way_m / 0.5
+    seen = Sightings(
+        seconds * 1e6,
+        beacons,
+        metres,
+        np.full(count, 0.05),
+        np.full(count, 0.05),
+        np.arange(count) % 2,
+    )
+    return seen, WayUnder(q, q[0], along * way_m, NOISE)
+
+
+def prior(sigma_m: float = 0.3, off_m: float = 0.0) -> Prior:
+    return Prior(W_T_O[:2] + [off_m, 0.0], sigma_m**2 * np.eye(2), 5.0)
+
+
+def test_three_metres_of_a_curve_have_one_place() -> None:
+    found = place(*driven(3.0), prior(), LINKTRACK)
+    assert isinstance(found, Placed)
+    assert found.w_T_o == pytest.approx(W_T_O, abs=0.05)
+    assert found.covariance[2, 2] < np.radians(8.0) ** 2
+
+
+@pytest.mark.parametrize(("every", "is_named"), [(4, True), (3, False)])
+def test_a_quarter_of_the_ranges_may_be_off(every: int, is_named: bool) -> None:
+    found = place(*driven(3.0, 2.5, every), prior(), LINKTRACK)
+    if is_named:
+        assert isinstance(found, Placed)
+        assert found.w_T_o == pytest.approx(W_T_O, abs=0.05)
+    else:
+        assert found == "ranges and odometry disagree"
+
+
+def test_who_has_hardly_moved_has_no_heading() -> None:
+    assert place(*driven(0.05), prior(), LINKTRACK) == "not enough motion"
+
+
+def test_two_places_that_fit_are_ambiguous() -> None:
+    """On a straight line, and of where it was nothing is known: the other side of the line between
+    both peers fits as well."""
+    seen, stretch = driven(3.0)
+    straight = np.stack([stretch.way_m, 0 * stretch.way_m], axis=-1)
+    turn = np.array([np.cos(2.2), np.sin(2.2)])
+    true = W_T_O[:2] + stretch.way_m[:, None] * turn
+    seen = replace(seen, range_m=np.hypot(*(true - seen.place).T))
+    wide = Prior(np.array([3.0, 2.5]), 25.0 * np.eye(2), 6.0)
+    assert place(seen, replace(stretch, antenna=straight), wide, LINKTRACK) == "ambiguous"
+
+
+@pytest.mark.parametrize("count", [FEWEST - 1, FEWEST])
+def test_few_ranges_name_no_place(count: int) -> None:
+    found = place(*driven(3.0, count=count), prior(), LINKTRACK)
+    assert isinstance(found, Placed) is (count == FEWEST)
+
+
+def test_a_place_before_the_hole_that_is_wrong_never_makes_a_wrong_one_sure() -> None:
+    """It was believed to be on the other side of the line between both peers."""
+    mirrored = Prior(np.array([1.0, 4.0]), 0.01 * np.eye(2), 7.0)
+    found = place(*driven(3.0), mirrored, LINKTRACK)
+    assert isinstance(found, str) or found.w_T_o == pytest.approx(W_T_O, abs=0.1)

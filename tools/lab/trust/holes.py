@@ -1,0 +1,176 @@
+"""A cable is out for twenty seconds: where is the robot said to be meanwhile, and when is it back?
+
+    python -m lab.trust.holes [--seeds 20] [--first 1]
+
+Three robots drive for 70 s; the wheels of robot 1 are silent from 30 to 50 s. Every half second its
+pose is held against the truth at the time that the pose names.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from statistics import median
+
+import numpy as np
+
+from drslamd.gossip.message_types import PoseState
+from drslamd.slam import se2
+from drslamd.slam.graph.estimate import PoseNow
+from lab.play import virtual_team
+from lab.play.playback import equip, robot_config
+from lab.play.simulator import Member, Simulator
+from lab.progress import Progress
+from lab.recordings import world
+from lab.recordings.recording import Array, Recording
+from lab.score import metrics
+
+ROBOT = 1
+SILENT_S, BACK_S, END_S = 30.0, 50.0, 70.0
+LOOK_S = 0.5
+FIRST_S = 3.0
+"""After the cable is out it takes so long until peers' odometry has come."""
+SCENE = world.Scene(
+    robots=3,
+    seconds=END_S,
+    ranges=world.RangeModel(bias=0.05, slow=0.03, burst_share=0.0),
+    odometry=world.OdometryModel(scale=0.01, yaw_deg_per_m=0.05),
+    odometry_hz=20,
+    range_hz=10,
+)
+WRONG_M, WRONG_RAD, WRONG_SIGMAS = 0.5, np.radians(15), 4.0
+INSIDE = 5.99
+"""Chi-squared of two degrees of freedom at 95 %."""
+
+
+@dataclass
+class Hole:
+    """One run.
+
+    Attributes:
+        was_localised: before the hole.
+        silent: error m and squared error by the claimed covariance, per degree of freedom, of each
+            look while the wheels are silent; unsaid: looks at which there was no position.
+        back_s: after the wheels are back, to the first pose with a heading; infinite without.
+        back_m, back_rad: how far off that was; squared: by its covariance of position.
+        wrong: looks after that at which a localised pose is over 0.5 m and four sigmas off.
+    """
+
+    was_localised: bool = False
+    silent: list[tuple[float, float]] = field(default_factory=list)
+    unsaid: int = 0
+    back_s: float = float("inf")
+    back_m: float = float("nan")
+    back_rad: float = float("nan")
+    wrong: int = 0
+
+
+def play(seed: int) -> Hole:
+    """One seed."""
+    recording = world.simulate(SCENE, seed)
+    simulator, hole = _cut(recording, seed), Hole()
+    for now in np.arange(SILENT_S - 1, END_S, LOOK_S).tolist():
+        simulator.run(now)
+        _look(hole, recording, simulator, now)
+    return hole
+
+
+def _cut(recording: Recording, seed: int) -> Simulator:
+    """The team with its devices about to print, but for what the cable keeps."""
+    rng, simulator = np.random.default_rng(seed), Simulator(seed, solve_us=20_000)
+    for robot, device in equip(recording).items():
+        member = simulator.add(robot_config(device, ""), virtual_team.skewed_clock(rng), device)
+        is_cut = [
+            robot == ROBOT and chunk.port == "wheels" and SILENT_S < chunk.t < BACK_S
+            for chunk in device.chunks()
+        ]
+        chunks = [c for c, cut in zip(device.chunks(), is_cut, strict=True) if not cut]
+        simulator.play(member, chunks)
+    return simulator
+
+
+def _look(hole: Hole, recording: Recording, simulator: Simulator, now: float) -> None:
+    member = simulator.members[ROBOT]
+    where = member.robot.whereabouts(member.clock.local(simulator.now))
+    has_heading = where.state in (PoseState.LOCALISED, PoseState.DOUBTFUL)
+    if now < SILENT_S:
+        hole.was_localised = has_heading
+        return
+    is_silent = SILENT_S + FIRST_S < now < BACK_S
+    if where.pose is None:
+        hole.unsaid += is_silent
+        return
+    error = _error(recording, member, where.pose)
+    metres = float(np.hypot(error[0], error[1]))
+    squared = float(error[:2] @ np.linalg.solve(where.pose.covariance[:2, :2], error[:2]))
+    if is_silent:
+        hole.silent.append((metres, squared / 2))
+    if now >= BACK_S and has_heading:
+        if not np.isfinite(hole.back_s):
+            hole.back_s, hole.back_m, hole.back_rad = now - BACK_S, metres, abs(float(error[2]))
+        hole.wrong += metres > WRONG_M and squared > WRONG_SIGMAS**2
+
+
+def _error(recording: Recording, member: Member, stated: PoseNow) -> Array:
+    """(3,) of a pose, at the time that it names and in the frame that it is in."""
+    estimate = member.robot.back.estimate
+    assert estimate is not None
+    t, trails = member.clock.world(stated.utime) / 1e6, recording.trails
+    true = metrics.at_times(trails[ROBOT].t, trails[ROBOT].truth, np.array([t]))[0]
+    error = stated.pose - metrics.relative(trails[estimate.frame.robot].truth[0], true)
+    error[2] = se2.wrap(error[2])
+    return np.asarray(error)
+
+
+def lines(found: list[Hole]) -> list[str]:
+    """What came out, of those that were localised before; empty where nobody was."""
+    runs = [hole for hole in found if hole.was_localised]
+    if not runs:
+        return []
+    looks = [look for hole in runs for look in hole.silent]
+    back = np.array([hole.back_s for hole in runs])
+    first = [hole for hole in runs if np.isfinite(hole.back_s)]
+    return [
+        f"{len(runs)} of {len(found)} runs: robot {ROBOT} was localised before its cable was out",
+        (
+            f"while it is silent: {median(m for m, _ in looks):.2f} m off (median), "
+            f"squared error by its covariance {np.mean([s for _, s in looks]):.2f} (mean), "
+            f"{np.mean([s < INSIDE / 2 for _, s in looks]):.0%} in the 95 % ellipse, "
+            f"{sum(hole.unsaid for hole in runs)} looks without a position"
+        ),
+        (
+            f"localised again within 5 s: {np.mean(back <= 5):.0%}, within 10 s: "
+            f"{np.mean(back <= 10):.0%}, after {np.median(back):.1f} s (median), "
+            f"{back.max():.1f} s (longest)"
+        ),
+        (
+            f"first pose then: at most {max(hole.back_m for hole in first):.2f} m and "
+            f"{np.degrees(max(hole.back_rad for hole in first)):.1f} degrees off; "
+            f"{sum(h.back_m > WRONG_M or h.back_rad > WRONG_RAD for h in first)} of {len(first)} "
+            f"over {WRONG_M} m or {np.degrees(WRONG_RAD):.0f} degrees"
+        ),
+        f"localised poses that are wrong: {sum(hole.wrong for hole in runs)}",
+    ]
+
+
+def holes(seeds: range) -> Iterator[Hole]:
+    """One after the other."""
+    progress = Progress("played", len(seeds), "runs")
+    for done, seed in enumerate(seeds, start=1):
+        yield play(seed)
+        progress(done)
+    progress.end()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=20, metavar="N", help="default: %(default)s")
+    parser.add_argument("--first", type=int, default=1, metavar="N", help="default: %(default)s")
+    asked = parser.parse_args()
+    found = list(holes(range(asked.first, asked.first + asked.seeds)))
+    print("\n".join(lines(found)))
+
+
+if __name__ == "__main__":
+    main()
