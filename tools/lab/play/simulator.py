@@ -12,7 +12,7 @@ import itertools
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -30,6 +30,7 @@ from drslamd.events import (
     SaveDone,
     Send,
     SerialData,
+    Slept,
     Solve,
     Stop,
     Tick,
@@ -239,10 +240,11 @@ class Simulator:
         self._everyone = [member for member in self._everyone if member.running]
 
     def sleep(self, member: Member, seconds: float) -> None:
-        """Suspend a robot's computer: nothing reaches it, and its clock stands meanwhile."""
-        lost_us = round(seconds * 1e6)
-        member.asleep_until = self.now + lost_us
-        member.clock = replace(member.clock, offset_us=member.clock.offset_us - lost_us)
+        """Suspend a robot's computer: nothing reaches it, its clock goes on, and it is told."""
+        asleep_us = round(seconds * 1e6)
+        member.asleep_until = self.now + asleep_us
+        wakes = partial(self.handle, member, lambda utime: Slept(utime, asleep_us))
+        self.at(member.asleep_until, wakes)
         self._tick(member)
 
     def handle(self, member: Member, make: Callable[[int], Event]) -> None:
