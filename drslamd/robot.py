@@ -103,7 +103,7 @@ class Robot:
         self.front = FrontEnd(config, self.own, self.calibration.used, tuning)
         self.back = BackEnd(config, self.own, tuning)
         self.broadcast = Broadcast(config, self.team, self.front, self.back)
-        self.standing = Standing(config, self.own, self.front, self.back)
+        self.standing = Standing(config, self.team, self.front, self.back)
         self.near = Surroundings(config, self.own, self.front, self.back, self.team, self.standing)
         self.outbox = Outbox(config.robot.id, config.gossip.max_bytes_per_s)
         self.health = Health()
@@ -322,7 +322,7 @@ class Robot:
         found = diagnosis.conditions(self, utime)
         notes: list[Effect] = [n for key, why in found for n in self.health.set(key, why, utime)]
         above = self.team.superseded_by
-        if above is None or self.team.is_own_id_used(utime):
+        if above is None or self.team.namesakes.is_own_id_heard(utime):
             return notes
         # our own memory was lost, or a lie is believed
         return [*notes, Restart(above, "peers know a later start of this robot")]

@@ -154,6 +154,8 @@ def _state(robot: Stages) -> str | None:
 def why_not_localised(robot: Stages, utime: int) -> str | None:
     """The first stage at which it stops, None when the robot is localised."""
     where = robot.whereabouts(utime)
+    if robot.team.namesakes.is_own_id_used(utime):
+        return "not localised: another robot uses the id of this one; no other reason counts"
     if where.is_old:
         seconds = where.age_us // SECOND_US
         relocation = robot.front.relocation

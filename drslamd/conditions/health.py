@@ -18,6 +18,7 @@ MAX_CONDITIONS = 512
 
 CAUSES_FIRST = (
     "team.own_id_used",
+    "team.id_used_twice",
     "uwb",
     "wheels",
     "network",

@@ -237,16 +237,6 @@ def test_another_team_key_does_not_merge_and_both_sides_say_so() -> None:
     assert not team.member(2).robot.team.peers
 
 
-@pytest.mark.row("S8")
-def test_two_robots_with_one_id_both_say_so() -> None:
-    team = VirtualTeam(on=(0, 1))
-    team.run(3.0)
-    clone = team.start(1, epoch=7)
-    team.run(6.0)
-    sentences = "\n".join(clone.robot.health.sentences().values())
-    assert "another robot uses id 1" in sentences
-
-
 @pytest.mark.row("S7")
 def test_a_robot_whose_memory_was_lost_begins_above_what_its_peers_know() -> None:
     team = VirtualTeam(on=(0, 1))

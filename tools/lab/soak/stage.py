@@ -37,6 +37,7 @@ class Bench(Simulator):
 
     Attributes:
         seen: the latest datagrams that each robot was given.
+        doubles: robots under an id that belongs to another, by that id.
     """
 
     def __init__(self, stage: Stage, seed: int, extra: str = "") -> None:
@@ -45,6 +46,7 @@ class Bench(Simulator):
         self.rng = np.random.default_rng([seed, 1])
         self.hardware = stage.hardware()
         self.seen: dict[int, deque[bytes]] = {}
+        self.doubles: dict[int, Member] = {}
         self._extra = f'[team]\nkey_file = "team.key"\n{extra}'
         self._disks = {robot: Disk() for robot in self.hardware}
         self.watchers.append(self._remember)
@@ -63,8 +65,19 @@ class Bench(Simulator):
         """A new start of a robot, with what its disk still says."""
         self.forget_ended()
         self.seen[robot] = deque(maxlen=REMEMBERED)
-        device, disk = self.hardware[robot], self._disks[robot]
-        now_s = self.now / 1e6
+        return self._begin(self.hardware[robot], self._disks[robot])
+
+    def double(self, robot: int) -> Member:
+        """Another robot, with a copy of the disk of this one; it is none of `members`."""
+        disk = Disk()
+        disk.state = dict(self._disks[robot].state)
+        first = self.members[robot]
+        second = self.doubles[robot] = self._begin(self.stage.hardware()[robot], disk)
+        self.members[robot] = first
+        return second
+
+    def _begin(self, device: Hardware, disk: Disk) -> Member:
+        robot, now_s = device.robot, self.now / 1e6
         epoch = next_epoch(
             disk.state.get("epoch", 0), WALL_S + int(now_s), int(self.rng.integers(1_000_000))
         )
@@ -162,3 +175,7 @@ def _wired(wirings: list[Wiring], t: Array, left: Array, right: Array) -> tuple[
     for wiring in wirings:
         left, right = wiring(t, left, right)
     return left, right
+
+
+Put = Callable[[Stage, float], None]
+"""Puts a fault onto a stage, in a dose."""
