@@ -23,6 +23,7 @@ CAUSES_FIRST = (
     "wheels",
     "network",
     "sleep",
+    "team.flood",
     "team.recording",
     "team.wrong_tag",
     "team.wrong_version",

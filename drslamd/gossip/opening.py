@@ -62,3 +62,15 @@ def opened(seal: Seal, event: Datagram | ChannelMessage) -> Outcome:
     if channel != messages.channel(kind, verdict.origin):
         return "channel of another robot"
     return Opened(verdict, message, payload, fault)
+
+
+def is_news_of_a_member(seal: Seal, data: bytes) -> bool:
+    """Is it proven, and none that came before? Entries of logs, which may come again, are not."""
+    framed = lc02.decode(data)
+    if isinstance(framed, lc02.FramingFault):
+        return False
+    channel, payload = framed
+    kind = messages.kind_of_channel(channel)
+    if kind is None or kind == "GRAPH":
+        return False
+    return isinstance(seal.judge(channel, payload, _FINGERPRINTS[kind]), Header)

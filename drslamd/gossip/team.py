@@ -13,6 +13,7 @@ from drslamd.gossip.entries.chapter_writer import ChapterWriter
 from drslamd.gossip.log_repeats import Place
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.membership.acquaintance import Acquaintance, vouched
+from drslamd.gossip.membership.flood import SHARE, Flood
 from drslamd.gossip.membership.namesakes import Namesakes, unanswered
 from drslamd.gossip.membership.refusals import Fault, Refusals
 from drslamd.gossip.message_types import Received
@@ -47,8 +48,13 @@ class Team:
         last_echo: when we last heard ourselves, which proves that the network carries us.
     """
 
-    def __init__(self, seal: Seal) -> None:
+    def __init__(self, seal: Seal, share: int = SHARE) -> None:
+        """
+        Args:
+            share: bytes a second that are heard of one robot.
+        """
         self.seal = seal
+        self.flood = Flood(share)
         self.own = Chain(seal.robot, seal.epoch)
         self.logs = LogSync(seal.robot)
         self.peers: dict[int, Peer] = {}
@@ -186,6 +192,12 @@ class Team:
         if isinstance(message, GraphEntry) and not self._is_near(origin, message.seq):
             self.refused["entry far ahead of its log"] += 1
             return None
+        # entries of the past come through others, at their cost
+        is_late = isinstance(message, GraphEntry) and message.seq < self.logs.end(origin)
+        room = is_late or self.flood.leaves_room(origin.robot, len(payload), event.utime)
+        if not room:
+            self.refused["more than the share of one robot"] += 1
+            return None
         self.seal.accept(header, once=not isinstance(message, GraphEntry))
         return self._sort(header, message, payload, event.utime)
 
@@ -321,6 +333,7 @@ class Team:
         return [
             *self.refusals.conditions(utime),
             *self.namesakes.conditions(utime),
+            ("team.flood", self.flood.sentence(utime)),
             ("team.recording", self.acquaintance.recording(utime)),
             ("team.uwb_id", shared_module(self.peers.values(), utime)),
         ]

@@ -9,7 +9,7 @@ from message_builders import OTHER_SECRET, SECOND, a_seal, a_status, an_entry, f
 
 from drslamd.events import ChannelMessage, Datagram
 from drslamd.gossip import lc02
-from drslamd.gossip.opening import Opened, opened
+from drslamd.gossip.opening import Opened, is_news_of_a_member, opened
 from drslamd.gossip.seal import Seal, SealFault, team_key
 
 T0 = 100 * SECOND
@@ -63,3 +63,25 @@ def test_each_reason_has_its_words() -> None:
     assert opened(seal, ChannelMessage(T0, "CHAT", payload)) == "channel of another program"
     assert opened(seal, ChannelMessage(T0, "DRSLAM_NEAR_003", payload)) is None
     assert opened(seal, ChannelMessage(T0, channel, payload[:20])) is SealFault.TOO_SHORT
+
+
+def test_what_is_proven_and_new_is_news_of_a_member() -> None:
+    seal = own_seal()
+
+    def framed(channel: str, payload: bytes) -> bytes:
+        return lc02.encode(7, channel, payload)
+
+    new = framed(*forged(a_status(), epoch=5))
+    assert is_news_of_a_member(seal, new)
+    found = opened(seal, Datagram(T0, new))
+    assert isinstance(found, Opened)
+    seal.accept(found.header)
+    assert not is_news_of_a_member(seal, new)
+    others = (
+        framed(*forged(a_status(), epoch=5, counter=2, secret=OTHER_SECRET)),
+        framed(*forged(an_entry(0, 1), epoch=5, counter=3)),
+        framed(*forged(a_status(), robot=1, epoch=10, counter=4)),
+        framed("CHAT", b"hello"),
+        b"",
+    )
+    assert not any(is_news_of_a_member(seal, data) for data in others)
