@@ -66,8 +66,6 @@ from drslamd.standing import Standing
 from drslamd.timers import PLACE_US, POLL_US, REPEAT_US, SAVE_US, TURN_US, Action, Timers
 from drslamd.whereabouts import Whereabouts
 
-SHARES = 2
-"""What is heard of one robot, in budgets of ours: a team is configured alike, or nearly so."""
 GOODBYES = 3
 """Last messages of an orderly stop; at 30 % loss one gets through in 97 % of cases."""
 
@@ -92,15 +90,14 @@ class Robot:
             epoch: of this start, above all earlier ones.
             epochs: last known epoch of each peer, from before this start.
             kept: what the last start learned of our sensors; taped: what a person measured.
-            dbc_text: content of `wheels.dbc_file`, where there is one.
-            tuning: of the estimator.
+            dbc_text: content of `wheels.dbc_file`, if there is one. tuning: of the estimator.
         """
         self.config = config
         self.own = Chain(config.robot.id, epoch)
         self.uwb = LinkTrackInput(config.uwb_id, config.uwb.max_range_m)
         self.wheels = WheelInput(config.wheels, dbc_text)
-        share = SHARES * config.gossip.max_bytes_per_s
-        self.team = Team(Seal(key, config.robot.id, epoch, epochs), share)
+        seal = Seal(key, config.robot.id, epoch, epochs)
+        self.team = Team(seal, config.gossip.max_bytes_per_s)
         uses_kept = closure_method(config.relative_pose).uses_calibration
         self.calibration = CalibrationStore(kept, uses_kept, taped)
         self.front = FrontEnd(config, self.own, self.calibration.used, tuning)
@@ -156,6 +153,8 @@ class Robot:
     def handle(self, event: Event) -> list[Effect]:
         """Take one event; what follows from it."""
         effects, outbox = self._handlers[type(event)](event), self.outbox
+        if self.memory.is_listening(event.utime):
+            return [e for e in effects if not isinstance(e, Send)]
         return [e for e in effects if not isinstance(e, Send) or outbox.passes(e, event.utime)]
 
     # sensors
@@ -334,6 +333,7 @@ class Robot:
 
     def _on_tick(self, event: Tick) -> list[Effect]:
         due = self.timers.take_due(event.utime)
+        due = [self._check_health] if self.memory.is_listening(event.utime) else due
         return [effect for action in due for effect in action(event.utime)]
 
     def _on_slept(self, event: Slept) -> list[Effect]:

@@ -128,6 +128,11 @@ class Seal:
         self._counter = 0
 
     @property
+    def has_spoken(self) -> bool:
+        """Was any message made under this epoch?"""
+        return self._counter > 0
+
+    @property
     def is_spent(self) -> bool:
         """Will this epoch soon have no more counters?"""
         return self._counter > SPENT_COUNTER

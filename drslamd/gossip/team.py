@@ -13,7 +13,7 @@ from drslamd.gossip.entries.chapter_writer import ChapterWriter
 from drslamd.gossip.log_repeats import Place
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.membership.acquaintance import Acquaintance, vouched
-from drslamd.gossip.membership.flood import SHARE, Flood
+from drslamd.gossip.membership.flood import BUDGET, Flood
 from drslamd.gossip.membership.namesakes import Namesakes, unanswered
 from drslamd.gossip.membership.refusals import Fault, Refusals
 from drslamd.gossip.message_types import Received
@@ -48,13 +48,13 @@ class Team:
         last_echo: when we last heard ourselves, which proves that the network carries us.
     """
 
-    def __init__(self, seal: Seal, share: int = SHARE) -> None:
+    def __init__(self, seal: Seal, budget: int = BUDGET) -> None:
         """
         Args:
-            share: bytes a second that are heard of one robot.
+            budget: bytes a second that robots of this team may say.
         """
         self.seal = seal
-        self.flood = Flood(share)
+        self.flood = Flood(budget)
         self.own = Chain(seal.robot, seal.epoch)
         self.logs = LogSync(seal.robot)
         self.peers: dict[int, Peer] = {}

@@ -25,8 +25,8 @@ from drslamd.gossip import lc02
 from drslamd.gossip.shares import Shares
 from drslamd.host.interfaces import NO_ADDRESS, SYSFS, address_of, fault_of
 from drslamd.io.backoff import Backoff
-from drslamd.io.callers import Callers
 from drslamd.io.clock import Clock
+from drslamd.io.watch.callers import Callers
 
 IP_MULTICAST_ALL = 49
 """Linux, <linux/in.h>; the socket module does not name it."""

@@ -20,9 +20,10 @@ from transport_helpers import GROUP, Ear, in_a_loop, native, running, section, s
 from drslamd.config import GossipSection
 from drslamd.events import Datagram, NetworkState
 from drslamd.gossip import lc02
-from drslamd.io import callers, multicast
+from drslamd.io import multicast
 from drslamd.io.clock import MonotonicClock
 from drslamd.io.multicast import IP_MULTICAST_ALL, Multicast, is_own, open_group, own_address
+from drslamd.io.watch import callers
 
 LONGEST_GAP_S = 0.05
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from drslamd.conventions import MAX_ROBOT_ID
 from drslamd.gossip.shares import Shares
 
-SHARE = 100_000
-"""Bytes a second of one robot: twice what its budget lets out by default."""
+BUDGET = 50_000
+"""Bytes a second, as a robot lets out by default."""
+BUDGETS = 2
+"""That are heard of one robot: a team is configured alike, or nearly so."""
 LEAST_COST = 250
 """Bytes that the smallest message counts for: it takes as long to judge as a longer one."""
 AT_ONCE_S = 4
@@ -16,11 +18,12 @@ AT_ONCE_S = 4
 class Flood:
     """What is heard of each robot."""
 
-    def __init__(self, share: int) -> None:
+    def __init__(self, budget: int) -> None:
         """
         Args:
-            share: bytes a second of one robot.
+            budget: bytes a second that our own says, and the others' should say.
         """
+        share = BUDGETS * budget
         self._shares: Shares[int] = Shares(share, AT_ONCE_S * share, MAX_ROBOT_ID + 1)
 
     def leaves_room(self, robot: int, size: int, utime: int) -> bool:

@@ -8,7 +8,7 @@ from message_builders import SECOND, a_seal, an_entry, kinds, sealed
 
 from drslamd.conventions import Chain
 from drslamd.events import ChannelMessage
-from drslamd.gossip.membership.flood import AT_ONCE_S, LEAST_COST, SHARE, Flood
+from drslamd.gossip.membership.flood import AT_ONCE_S, BUDGET, BUDGETS, LEAST_COST, Flood
 from drslamd.gossip.team import Team
 
 T0 = 100 * SECOND
@@ -20,7 +20,7 @@ def test_of_a_member_at_a_hundred_times_its_share_the_others_notice_nothing() ->
     team = introduce(Team(a_seal(1)), Chain(3, 1), Chain(4, 1), utime=T0)
     loud, honest, pose = a_seal(3), a_seal(4), kinds()["POSE"]
     size = len(sealed(a_seal(3), pose)[1])
-    each_s = SHARE // max(size, LEAST_COST)
+    each_s = BUDGETS * BUDGET // max(size, LEAST_COST)
     heard = 0
     for second in range(3):
         for k in range(5 * each_s):
@@ -36,7 +36,7 @@ def test_of_a_member_at_a_hundred_times_its_share_the_others_notice_nothing() ->
 
 
 def test_log_entries_of_the_past_come_through_others_and_cost_their_owner_nothing() -> None:
-    team = introduce(Team(a_seal(1), share=LEAST_COST), Chain(3, 1))
+    team = introduce(Team(a_seal(1), budget=LEAST_COST // BUDGETS), Chain(3, 1))
     seal = a_seal(3)
     entries = [sealed(seal, an_entry(seq, seq)) for seq in range(20)]
     assert team.receive(ChannelMessage(T0, *entries[-1])) is not None
@@ -49,7 +49,7 @@ def test_log_entries_of_the_past_come_through_others_and_cost_their_owner_nothin
 
 
 def test_short_messages_cost_as_much_as_longer_ones() -> None:
-    flood = Flood(share=LEAST_COST)
+    flood = Flood(budget=LEAST_COST // BUDGETS)
     assert [flood.leaves_room(3, 1, T0) for _ in range(5)] == [True] * 4 + [False]
     assert not flood.leaves_room(4, AT_ONCE_S * LEAST_COST + 1, T0)
     assert flood.leaves_room(5, AT_ONCE_S * LEAST_COST, T0)

@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from drslamd.events import Datagram, Effect, Event
+from drslamd.events import Datagram, Effect, Event, SaveDone
 from drslamd.gossip.epochs import next_epoch
 from drslamd.slam.calibration.sensor_calibration import SensorCalibration
 from lab.play.playback import Chunk, Hardware, Wiring, equip, robot_config
@@ -83,7 +83,7 @@ class Bench(Simulator):
         )
         epochs = dict(disk.state.get("epochs", {}))
         kept = SensorCalibration.of_state(disk.state.get("calibration", {}))
-        disk.keep({**disk.state, "epoch": epoch})
+        fault = disk.keep({**disk.state, "epoch": epoch})
         member = self.add(
             robot_config(device, self._extra),
             self.stage.clocks[robot],
@@ -95,6 +95,8 @@ class Bench(Simulator):
             disk=disk,
         )
         member.hears = partial(self._on_line, self.stage.lines.get(robot, []))
+        if fault:
+            self.handle(member, lambda utime: SaveDone(utime, fault))
         self.play(member, self.stage.chunks(device, now_s))
         return member
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drslamd.io.callers import GONE_S, MOST, SILENT_S, Callers
+from drslamd.io.watch.callers import GONE_S, MOST, SILENT_S, Callers
 
 
 def test_while_nobody_is_heard_somebody_is_missed() -> None:
