@@ -49,10 +49,7 @@ class Team:
     """
 
     def __init__(self, seal: Seal, budget: int = BUDGET) -> None:
-        """
-        Args:
-            budget: bytes a second that robots of this team may say.
-        """
+        """`budget`: bytes a second that robots of this team may say."""
         self.seal = seal
         self.flood = Flood(budget)
         self.own = Chain(seal.robot, seal.epoch)
@@ -194,8 +191,7 @@ class Team:
             return None
         # entries of the past come through others, at their cost
         is_late = isinstance(message, GraphEntry) and message.seq < self.logs.end(origin)
-        room = is_late or self.flood.leaves_room(origin.robot, len(payload), event.utime)
-        if not room:
+        if not (is_late or self.flood.leaves_room(origin.robot, len(payload), event.utime)):
             self.refused["more than the share of one robot"] += 1
             return None
         self.seal.accept(header, once=not isinstance(message, GraphEntry))
@@ -232,7 +228,7 @@ class Team:
         if isinstance(message, Status):
             self.acquaintance.read(origin, message, event.utime)
             # who holds us for a later start does not hear us, and cannot answer
-            self.starts.on_status(origin.robot, message, self._next_seq, event.utime)
+            self.starts.on_status(origin.robot, message, self._said, event.utime)
         return False
 
     def meet(self, origin: Chain, counter: int, utime: int) -> None:
@@ -288,7 +284,11 @@ class Team:
             self.logs.repeats.pace.reckon([p.usual_loss for p in self.living(utime).values()])
             self.logs.on_states(status.logs, peer.chain.robot, utime)
             self._chapters.on_states(self.own, status.logs)
-        self.starts.on_status(peer.chain.robot, status, self._next_seq, utime)
+        self.starts.on_status(peer.chain.robot, status, self._said, utime)
+
+    @property
+    def _said(self) -> int | None:
+        return self._next_seq if self.seal.has_spoken else None
 
     @property
     def superseded_by(self) -> int | None:
@@ -301,8 +301,7 @@ class Team:
         return self.seal.is_spent or self._next_seq >= LAST_SEQ
 
     def living(self, utime: int) -> dict[int, Peer]:
-        """Peers that are alive, hear us, and are the only ones of their id; nobody while we are not
-        the only one of ours."""
+        """Peers that are alive, hear us and share no id; nobody while we share ours."""
         twice = self.namesakes.twice(utime)
         if self.own.robot in twice:
             return {}
