@@ -33,6 +33,7 @@ from drslamd.events import (
     Tick,
     Write,
 )
+from drslamd.gossip.opening import is_news_of_a_member
 from drslamd.gossip.seal import team_key
 from drslamd.io.clock import Clock, MonotonicClock, cpu_s
 from drslamd.io.near_socket import NearSocket
@@ -92,7 +93,8 @@ class Daemon:
         self._ends: Robot | None = None
         """The robot in whose place another one is about to begin."""
         self._may_restart_at, self._restart_apart = 0, RESTARTS_APART_US
-        self._transport = make_transport(config, self._clock, self.handle)
+        is_news = lambda data: is_news_of_a_member(self.robot.team.seal, data)  # noqa: E731
+        self._transport = make_transport(config, self._clock, self.handle, is_news)
         self._wheels = make_wheels(config, self._clock, self.handle)
         self._uwb = SerialPort("uwb", config.uwb.port, config.uwb.baud, self._clock, self.handle)
         self._pace = Pace()
@@ -290,13 +292,14 @@ class Daemon:
 
     def _complaints(self) -> list[str]:
         """What only the process knows to be wrong."""
-        slow = slow_disk(self._disk)
-        return [*([slow] if slow else []), *self._recorder.problems()]
+        said = (slow_disk(self._disk), self._transport.complaint(), *self._recorder.problems())
+        return [sentence for sentence in said if sentence]
 
     def _picture(self) -> dict[str, Any]:
         """The robot's own picture, and what only the process knows."""
         picture = report.status(self.robot, self._clock.now())
         picture["network"]["dropped"] = self._transport.dropped
+        picture["network"]["flooded"] = self._transport.flooded
         picture["cpu_s"] = round(cpu_s(), 3)
         picture["recording"] = self._recorder.status()
         picture["problems"] += self._complaints()

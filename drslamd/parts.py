@@ -66,8 +66,16 @@ def stays_on_this_host(section: GossipSection) -> bool:
     return section.ttl == 0 or section.interface == "lo" or section.interface.startswith("127.")
 
 
-def make_transport(config: Config, clock: Clock, handle: Handle) -> Transport:
+def make_transport(
+    config: Config,
+    clock: Clock,
+    handle: Handle,
+    is_news: Callable[[bytes], bool] = lambda data: False,
+) -> Transport:
     """
+    Args:
+        is_news: is a datagram proven to be a robot's, and new?
+
     Raises:
         ConfigError: the chosen package is not installed.
     """
@@ -75,7 +83,7 @@ def make_transport(config: Config, clock: Clock, handle: Handle) -> Transport:
     if section.provider == "liblcm":
         require_lcm()
         return Liblcm(section, clock, handle)
-    return Multicast(section, clock, handle)
+    return Multicast(section, clock, handle, is_news)
 
 
 def make_wheels(config: Config, clock: Clock, handle: Handle) -> SerialPort | CanBus:

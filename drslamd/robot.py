@@ -90,20 +90,20 @@ class Robot:
             epoch: of this start, above all earlier ones.
             epochs: last known epoch of each peer, from before this start.
             kept: what the last start learned of our sensors; taped: what a person measured.
-            dbc_text: content of `wheels.dbc_file`, where there is one.
-            tuning: of the estimator.
+            dbc_text: content of `wheels.dbc_file`, if there is one. tuning: of the estimator.
         """
         self.config = config
         self.own = Chain(config.robot.id, epoch)
         self.uwb = LinkTrackInput(config.uwb_id, config.uwb.max_range_m)
         self.wheels = WheelInput(config.wheels, dbc_text)
-        self.team = Team(Seal(key, config.robot.id, epoch, epochs))
+        seal = Seal(key, config.robot.id, epoch, epochs)
+        self.team = Team(seal, config.gossip.max_bytes_per_s)
         uses_kept = closure_method(config.relative_pose).uses_calibration
         self.calibration = CalibrationStore(kept, uses_kept, taped)
         self.front = FrontEnd(config, self.own, self.calibration.used, tuning)
         self.back = BackEnd(config, self.own, tuning)
         self.broadcast = Broadcast(config, self.team, self.front, self.back)
-        self.standing = Standing(config, self.own, self.front, self.back)
+        self.standing = Standing(config, self.team, self.front, self.back)
         self.near = Surroundings(config, self.own, self.front, self.back, self.team, self.standing)
         self.outbox = Outbox(config.robot.id, config.gossip.max_bytes_per_s)
         self.health = Health()
@@ -153,6 +153,8 @@ class Robot:
     def handle(self, event: Event) -> list[Effect]:
         """Take one event; what follows from it."""
         effects, outbox = self._handlers[type(event)](event), self.outbox
+        if self.memory.is_listening(event.utime):
+            return [e for e in effects if not isinstance(e, Send)]
         return [e for e in effects if not isinstance(e, Send) or outbox.passes(e, event.utime)]
 
     # sensors
@@ -322,7 +324,7 @@ class Robot:
         found = diagnosis.conditions(self, utime)
         notes: list[Effect] = [n for key, why in found for n in self.health.set(key, why, utime)]
         above = self.team.superseded_by
-        if above is None or self.team.is_own_id_used(utime):
+        if above is None or self.team.namesakes.is_own_id_heard(utime):
             return notes
         # our own memory was lost, or a lie is believed
         return [*notes, Restart(above, "peers know a later start of this robot")]
@@ -331,6 +333,7 @@ class Robot:
 
     def _on_tick(self, event: Tick) -> list[Effect]:
         due = self.timers.take_due(event.utime)
+        due = [self._check_health] if self.memory.is_listening(event.utime) else due
         return [effect for action in due for effect in action(event.utime)]
 
     def _on_slept(self, event: Slept) -> list[Effect]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from drslamd.config import Config
-from drslamd.conventions import Chain
+from drslamd.gossip.team import Team
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.doubt import Doubt, Partners, doubt_of, doubted_partners
 from drslamd.slam.front_end import FrontEnd
@@ -14,15 +14,15 @@ from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.pose_now import pose_now
 from drslamd.slam.relative_pose.pair_end import PairEnd
 from drslamd.slam.relocation.relocation import Found
-from drslamd.whereabouts import Whereabouts, likely_speeds, whereabouts
+from drslamd.whereabouts import NOWHERE, Whereabouts, likely_speeds, whereabouts
 
 
 class Standing:
     """Of one robot."""
 
-    def __init__(self, config: Config, own: Chain, front: FrontEnd, back: BackEnd) -> None:
-        self._most_mps, self._robot = config.wheels.max_speed_mps, own.robot
-        self._front, self._back = front, back
+    def __init__(self, config: Config, team: Team, front: FrontEnd, back: BackEnd) -> None:
+        self._most_mps, self._robot = config.wheels.max_speed_mps, team.own.robot
+        self._namesakes, self._front, self._back = team.namesakes, front, back
         self._ranges_solve = config.optimizer.algorithm == "banded"
 
     def pose(self) -> PoseNow | None:
@@ -36,7 +36,9 @@ class Standing:
         return found._replace(covariance=found.covariance * self._back.revisions.boldness)
 
     def whereabouts(self, utime: int) -> Whereabouts:
-        """What that pose is worth now."""
+        """What that pose is worth now; nothing while another robot lives under our id."""
+        if self._namesakes.is_own_id_used(utime):
+            return NOWHERE
         track, gap_m = self._front.reckoning.track, self._front.watch.gap_m
         by_ranges = self._front.relocation.by_ranges(utime)
         return whereabouts(

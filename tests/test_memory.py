@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from message_builders import SECRET
 
-from drslamd.conventions import Chain, Segment
+from drslamd.conventions import SECOND_US, Chain, Segment
+from drslamd.events import SaveDone
 from drslamd.gossip.epochs import LAST_KEPT_EPOCH
 from drslamd.gossip.seal import Seal, team_key
 from drslamd.memory import Memory
@@ -66,3 +67,22 @@ def test_what_was_learned_is_written_once_and_again_when_it_has_moved() -> None:
         assert save.state["calibration"] == scene.calibration.latest.state()
         assert scene.calibration.latest.scale.value == pytest.approx(scale)
         assert scene.memory.save() == []
+
+
+@pytest.mark.row("S7")
+def test_a_start_whose_number_could_not_be_kept_listens_for_ten_seconds() -> None:
+    scene = Remembering()
+    memory, t0 = scene.memory, 100 * SECOND_US
+    assert not memory.is_listening(t0)
+    memory.on_saved(SaveDone(t0, ""))
+    assert not memory.is_listening(t0)
+    memory.on_saved(SaveDone(t0, "cannot write it: Read-only file system"))
+    assert memory.is_listening(t0 + 10 * SECOND_US - 1)
+    assert not memory.is_listening(t0 + 10 * SECOND_US)
+
+
+def test_a_disk_that_fails_later_silences_nobody() -> None:
+    scene = Remembering()
+    scene.seal.header(0)
+    scene.memory.on_saved(SaveDone(SECOND_US, "cannot write it: No space left on device"))
+    assert not scene.memory.is_listening(SECOND_US)

@@ -78,7 +78,7 @@ def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
     yield "mounting", _mountings(robot)
     yield "load", _load(robot, utime)
     yield "budget", robot.outbox.condition(utime)
-    yield "state", _state(robot)
+    yield "state", _state(robot, utime)
 
 
 def _sensor(
@@ -142,11 +142,13 @@ def _is_odd(pairs: dict[int, PairTracker], peer: int) -> bool:
     return any(pair.connected and pair.search.found is None for pair in others)
 
 
-def _state(robot: Stages) -> str | None:
-    if not robot.memory.fault:
+def _state(robot: Stages, utime: int) -> str | None:
+    memory = robot.memory
+    if not memory.fault:
         return None
+    listens = "this start only listens for ten seconds, and " if memory.is_listening(utime) else ""
     return (
-        f"{robot.memory.fault}: the next start will not know what this one learned, nor its "
+        f"{memory.fault}: {listens}the next start will not know what this one learned, nor its "
         "number; make room, make the folder writable, or name another in daemon.state_dir"
     )
 
@@ -154,6 +156,8 @@ def _state(robot: Stages) -> str | None:
 def why_not_localised(robot: Stages, utime: int) -> str | None:
     """The first stage at which it stops, None when the robot is localised."""
     where = robot.whereabouts(utime)
+    if robot.team.namesakes.is_own_id_used(utime):
+        return "not localised: another robot uses the id of this one; no other reason counts"
     if where.is_old:
         seconds = where.age_us // SECOND_US
         relocation = robot.front.relocation

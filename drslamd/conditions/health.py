@@ -18,10 +18,12 @@ MAX_CONDITIONS = 512
 
 CAUSES_FIRST = (
     "team.own_id_used",
+    "team.id_used_twice",
     "uwb",
     "wheels",
     "network",
     "sleep",
+    "team.flood",
     "team.recording",
     "team.wrong_tag",
     "team.wrong_version",

@@ -128,6 +128,11 @@ class Seal:
         self._counter = 0
 
     @property
+    def has_spoken(self) -> bool:
+        """Was any message made under this epoch?"""
+        return self._counter > 0
+
+    @property
     def is_spent(self) -> bool:
         """Will this epoch soon have no more counters?"""
         return self._counter > SPENT_COUNTER
@@ -182,10 +187,14 @@ class Seal:
             return SealFault.OLD_EPOCH
         if once and not self._window(header).is_new(header.counter):
             return SealFault.SEEN
-        proof = _tag(_origin_key(self._key, header.origin), channel, message)
-        if not hmac.compare_digest(message[_TAG_AT : _HEADER.size], proof):
+        if not self.is_proven(header, channel, message):
             return SealFault.WRONG_TAG
         return SealFault.OWN_ID_USED if ours else header
+
+    def is_proven(self, header: Header, channel: str, message: bytes) -> bool:
+        """Did somebody with the key make this message, whose header this is?"""
+        proof = _tag(_origin_key(self._key, header.origin), channel, message)
+        return hmac.compare_digest(message[_TAG_AT : _HEADER.size], proof)
 
     def _window(self, header: Header) -> ReplayWindow:
         """The window that a message belongs to; every epoch begins with an empty one."""

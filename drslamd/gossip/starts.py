@@ -72,11 +72,12 @@ class Starts:
             return StartFault.BEYOND_CLOCKS
         return None
 
-    def on_status(self, sender: int, status: Status, said: int, utime: int) -> None:
+    def on_status(self, sender: int, status: Status, said: int | None, utime: int) -> None:
         """A peer says which starts it knows: is there one of ours that we do not?
 
         Args:
-            said: how many entries our log has.
+            said: how many entries our log has; None while this start has not said a word, so that
+                whoever knows it knows another of the same number.
         """
         own = self._own
         heard = {h.epoch for h in status.heard if h.id == own.robot}
@@ -84,7 +85,9 @@ class Starts:
         later = heard | {log.epoch for log in logs}
         # who hears this start has not taken a later one for ours
         named = set() if own.epoch in heard else {e for e in later if e > own.epoch}
-        if any(log.epoch == own.epoch and log.first < log.complete > said for log in logs):
+        if said is None:
+            named = {e for e in later if e >= own.epoch}
+        elif any(log.epoch == own.epoch and log.first < log.complete > said for log in logs):
             named.add(own.epoch)  # it holds what we never said: this epoch was used before
         # whoever was lied high and lost its memory comes back there step by step
         most = min(highest_believed(own.epoch), LAST_KEPT_EPOCH - 2 * SECOND_US)

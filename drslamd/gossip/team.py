@@ -7,20 +7,23 @@ from collections.abc import Container, Iterator, Sequence, Set
 
 from drslamd.conventions import SECOND_US, Chain
 from drslamd.events import ChannelMessage, Datagram, Send
-from drslamd.gossip import lc02, messages
+from drslamd.gossip import messages
 from drslamd.gossip.bounds import LAST_SEQ, Measurement, is_sayable
 from drslamd.gossip.entries.chapter_writer import ChapterWriter
-from drslamd.gossip.lc02 import MAX_PAYLOAD
 from drslamd.gossip.log_repeats import Place
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.membership.acquaintance import Acquaintance, vouched
-from drslamd.gossip.membership.refusals import Refusals
-from drslamd.gossip.message_types import UNANSWERED, Received
+from drslamd.gossip.membership.flood import BUDGET, Flood
+from drslamd.gossip.membership.namesakes import Namesakes, unanswered
+from drslamd.gossip.membership.refusals import Fault, Refusals
+from drslamd.gossip.message_types import Received
 from drslamd.gossip.messages import Heard, Message, OdometryBatch, Pose, Status
+from drslamd.gossip.opening import Opened, opened
 from drslamd.gossip.peer import Peer, carrier, shared_module
 from drslamd.gossip.replicated_log import AHEAD
 from drslamd.gossip.seal import Header, Seal, SealFault
-from drslamd.gossip.starts import StartFault, Starts
+from drslamd.gossip.splitting import entries_of, parts_of
+from drslamd.gossip.starts import Starts
 from drslamd.slam.graph.measurements import (
     ClosureMeasurement,
     GraphEntry,
@@ -32,13 +35,6 @@ from drslamd.slam.robot_model import RobotModel
 
 FORGET_US = 600 * SECOND_US
 """A peer that was silent for ten minutes is no longer listed."""
-MODEL_EVERY = 64
-"""Log entries between two that say what our sensors are like."""
-MEASUREMENTS_PER_ENTRY = 20
-"""Keyframes, ranges and closures in one log entry; 20 closures with 20 peers are 1,280 bytes."""
-PUBLIC_ENVELOPE_BYTES = 80
-"""Of a public_poses_t besides its poses, each a number and 4 * rank floats; 10 for each held."""
-_FINGERPRINTS = {kind: frozenset([value]) for kind, value in messages.FINGERPRINTS.items()}
 
 
 class Team:
@@ -52,12 +48,14 @@ class Team:
         last_echo: when we last heard ourselves, which proves that the network carries us.
     """
 
-    def __init__(self, seal: Seal) -> None:
+    def __init__(self, seal: Seal, budget: int = BUDGET) -> None:
+        """`budget`: bytes a second that robots of this team may say."""
         self.seal = seal
+        self.flood = Flood(budget)
         self.own = Chain(seal.robot, seal.epoch)
         self.logs = LogSync(seal.robot)
         self.peers: dict[int, Peer] = {}
-        self.refusals = Refusals(seal.robot)
+        self.refusals = Refusals()
         self.accepted = 0
         self.unsayable = 0
         self.repeats_heard = 0
@@ -69,6 +67,7 @@ class Team:
         """The robot after which the next status goes on, when it cannot name all that are heard."""
         self.starts = Starts(self.own, seal.epochs)
         self.acquaintance = Acquaintance(self.own)
+        self.namesakes = Namesakes(self.own)
 
     @property
     def refused(self) -> Counter[str]:
@@ -85,12 +84,7 @@ class Team:
 
     def send_public(self, public: PublicPoses, utime: int) -> list[Send]:
         """Lifted poses, as many in one message as one datagram takes."""
-        lifted = 16 * public.rank
-        envelope = PUBLIC_ENVELOPE_BYTES + 10 * len(public.held) + lifted
-        return [
-            self.send(part, utime)
-            for part in public.split((MAX_PAYLOAD - envelope) // (4 + lifted))
-        ]
+        return [self.send(part, utime) for part in parts_of(public)]
 
     def append(self, entry: GraphEntry, utime: int) -> tuple[GraphEntry, bytes]:
         """Put an entry on our own log; the caller sends it when anybody is there to hear it."""
@@ -116,16 +110,7 @@ class Team:
         measured: list[Measurement] = [*keyframes, *ranges, *closures]
         measurements = [item for item in measured if is_sayable(item)]
         self.unsayable += len(measured) - len(measurements)
-        starts = range(0, len(measurements), MEASUREMENTS_PER_ENTRY)
-        for seq, first in enumerate(starts, start=self._next_seq):
-            part = measurements[first : first + MEASUREMENTS_PER_ENTRY]
-            yield GraphEntry(
-                seq,
-                model if seq % MODEL_EVERY == 0 else None,
-                tuple(i for i in part if isinstance(i, Keyframe)),
-                tuple(i for i in part if isinstance(i, RangeMeasurement)),
-                tuple(i for i in part if isinstance(i, ClosureMeasurement)),
-            )
+        yield from entries_of(model, measurements, self._next_seq)
 
     def write_chapter(self, utime: int, *, aloud: bool) -> list[GraphEntry]:
         """Entries that follow where a chapter is due; they are said later, if `aloud`."""
@@ -149,7 +134,9 @@ class Team:
 
     def audible(self, utime: int) -> Set[Chain]:
         """Whom we hear."""
-        return {peer.chain for peer in self.everybody.values() if peer.is_alive(utime)}
+        twice, named = self.namesakes.twice(utime), self.namesakes.named(utime)
+        alive = (peer.chain for peer in self.everybody.values() if peer.is_alive(utime))
+        return {chain for chain in alive if chain.robot not in twice} | named
 
     @property
     def everybody(self) -> dict[int, Peer]:
@@ -162,70 +149,73 @@ class Team:
         Args:
             needed: robots whose odometry we need.
         """
-        strangers = self.acquaintance.strangers
         chains = sorted(self.audible(utime))
         if len(chains) > messages.MAX_HEARD:
             later = [chain for chain in chains if chain.robot > self._named_last]
             chains = (later + chains)[: messages.MAX_HEARD]
             self._named_last = chains[-1].robot
+        doubtful = self.namesakes.named(utime)
         return tuple(
-            Heard(*chain, UNANSWERED)
-            if chain.robot in strangers
-            else self.peers[chain.robot].named(chain.robot in needed)
+            self.peers[chain.robot].named(chain.robot in needed)
+            if self._is_peer(chain) and chain not in doubtful
+            else unanswered(chain)
             for chain in chains
         )
+
+    def _is_peer(self, chain: Chain) -> bool:
+        peer = self.peers.get(chain.robot)
+        return peer is not None and peer.chain == chain
 
     # incoming
 
     def receive(self, event: Datagram | ChannelMessage) -> Received | None:
         """Judge one datagram; whatever is wrong with it is counted by its reason."""
-        if isinstance(event, Datagram):
-            framed = lc02.decode(event.data)
-            if isinstance(framed, lc02.FramingFault):
-                self.refused[framed.value] += 1
-                return None
-            channel, payload = framed
-        else:
-            channel, payload = event.channel, event.payload
-        kind = messages.kind_of_channel(channel)
-        if channel.startswith(messages.NEAR_PREFIX):
-            return None  # for whoever steers, not for robots
-        if kind is None:
-            self.refused["channel of another program"] += 1
+        found = opened(self.seal, event)
+        if not isinstance(found, Opened):
+            if isinstance(found, str):
+                self.refused[found] += 1
+            elif found is not None:
+                self._refuse(found, event)
             return None
-        once = kind != "GRAPH"
-        header = self.seal.judge(channel, payload, _FINGERPRINTS[kind], once)
-        if isinstance(header, SealFault):
-            self._refuse(header, event)
-            return None
-        message = messages.decode(kind, payload)
-        if isinstance(message, str):
-            self.refused["content out of range"] += 1
-            return None
-        if channel != messages.channel(kind, header.origin):
-            self.refused["channel of another robot"] += 1
-            return None
-        origin = Chain(header.origin, header.epoch)
-        fault = self.starts.judge(origin, self.peers.get(origin.robot), event.utime)
+        header, message, payload, _ = found
+        fault = self._fault(found, event)
         if fault is not None:
             self._refuse(fault, event)
             return None
         if not self._is_acquainted(header, message, event):
             self.refused["of a robot that has not answered this start"] += 1
             return None
+        origin = Chain(header.origin, header.epoch)
         if isinstance(message, GraphEntry) and not self._is_near(origin, message.seq):
             self.refused["entry far ahead of its log"] += 1
             return None
-        self.seal.accept(header, once)
+        # entries of the past come through others, at their cost
+        is_late = isinstance(message, GraphEntry) and message.seq < self.logs.end(origin)
+        if not (is_late or self.flood.leaves_room(origin.robot, len(payload), event.utime)):
+            self.refused["more than the share of one robot"] += 1
+            return None
+        self.seal.accept(header, once=not isinstance(message, GraphEntry))
         return self._sort(header, message, payload, event.utime)
+
+    def _fault(self, found: Opened, event: Datagram | ChannelMessage) -> Fault | None:
+        """Is it of the start that speaks for its robot, and of the only robot of this id?"""
+        header, message, utime = found.header, found.message, event.utime
+        if not isinstance(message, GraphEntry):
+            answers = isinstance(message, Status) and self.acquaintance.answers(message)
+            self.namesakes.hear(header, answers, utime, event.sender)
+        origin = Chain(header.origin, header.epoch)
+        return (
+            found.fault
+            or self.namesakes.fault(origin.robot, utime)
+            or self.starts.judge(origin, self.peers.get(origin.robot), utime)
+        )
 
     def _is_acquainted(
         self, header: Header, message: Message, event: Datagram | ChannelMessage
     ) -> bool:
         """Is it no recording of the past? What a stranger says is remembered only as a voice."""
         origin = Chain(header.origin, header.epoch)
-        peer = self.peers.get(origin.robot)
-        is_peer = peer is not None and peer.chain == origin
+        peer, is_peer = self.peers.get(origin.robot), self._is_peer(origin)
         if isinstance(message, GraphEntry):
             is_begun = self.logs.epoch(origin.robot) == origin.epoch
             return is_begun or is_peer or vouched(origin, self.peers.values())
@@ -238,7 +228,7 @@ class Team:
         if isinstance(message, Status):
             self.acquaintance.read(origin, message, event.utime)
             # who holds us for a later start does not hear us, and cannot answer
-            self.starts.on_status(origin.robot, message, self._next_seq, event.utime)
+            self.starts.on_status(origin.robot, message, self._said, event.utime)
         return False
 
     def meet(self, origin: Chain, counter: int, utime: int) -> None:
@@ -255,7 +245,7 @@ class Team:
             seq < peer.newest_of(origin) + AHEAD for peer in self.peers.values()
         )
 
-    def _refuse(self, fault: SealFault | StartFault, event: Datagram | ChannelMessage) -> None:
+    def _refuse(self, fault: Fault, event: Datagram | ChannelMessage) -> None:
         """Count a message that is not to be heard; our own echo is none that anybody refused."""
         if fault is SealFault.OWN:
             self.own_echoes += 1
@@ -289,11 +279,16 @@ class Team:
     def _status(self, peer: Peer, status: Status, counter: int, utime: int) -> None:
         if not peer.take_status(status, counter, self.own, utime):
             return
+        self.namesakes.on_status(peer.chain.robot, status, utime)
         if not peer.waits_for(self.own):
             self.logs.repeats.pace.reckon([p.usual_loss for p in self.living(utime).values()])
             self.logs.on_states(status.logs, peer.chain.robot, utime)
             self._chapters.on_states(self.own, status.logs)
-        self.starts.on_status(peer.chain.robot, status, self._next_seq, utime)
+        self.starts.on_status(peer.chain.robot, status, self._said, utime)
+
+    @property
+    def _said(self) -> int | None:
+        return self._next_seq if self.seal.has_spoken else None
 
     @property
     def superseded_by(self) -> int | None:
@@ -306,15 +301,20 @@ class Team:
         return self.seal.is_spent or self._next_seq >= LAST_SEQ
 
     def living(self, utime: int) -> dict[int, Peer]:
-        """Peers that are alive and hear us."""
-        return {r: p for r, p in self.peers.items() if p.is_alive(utime) and p.hears(self.own)}
+        """Peers that are alive, hear us and share no id; nobody while we share ours."""
+        twice = self.namesakes.twice(utime)
+        if self.own.robot in twice:
+            return {}
+        alive = ((r, p) for r, p in self.peers.items() if p.is_alive(utime) and p.hears(self.own))
+        return {robot: peer for robot, peer in alive if robot not in twice}
 
     def present(self, utime: int) -> set[int]:
         """Robots that live: those we talk to, and those that they vouch for."""
         direct = self.living(utime)
         audible = {chain for peer in direct.values() for chain in peer.audible}
         vouched_for = {c.robot for c in audible if c.epoch == self.logs.epoch(c.robot)}
-        return set(direct) | vouched_for | {self.own.robot}
+        there = set(direct) | (vouched_for - self.namesakes.twice(utime))
+        return there | {self.own.robot}
 
     def compare_radio_clocks(self, own_minus_system: int | None, utime: int) -> None:
         """Use LinkTrack's system_time, where both sides know their clock against it."""
@@ -331,13 +331,11 @@ class Team:
         """What is wrong with the conversation, by key, in sentences with a remedy."""
         return [
             *self.refusals.conditions(utime),
+            *self.namesakes.conditions(utime),
+            ("team.flood", self.flood.sentence(utime)),
             ("team.recording", self.acquaintance.recording(utime)),
             ("team.uwb_id", shared_module(self.peers.values(), utime)),
         ]
-
-    def is_own_id_used(self, utime: int) -> bool:
-        """Does another robot speak under our id?"""
-        return self.refusals.is_of_late(SealFault.OWN_ID_USED, utime)
 
     def robot_of_uwb(self, uwb_id: int) -> int | None:
         """The robot that carries this UWB module, None when it is not (yet) known."""

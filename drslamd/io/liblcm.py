@@ -43,6 +43,7 @@ class Liblcm:
 
     Attributes:
         dropped: messages that liblcm did not take, since the start.
+        flooded: 0: liblcm does not say who sends.
         reads: how often it has read since the start.
     """
 
@@ -55,7 +56,7 @@ class Liblcm:
         self._lcm: Any = None
         self._failed = asyncio.Event()
         self._last_state: tuple[bool, str] | None = None
-        self.dropped = self.reads = 0
+        self.dropped = self.reads = self.flooded = 0
 
     async def run(self) -> None:
         """Join, receive, join again."""
@@ -68,6 +69,10 @@ class Liblcm:
                 await backoff.wait()
         finally:
             self._close()
+
+    def complaint(self) -> str | None:
+        """Nothing: liblcm does not say who sends."""
+        return None
 
     def descriptor(self) -> int:
         """Of what liblcm reads from, or -1."""

@@ -16,14 +16,17 @@ import socket
 import struct
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from drslamd.config import GossipSection
 from drslamd.events import Datagram, Event, NetworkState
 from drslamd.gossip import lc02
+from drslamd.gossip.shares import Shares
 from drslamd.host.interfaces import NO_ADDRESS, SYSFS, address_of, fault_of
 from drslamd.io.backoff import Backoff
 from drslamd.io.clock import Clock
+from drslamd.io.watch.callers import Callers
 
 IP_MULTICAST_ALL = 49
 """Linux, <linux/in.h>; the socket module does not name it."""
@@ -37,6 +40,11 @@ RECENT = 32
 """Own datagrams that are recognised when they come back."""
 DATAGRAMS_AT_ONCE = 64
 """Read in one go; then other readers have their turn."""
+SHARE, SHARE_AT_ONCE, ADDRESSES = 1_000, 2_000, 256
+"""Datagrams a second of one address, and after a pause: fifty robots on one computer say fewer.
+So many addresses are told apart."""
+REMIND_S = 5.0
+"""How often switches are told that we are here, while somebody is missed."""
 
 
 class Multicast:
@@ -44,12 +52,21 @@ class Multicast:
 
     Attributes:
         dropped: messages that the network did not take, since the start.
+        flooded: datagrams that were not looked at, since their address sends too many.
         reads: how often it has read since the start.
     """
 
     def __init__(
-        self, section: GossipSection, clock: Clock, deliver: Callable[[Event], None]
+        self,
+        section: GossipSection,
+        clock: Clock,
+        deliver: Callable[[Event], None],
+        is_news: Callable[[bytes], bool] = lambda data: False,
     ) -> None:
+        """
+        Args:
+            is_news: is a datagram proven to be a robot's, and new? Then it is heard in any flood.
+        """
         self._section = section
         self._clock = clock
         self._deliver = deliver
@@ -62,7 +79,10 @@ class Multicast:
         self._last_state: tuple[bool, str] | None = None
         self._own_addresses: set[str] = set()
         """That were heard since the group was joined; no computer has many."""
-        self.dropped = self.reads = 0
+        self._is_news = is_news
+        self._shares: Shares[str] = Shares(SHARE, SHARE_AT_ONCE, ADDRESSES)
+        self._callers, self._told_switches = Callers(), 0.0
+        self.dropped = self.reads = self.flooded = 0
 
     async def run(self) -> None:
         """Join, watch, join again."""
@@ -108,7 +128,9 @@ class Multicast:
         self._failed.clear()
         self._unheard_since = None
         self._own_addresses.clear()
-        asyncio.get_running_loop().add_reader(self._socket.fileno(), self._read)
+        loop = asyncio.get_running_loop()
+        loop.add_reader(self._socket.fileno(), self._read)
+        self._told_switches = loop.time()
         return True
 
     async def _until_it_fails(self) -> None:
@@ -121,9 +143,24 @@ class Multicast:
                 since = self._unheard_since
                 if since is not None and loop.time() - since > ECHO_S:
                     self._fail(f"own messages do not come back on {self._where}; joining again")
+                else:
+                    self._remind_switches(loop.time())
+
+    def _remind_switches(self, now: float) -> None:
+        """Report our membership, which a switch may have forgotten: it then sends us nothing, or
+        nothing of those who are on another of its ports."""
+        is_missed = self._callers.is_anybody_missed(now)
+        if self._socket is None or not is_missed or now - self._told_switches < REMIND_S:
+            return
+        self._told_switches = now
+        try:
+            report_membership(self._socket, self._section)
+        except OSError as error:
+            self._fail(join_fault(self._section, error))
 
     def _read(self) -> None:
         self.reads += 1
+        loop = asyncio.get_running_loop()
         for _ in range(DATAGRAMS_AT_ONCE):
             if self._socket is None:
                 return
@@ -136,9 +173,33 @@ class Multicast:
                 return
             if self._section.ttl == 0 and not self._is_of_this_host(sender[0]):
                 continue  # in both directions
+            now = self._clock.now()
             if data in self._recent:
                 self._heard_ourselves()
-            self._deliver(Datagram(self._clock.now(), data, sender[0]))
+            else:
+                self._callers.hear(sender[0], loop.time())
+                if not self._admits(data, sender[0], now):
+                    continue
+            self._deliver(Datagram(now, data, sender[0]))
+
+    def _admits(self, data: bytes, address: str, utime: int) -> bool:
+        """Is it within the share of its address? If not, only a robot is heard."""
+        if self._shares.takes(address, 1.0, utime) or self._is_news(data):
+            return True
+        self.flooded += 1
+        return False
+
+    def complaint(self) -> str | None:
+        """One sentence while the group is flooded."""
+        floods = self._shares.over(self._clock.now())
+        if not floods:
+            return None
+        worst = max(floods, key=lambda who: floods[who])
+        return (
+            f"{worst or 'many addresses'} floods {self._section.group}:{self._section.port} "
+            f"({floods[worst]:.0f} datagrams a second too many): robots are heard, most else is "
+            "not looked at; find out what runs there, or set another gossip.group"
+        )
 
     def _is_of_this_host(self, address: str) -> bool:
         if address not in self._own_addresses and is_own(address):
@@ -202,12 +263,8 @@ def _reason(section: GossipSection, error: OSError, sysfs: Path = SYSFS) -> str:
     return fault_of(section.interface, sysfs) or error.strerror or str(error)
 
 
-def open_group(section: GossipSection) -> socket.socket:
-    """A non-blocking socket that is in the group, on the interface that is named.
-
-    Raises:
-        OSError: no such interface, none of its addresses, no route, port taken.
-    """
+def _member(section: GossipSection) -> bytes:
+    """The group on its interface, as `struct ip_mreqn`; errors as of `open_group`."""
     address, index = "0.0.0.0", 0
     if section.interface:
         try:
@@ -217,7 +274,16 @@ def open_group(section: GossipSection) -> socket.socket:
             if not address_of(section.interface):
                 # the kernel would send under the address of another interface
                 raise OSError(errno.EADDRNOTAVAIL, NO_ADDRESS) from None
-    member = struct.pack("4s4si", *map(socket.inet_aton, (section.group, address)), index)
+    return struct.pack("4s4si", *map(socket.inet_aton, (section.group, address)), index)
+
+
+def open_group(section: GossipSection) -> socket.socket:
+    """A non-blocking socket that is in the group, on the interface that is named.
+
+    Raises:
+        OSError: no such interface, none of its addresses, no route, port taken.
+    """
+    member = _member(section)
     udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
     try:
         udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -235,6 +301,24 @@ def open_group(section: GossipSection) -> socket.socket:
         udp.close()
         raise
     return udp
+
+
+def report_membership(udp: socket.socket, section: GossipSection) -> None:
+    """Make the kernel say that we are in the group, which it says when we join.
+
+    What comes meanwhile, about 30 us, is lost: so this is for when somebody is missed.
+
+    The socket leaves and comes back; by IGMPv3 the kernel then says only that it is there. By
+    IGMPv2 it would also say that it left, but that it speaks only where a router asks for members,
+    and there no switch forgets.
+
+    Raises:
+        OSError: the interface is gone.
+    """
+    member = _member(section)
+    with suppress(OSError):
+        udp.setsockopt(socket.IPPROTO_IP, socket.IP_DROP_MEMBERSHIP, member)
+    udp.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
 
 
 def is_own(address: str) -> bool:

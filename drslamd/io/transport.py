@@ -10,10 +10,12 @@ class Transport(Protocol):
 
     Attributes:
         dropped: messages that the network did not take.
+        flooded: datagrams that were not looked at, since their address sends too many.
         reads: how often it has read.
     """
 
     dropped: int
+    flooded: int
     reads: int
 
     async def run(self) -> None:
@@ -24,3 +26,6 @@ class Transport(Protocol):
 
     def send(self, channel: str, payload: bytes) -> None:
         """Publish without waiting; what the network does not take is dropped and counted."""
+
+    def complaint(self) -> str | None:
+        """One sentence while the network is flooded, where that can be seen."""

@@ -13,6 +13,7 @@ from places import REPOSITORY
 from drslamd.conditions.health import CAUSES_FIRST
 from drslamd.events import PortCondition
 from drslamd.gossip.lc02 import FramingFault
+from drslamd.gossip.membership.namesakes import NamesakeFault
 from drslamd.gossip.message_types import PoseState
 from drslamd.gossip.seal import SealFault
 from drslamd.gossip.starts import StartFault
@@ -32,7 +33,7 @@ BY_NAME: dict[str, type[Enum]] = {
     "gaps.": Gap,
 }
 """Counters, by what stands before the reason."""
-BY_VALUE: list[type[Enum]] = [FramingFault, SealFault, StartFault, Verdict]
+BY_VALUE: list[type[Enum]] = [FramingFault, SealFault, StartFault, NamesakeFault, Verdict]
 """Those that are shown as they are."""
 
 
@@ -59,6 +60,7 @@ def reasons() -> set[str]:
     ports = {member.value for member in PortCondition if member is not PortCondition.OPEN}
     states = {member.name.lower().replace("_", " ") for member in PoseState}
     plain = said_in(PACKAGE / "gossip" / "team.py", r'self\.refused\["(.+?)"\]')
+    plain |= texts_returned(PACKAGE / "gossip" / "opening.py")
     plain |= said_in(PACKAGE / "slam" / "front_end.py", r'\.count\("(.+?)"\)')
     plain |= texts_returned(PACKAGE / "slam" / "relative_pose" / "window_request.py")
     return names | values | ports | states | plain | set(CAUSES_FIRST)

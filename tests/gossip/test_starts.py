@@ -119,10 +119,16 @@ def test_a_start_beyond_all_clocks_is_spoken_of() -> None:
 
 
 def claims(
-    heard: tuple[int, ...] = (), logs: tuple[LogState, ...] = (), *, seconds: float = 2.0
+    heard: tuple[int, ...] = (),
+    logs: tuple[LogState, ...] = (),
+    *,
+    seconds: float = 2.0,
+    has_spoken: bool = True,
 ) -> int | None:
     """What we believe of our own start after a peer said this twice, some seconds apart."""
     team, seal = a_team(), a_seal(3)
+    if has_spoken:
+        team.send(a_status(), T0)
     for utime in (T0, T0 + round(seconds * SECOND)):
         assert team.superseded_by is None
         status = a_status(tuple(Heard(1, epoch, 0) for epoch in heard), logs)
@@ -204,6 +210,14 @@ def test_no_claim_leads_beyond_what_can_be_kept(own: int, followed: bool) -> Non
 def test_entries_of_our_log_that_we_never_made_show_that_this_epoch_was_used_before() -> None:
     assert claims(heard=(10,), logs=log(10, complete=1)) == 10
     assert claims(heard=(10,), logs=log(10, complete=0)) is None
+
+
+@pytest.mark.row("S7")
+def test_before_the_first_word_whoever_knows_our_number_knows_another_start() -> None:
+    assert claims(heard=(10,), has_spoken=False) == 10
+    assert claims(logs=log(10), has_spoken=False) == 10
+    assert claims(heard=(9,), logs=log(9, complete=5), has_spoken=False) is None
+    assert claims(logs=log(10)) is None
 
 
 def test_who_holds_none_of_our_entries_proves_nothing_by_where_it_waits() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -22,6 +23,7 @@ from drslamd.io.liblcm import Liblcm
 from drslamd.io.multicast import open_group
 
 ADDRESS = "10.10.0.1"
+OTHER_ADDRESS = "10.10.0.2"
 
 
 def ip(command: str) -> None:
@@ -34,6 +36,66 @@ def plug_in(name: str = "wlan0", address: str = ADDRESS) -> None:
     ip(f"link set far-{name} up")
     ip(f"link set {name} up")
     ip(f"addr add {address}/24 dev {name}")
+
+
+def snooping_switch() -> None:
+    """A switch that sends a group only where somebody said that it is wanted.
+
+    The robot is on one of its ports, somebody else on another one, both on this computer.
+    """
+    conf = Path("/proc/sys/net/ipv4/conf/all")
+    (conf / "accept_local").write_text("1")
+    (conf / "rp_filter").write_text("0")
+    ip("link add switch type bridge")
+    # it believes its own memory as soon as answers to its one question would have come
+    ip("link set switch type bridge mcast_query_response_interval 50 mcast_query_interval 100000")
+    ip("link set switch type bridge mcast_querier 1")
+    for name, address in (("wlan0", ADDRESS), ("eth0", OTHER_ADDRESS)):
+        plug_in(name, address)
+        ip(f"link set far-{name} master switch")
+    ip("link set switch up")
+
+
+def forget_group() -> None:
+    """As a switch does that hears nothing of it for minutes."""
+    command = ["bridge", "mdb", "del", "dev", "switch", "port", "far-wlan0", "grp", GROUP]
+    subprocess.run(command, check=True)
+
+
+def on_the_other_port() -> socket.socket:
+    sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(OTHER_ADDRESS))
+    return sender
+
+
+WORD = "DRSLAM_POSE_009"
+
+
+async def a_switch_that_forgot_the_group_is_told_again() -> None:
+    snooping_switch()
+    where = section("wlan0").model_copy(update={"ttl": 1})
+    transport, ear = native(where)
+
+    async def heard_of(count: int) -> int:
+        before = len(ear.messages)
+        for number in range(count):
+            sender.sendto(lc02.encode(number, WORD, b"x"), (GROUP, where.port))
+        await asyncio.sleep(0.1)
+        return sum(channel == WORD for channel, _ in ear.messages[before:])
+
+    with on_the_other_port() as sender:
+        async with running(transport):
+            await spoken_until(transport, ear.is_up)
+            await asyncio.sleep(4.0)
+            assert await heard_of(20) == 20
+            forget_group()
+            assert await heard_of(20) == 0, "a switch that snoops does not forget"
+            for _ in range(120):
+                if await heard_of(1):
+                    break
+            else:
+                raise AssertionError("nothing was heard again within twelve seconds")
+    assert [state.up for state in ear.states] == [True]
 
 
 async def without_any_route_the_user_is_told_to_name_an_interface() -> None:

@@ -6,9 +6,11 @@ import asyncio
 import contextlib
 import errno
 import itertools
+import shutil
 import socket
 import sys
 import time
+from functools import partial
 from typing import Any, cast
 
 import pytest
@@ -21,6 +23,7 @@ from drslamd.gossip import lc02
 from drslamd.io import multicast
 from drslamd.io.clock import MonotonicClock
 from drslamd.io.multicast import IP_MULTICAST_ALL, Multicast, is_own, open_group, own_address
+from drslamd.io.watch import callers
 
 LONGEST_GAP_S = 0.05
 
@@ -366,6 +369,73 @@ def test_in_a_namespace(scenario: str) -> None:
     run_in_namespace(scenario)
 
 
+@pytest.mark.slow
+@pytest.mark.row("N10")
+def test_a_switch_that_forgot_the_group_is_told_again() -> None:
+    if shutil.which("bridge") is None:
+        pytest.skip("no program bridge")
+    run_in_namespace("a_switch_that_forgot_the_group_is_told_again")
+
+
+@in_a_loop
+async def test_switches_are_told_again_while_somebody_is_missed_and_at_no_other_time() -> None:
+    """What comes while it is said would be lost."""
+    told: list[None] = []
+    transport, ear = native(section())
+    reported = multicast.report_membership
+    with raw_sender() as sender, pytest.MonkeyPatch.context() as patched:
+        patched.setattr(multicast, "report_membership", lambda *_: told.append(None))
+        patched.setattr(multicast, "LOOK_S", 0.01)
+        patched.setattr(multicast, "REMIND_S", 0.05)
+        async with running(transport):
+            await spoken_until(transport, ear.is_up)
+            await until(lambda: len(told) > 1)
+            sender.sendto(lc02.encode(0, "DRSLAM_POSE_009", b"x"), (GROUP, transport._section.port))
+            await until(lambda: len(transport._callers) == 1)
+            told.clear()
+            await asyncio.sleep(0.3)
+            assert told == []
+            patched.setattr(callers, "SILENT_S", 0.1)
+            await until(lambda: len(told) > 1)
+            assert transport._socket is not None
+            reported(transport._socket, transport._section)
+            await spoken_until(transport, ear.is_up)
+
+
+class StandingClock:
+    """At which no share fills again."""
+
+    def now(self) -> int:
+        return 100_000_000
+
+
+@in_a_loop
+async def test_of_a_flood_only_robots_are_heard_beyond_the_share_of_its_address() -> None:
+    where, ear, true = section(), Ear(), lc02.encode(1, "DRSLAM_POSE_009", b"of a robot")
+    transport = Multicast(where, StandingClock(), ear.events.append, lambda data: data == true)
+    async with running(transport):
+        await spoken_until(transport, ear.is_up)
+        ear.events.clear()
+        assert transport.complaint() is None
+
+        def have_come(count: int) -> bool:
+            return len(ear.events) + transport.flooded >= count
+
+        with raw_sender() as sender:
+            for number in range(0, 2_500, 50):
+                for _ in range(50):
+                    sender.sendto(lc02.encode(0, "FLOOD", bytes(300)), (GROUP, where.port))
+                await until(partial(have_come, number))
+            await until(partial(have_come, 2_500))
+            assert transport.flooded == 500
+            sender.sendto(true, (GROUP, where.port))
+            await until(lambda: len(ear.events) == 2_001)
+    assert ear.messages[-1] == ("DRSLAM_POSE_009", b"of a robot")
+    said = transport.complaint()
+    assert said is not None
+    assert said.startswith(f"127.0.0.1 floods {GROUP}:{where.port} (")
+
+
 # under load
 
 FLOOD = """
@@ -418,7 +488,7 @@ async def test_a_flood_of_ten_thousand_datagrams_leaves_the_loop_its_turns() -> 
         ticking.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await ticking
-    assert len(ear.events) > 2000
+    assert len(ear.events) + transport.flooded > 2000
     assert max(gaps) < LONGEST_GAP_S
 
 

@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from message_builders import a_status
 from robot_scenes import RobotScene
 
+from drslamd.conditions.diagnosis import why_not_localised
 from drslamd.conventions import SECOND_US, Chain
-from drslamd.gossip.message_types import PoseState
+from drslamd.gossip.message_types import Heard, PoseState
 from drslamd.slam.doubt import MUCH_WORSE, Doubt, Reason
 from drslamd.slam.graph.estimate import Learned, Trajectory
 from drslamd.slam.range_watch import RangeWatch
@@ -21,7 +23,7 @@ from drslamd.standing import Standing
 
 def standing(scene: RobotScene) -> Standing:
     robot = scene.robot
-    return Standing(scene.config, robot.own, robot.front, robot.back)
+    return Standing(scene.config, robot.team, robot.front, robot.back)
 
 
 def driven(level: float = 1.0, contradicted: tuple[tuple[int, int], ...] = ()) -> RobotScene:
@@ -160,3 +162,15 @@ def test_windows_with_robots_of_the_solution_are_a_witness(windows: int, is_solv
     expected = Doubt(0, Reason.WINDOWS, (4,)) if is_doubt else None
     assert standing(scene).whereabouts(scene.utime).doubt == expected
     assert standing(scene).is_doubted() == (is_doubt, is_doubt)
+
+
+def test_a_robot_whose_id_another_uses_has_no_pose() -> None:
+    scene = driven()
+    other = a_status((Heard(0, 1, 0),))
+    assert standing(scene).whereabouts(scene.utime).state is PoseState.LOCALISED
+    for _ in range(2):
+        scene.later(1)
+        scene.hear(0, other, epoch=7)
+    found = standing(scene).whereabouts(scene.utime)
+    assert (found.state, found.pose) == (PoseState.NOT_LOCALISED, None)
+    assert "another robot uses the id" in str(why_not_localised(scene.robot, scene.utime))

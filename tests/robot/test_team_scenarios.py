@@ -11,6 +11,7 @@ from lab.recordings import world
 from teams import EASY, VirtualTeam
 
 from drslamd.conventions import SECOND_US
+from drslamd.events import SaveDone
 from drslamd.gossip import messages
 from drslamd.gossip.message_types import PoseState
 
@@ -237,16 +238,6 @@ def test_another_team_key_does_not_merge_and_both_sides_say_so() -> None:
     assert not team.member(2).robot.team.peers
 
 
-@pytest.mark.row("S8")
-def test_two_robots_with_one_id_both_say_so() -> None:
-    team = VirtualTeam(on=(0, 1))
-    team.run(3.0)
-    clone = team.start(1, epoch=7)
-    team.run(6.0)
-    sentences = "\n".join(clone.robot.health.sentences().values())
-    assert "another robot uses id 1" in sentences
-
-
 @pytest.mark.row("S7")
 def test_a_robot_whose_memory_was_lost_begins_above_what_its_peers_know() -> None:
     team = VirtualTeam(on=(0, 1))
@@ -258,6 +249,26 @@ def test_a_robot_whose_memory_was_lost_begins_above_what_its_peers_know() -> Non
     forgetful = team.start(1, epoch=2)
     team.run(15.0)
     assert forgetful.robot.own.epoch > 50
+    assert team.member(0).robot.team.peers[1].chain.epoch == forgetful.robot.own.epoch
+
+
+@pytest.mark.row("S7")
+def test_a_robot_that_can_keep_nothing_says_no_word_under_a_number_that_peers_know() -> None:
+    """Its clock is behind as well."""
+    team = VirtualTeam(on=(0, 1))
+    team.run(5.0)
+    team.simulator.kill(team.member(1))
+    late = team.start(1, epoch=50, epochs={0: 1})
+    team.run(10.0)
+    team.simulator.kill(late)
+    forgetful = team.start(1, epoch=50)  # by chance the very same number
+    team.simulator.handle(forgetful, lambda utime: SaveDone(utime, "Read-only file system"))
+    team.run(11.5)
+    assert "only listens for ten seconds" in team.problems(1)
+    team.run(24.0)
+    said = {int.from_bytes(payload[11:19], "big") for _, _, payload in forgetful.traces.sent}
+    assert said
+    assert min(said) > 50
     assert team.member(0).robot.team.peers[1].chain.epoch == forgetful.robot.own.epoch
 
 

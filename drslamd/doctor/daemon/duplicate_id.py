@@ -9,5 +9,5 @@ from drslamd.machine.finding import Finding, Severity
 
 
 def duplicate_id(patient: Patient) -> Iterator[Finding]:
-    keys = ("team.own_id_used", "team.uwb_id")
+    keys = ("team.own_id_used", "team.id_used_twice", "team.uwb_id")
     yield from patient.told("duplicate id", *keys, severity=Severity.ERROR)

@@ -6,10 +6,11 @@ from collections import Counter
 from typing import Union
 
 from drslamd.conventions import SECOND_US
+from drslamd.gossip.membership.namesakes import NamesakeFault
 from drslamd.gossip.seal import SealFault
 from drslamd.gossip.starts import StartFault
 
-Fault = Union[SealFault, StartFault]
+Fault = Union[SealFault, StartFault, NamesakeFault]
 
 UNVERIFIED_US = 10 * SECOND_US
 """How long after a message that does not fit the team key it is still spoken of."""
@@ -19,8 +20,6 @@ _REMEDIES: dict[Fault, str] = {
     "give all robots the same team.key_file",
     SealFault.WRONG_VERSION: "hears messages of another version of drslamd, from {sender}; "
     "install the same version on all robots",
-    SealFault.OWN_ID_USED: "another robot uses id {robot}, at {sender}; "
-    "give every robot a robot.id of its own",
     StartFault.BEYOND_CLOCKS: "hears a start that no clock can show, from {sender}; its state file "
     "is damaged, or somebody who can seal messages makes them up",
 }
@@ -28,14 +27,12 @@ _REMEDIES: dict[Fault, str] = {
 
 
 class Refusals:
-    """Of one robot.
-
+    """
     Attributes:
         counts: messages that were turned away, by reason.
     """
 
-    def __init__(self, robot: int) -> None:
-        self._robot = robot
+    def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
         self._last: dict[Fault, tuple[int, str]] = {}
 
@@ -52,7 +49,7 @@ class Refusals:
         out: list[tuple[str, str | None]] = []
         for fault, sentence in _REMEDIES.items():
             _, sender = self._last.get(fault, (0, ""))
-            text = sentence.format(robot=self._robot, sender=sender or "an unknown sender")
+            text = sentence.format(sender=sender or "an unknown sender")
             out.append(
                 (f"team.{fault.name.lower()}", text if self.is_of_late(fault, utime) else None)
             )

@@ -22,7 +22,8 @@ from lab.recordings import world
 from lab.recordings.recording import Array, Recording
 from lab.recordings.world import STEP_S
 from lab.score import metrics
-from lab.soak import faults, radio
+from lab.soak import radio
+from lab.soak.harm import on_the_air
 from lab.soak.invariants import Invariants
 from lab.soak.stage import Bench, Stage
 
@@ -154,7 +155,7 @@ def hours(seed: int, count: float, progress: Callable[[float], None]) -> Iterato
     stage = DayStage(day.block(0), np.random.default_rng([seed, 3]), 0.0, float("inf"), day=day)
     stage.radio.troubles.append(radio.Trouble(0, 2**62, radio.lossy(LOSS)))
     until_s = LOOK_S * round(count * 3600 / LOOK_S)
-    faults.stranger(stage, STRANGE_PER_S, until_s)
+    on_the_air.stranger(stage, STRANGE_PER_S, until_s)
     bench = Bench(stage, seed, RATES)
     invariants = Invariants(bench, keeps_journal=False)
     measured = _Measured(bench, day)

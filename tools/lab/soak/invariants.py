@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import pickle
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Sized
 from dataclasses import replace
 from hashlib import blake2b
@@ -59,6 +59,7 @@ def sizes(robot: Robot) -> dict[str, tuple[int, int]]:
         "reasons": (team.refused, 64),
         "jobs": (robot.jobs._under_way, 2 * robots),
         "scanner": (robot.uwb._scanner._rest, MAX_BUFFER_BYTES),
+        "namesakes": (team.namesakes._voices, robots),
         "planned": (team.logs.repeats._planned, MAX_PLANNED),
     }
     out |= {f"log of {owner}": (log.sealed, MAX_ENTRIES) for owner, log in team.logs._logs.items()}
@@ -71,6 +72,7 @@ def imprint(robot: Robot) -> bytes:
     what = (
         team.seal,
         team.peers,
+        team.namesakes.latest,
         sorted(agreement.held(robot).items()),
         agreement.whole_digest(robot),
     )
@@ -144,7 +146,8 @@ class Invariants:
         self._simulator = simulator
         self._keeps_journal = keeps_journal
         self._received: dict[int, tuple[Robot, int]] = {}
-        self._numbers = Numbers()
+        """By computer, which is its disk; so are the numbers that were used."""
+        self._numbers: dict[int, Numbers] = defaultdict(Numbers)
         self._sent = blake2b(digest_size=8)
         self.journals: dict[int, tuple[Member, Journal]] = {}
         self.bytes_sent: deque[int] = deque([0], maxlen=1_000)
@@ -160,10 +163,10 @@ class Invariants:
         """An event was handled."""
         robot = member.robot
         if isinstance(event, Datagram):
-            self._count(robot)
+            self._count(member)
         for effect in effects:
             if isinstance(effect, Send):
-                self._on_send(robot, event.utime, effect)
+                self._on_send(member, event.utime, effect)
         if any(isinstance(effect, Restart) for effect in effects):
             self.journals.pop(id(member), None)
         elif self._keeps_journal:
@@ -172,16 +175,17 @@ class Invariants:
             if id(member) in self.journals:
                 self.journals[id(member)][1].add(event, effects)
 
-    def _count(self, robot: Robot) -> None:
-        team = robot.team
-        known, count = self._received.get(robot.own.robot, (robot, 0))
+    def _count(self, member: Member) -> None:
+        robot, team = member.robot, member.robot.team
+        known, count = self._received.get(id(member.disk), (robot, 0))
         count = count + 1 if known is robot else 1
-        self._received[robot.own.robot] = robot, count
+        self._received[id(member.disk)] = robot, count
         counted = team.accepted + team.repeats_heard + team.own_echoes + sum(team.refused.values())
         if counted != count:
             raise Broken("P3", robot.own.robot, f"{count} datagrams came, {counted} were counted")
 
-    def _on_send(self, robot: Robot, utime: int, effect: Send) -> None:
+    def _on_send(self, member: Member, utime: int, effect: Send) -> None:
+        robot = member.robot
         self._sent.update(effect.channel.encode() + effect.payload)
         self.bytes_sent[-1] += len(effect.payload)
         kind = messages.kind_of_channel(effect.channel)
@@ -192,7 +196,7 @@ class Invariants:
             raise Broken("P3", robot.own.robot, f"says what is refused: {header.value}")
         if header.origin != robot.own.robot:
             return
-        fault = self._numbers.use(header, kind, effect.payload)
+        fault = self._numbers[id(member.disk)].use(header, kind, effect.payload)
         if fault:
             raise Broken("P8", robot.own.robot, fault)
         if kind == "POSE":

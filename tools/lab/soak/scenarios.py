@@ -57,7 +57,10 @@ _SAID = {
     "wheels-cut": r"wheels",
     "disk-full": r"No space left",
     "read-only": r"Read-only",
+    "one-id-twice": r"two robots use id",
 }
+_LASTING = ("one-id-twice",)
+"""An id that two robots had is used again after half a minute."""
 _LASTS_S = {"disk-full": 30.0, "read-only": 30.0}
 """A robot writes once a minute."""
 _EACH_DOSE = ("loss", "outliers", "range-dropout")
@@ -73,7 +76,8 @@ def _alone() -> list[Scenario]:
             title = f"{name}-{dose:g}" if len(doses) > 1 else name
             is_sensor = fault.rows[0][0] in "DM"
             lasts_s = _LASTS_S.get(name, LASTS_S)
-            expects = TRUE if is_sensor else (*HEALED_SOON, *TRUE)
+            is_quick = not is_sensor and name not in _LASTING
+            expects = (*HEALED_SOON, *TRUE) if is_quick else TRUE
             out.append(Scenario(title, ((name, dose),), expects, _SAID.get(name, ""), lasts_s))
     return out
 

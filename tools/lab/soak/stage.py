@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from drslamd.events import Datagram, Effect, Event
+from drslamd.events import Datagram, Effect, Event, SaveDone
 from drslamd.gossip.epochs import next_epoch
 from drslamd.slam.calibration.sensor_calibration import SensorCalibration
 from lab.play.playback import Chunk, Hardware, Wiring, equip, robot_config
@@ -37,6 +37,7 @@ class Bench(Simulator):
 
     Attributes:
         seen: the latest datagrams that each robot was given.
+        doubles: robots under an id that belongs to another, by that id.
     """
 
     def __init__(self, stage: Stage, seed: int, extra: str = "") -> None:
@@ -45,6 +46,7 @@ class Bench(Simulator):
         self.rng = np.random.default_rng([seed, 1])
         self.hardware = stage.hardware()
         self.seen: dict[int, deque[bytes]] = {}
+        self.doubles: dict[int, Member] = {}
         self._extra = f'[team]\nkey_file = "team.key"\n{extra}'
         self._disks = {robot: Disk() for robot in self.hardware}
         self.watchers.append(self._remember)
@@ -63,14 +65,25 @@ class Bench(Simulator):
         """A new start of a robot, with what its disk still says."""
         self.forget_ended()
         self.seen[robot] = deque(maxlen=REMEMBERED)
-        device, disk = self.hardware[robot], self._disks[robot]
-        now_s = self.now / 1e6
+        return self._begin(self.hardware[robot], self._disks[robot])
+
+    def double(self, robot: int) -> Member:
+        """Another robot, with a copy of the disk of this one; it is none of `members`."""
+        disk = Disk()
+        disk.state = dict(self._disks[robot].state)
+        first = self.members[robot]
+        second = self.doubles[robot] = self._begin(self.stage.hardware()[robot], disk)
+        self.members[robot] = first
+        return second
+
+    def _begin(self, device: Hardware, disk: Disk) -> Member:
+        robot, now_s = device.robot, self.now / 1e6
         epoch = next_epoch(
             disk.state.get("epoch", 0), WALL_S + int(now_s), int(self.rng.integers(1_000_000))
         )
         epochs = dict(disk.state.get("epochs", {}))
         kept = SensorCalibration.of_state(disk.state.get("calibration", {}))
-        disk.keep({**disk.state, "epoch": epoch})
+        fault = disk.keep({**disk.state, "epoch": epoch})
         member = self.add(
             robot_config(device, self._extra),
             self.stage.clocks[robot],
@@ -82,6 +95,8 @@ class Bench(Simulator):
             disk=disk,
         )
         member.hears = partial(self._on_line, self.stage.lines.get(robot, []))
+        if fault:
+            self.handle(member, lambda utime: SaveDone(utime, fault))
         self.play(member, self.stage.chunks(device, now_s))
         return member
 
@@ -162,3 +177,7 @@ def _wired(wirings: list[Wiring], t: Array, left: Array, right: Array) -> tuple[
     for wiring in wirings:
         left, right = wiring(t, left, right)
     return left, right
+
+
+Put = Callable[[Stage, float], None]
+"""Puts a fault onto a stage, in a dose."""

@@ -1,0 +1,1 @@
+"""How each thing is made to go wrong on a stage."""
