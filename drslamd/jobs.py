@@ -26,23 +26,24 @@ REST = 4
 
 @dataclass(frozen=True)
 class Job:
-    """A computation: its module, the pair that it is about, and the window that it looks at."""
+    """A computation: its module, the pairs that it is about, and the window of each."""
 
     module: str
-    pair: PairTracker | None = None
-    request: WindowRequest | None = None
+    pairs: tuple[PairTracker, ...] = ()
+    requests: tuple[WindowRequest, ...] = ()
 
-    def tell_pair(self, result: Any) -> bool:
-        """Give a pair what was found for it; False where it is not about one pair."""
-        if self.pair is None:
-            return False
-        if self.request is None:
-            self.pair.on_check(result)
-        elif self.module == WHAT_IF:
-            self.pair.on_costs(self.request, *result)
-        else:
-            self.pair.on_estimate(self.request, result)
-        return True
+    def tell_pairs(self, result: Any) -> bool:
+        """Give the pairs what was found for them; False where it is not about pairs."""
+        if self.module == RELATIVE_POSE:
+            for pair, request, estimate in zip(self.pairs, self.requests, result, strict=True):
+                pair.on_estimate(request, estimate)
+            return True
+        for pair in self.pairs:
+            if self.requests:
+                pair.on_costs(self.requests[0], *result)
+            else:
+                pair.on_check(result)
+        return bool(self.pairs)
 
 
 class DutyCycle(NamedTuple):
@@ -84,7 +85,8 @@ class Jobs:
     def is_busy(self, module: str, pair: PairTracker | None = None) -> bool:
         """Does the module compute, for this pair or for any?"""
         return any(
-            job.module == module and pair in (None, job.pair) for job in self._under_way.values()
+            job.module == module and (pair is None or pair in job.pairs)
+            for job in self._under_way.values()
         )
 
     def is_free(self, module: str, utime: int) -> bool:

@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from drslamd.broadcast import Broadcast
@@ -248,28 +249,29 @@ class Robot:
     # the three modules
 
     def _relative_poses(self, utime: int) -> list[Effect]:
-        """Module 1: a window of ranges and both odometries, for each pair that we own."""
+        """Module 1: a window of ranges and both odometries, for all pairs that we own."""
         if self.jobs.is_resting(RELATIVE_POSE, utime):
             return []
         peers = self.neighbours(utime)
-        windows = self.front.module1(peers, self.back.graph, self.back.estimate, utime)
-        return [
-            self.jobs.begin(Job(RELATIVE_POSE, window.pair, window.request), window.run)
-            for window in windows
-            if not self.jobs.is_busy(RELATIVE_POSE, window.pair)
-        ]
+        found = self.front.module1(peers, self.back.graph, self.back.estimate, utime)
+        free = [window for window in found if not self.jobs.is_busy(RELATIVE_POSE, window.pair)]
+        if not free:
+            return []
+        pairs, requests, windows = zip(*free, strict=True)
+        run = partial(self.front.solve, windows)
+        return [self.jobs.begin(Job(RELATIVE_POSE, pairs, requests), run)]
 
     def _what_if(self, utime: int) -> list[Effect]:
         """Where windows disagree again and again: which mistake in the mountings explains them?"""
         if not self.jobs.is_free(WHAT_IF, utime):
             return []
         asked = self.front.what_if(self.neighbours(utime), self.back.graph, utime)
-        return [self.jobs.begin(Job(WHAT_IF, w.pair, w.request), w.run) for w in asked]
+        return [self.jobs.begin(Job(WHAT_IF, (w.pair,), (w.request,)), w.run) for w in asked]
 
     def _consistency(self, utime: int) -> list[Effect]:
         """Module 2: which of a pair's closures belong together."""
         return [
-            self.jobs.begin(Job(CONSISTENCY, pair), run)
+            self.jobs.begin(Job(CONSISTENCY, (pair,)), run)
             for pair, run in self.front.module2(self.back.graph, self.back.estimate)
         ]
 
@@ -300,7 +302,7 @@ class Robot:
             is_found = self.standing.on_relocated(event.result, event.utime)
             actions = (self._extend_log, self._optimize) if is_found else ()
             return [effect for action in actions for effect in action(event.utime)]
-        if job.tell_pair(event.result):
+        if job.tell_pairs(event.result):
             return []
         said = self.back.on_solution(event.result, event.utime)
         public = self.broadcast.public(said, event.utime)

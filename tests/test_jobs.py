@@ -26,7 +26,7 @@ def done(jobs: Jobs, job: Job, ended: int = T0, took: int = TOOK) -> Job:
 
 def test_a_job_goes_out_under_the_name_of_its_module_and_comes_back_by_its_number() -> None:
     jobs, pair, request = Jobs(), a_pair(1), asked_at(10)
-    first = Job(RELATIVE_POSE, pair, request)
+    first = Job(RELATIVE_POSE, (pair,), (request,))
     effects = [jobs.begin(first, lambda: "answer"), jobs.begin(Job(OPTIMIZER), lambda: None)]
     assert [effect.name for effect in effects] == [RELATIVE_POSE, OPTIMIZER]
     assert effects[0].job_id != effects[1].job_id
@@ -47,12 +47,12 @@ def test_a_module_is_busy_until_its_job_has_ended() -> None:
 
 def test_a_module_is_busy_with_one_pair_and_free_for_another() -> None:
     jobs, one, other = Jobs(), a_pair(1), a_pair(2)
-    first = jobs.begin(Job(RELATIVE_POSE, one), lambda: None)
+    first = jobs.begin(Job(RELATIVE_POSE, (one,)), lambda: None)
     assert jobs.is_busy(RELATIVE_POSE, one)
     assert not jobs.is_busy(RELATIVE_POSE, other)
     assert not jobs.is_busy(CONSISTENCY, one)
     assert jobs.is_busy(RELATIVE_POSE)
-    jobs.begin(Job(RELATIVE_POSE, other), lambda: None)
+    jobs.begin(Job(RELATIVE_POSE, (other,)), lambda: None)
     jobs.finish(JobDone(T0, first.job_id, None, TOOK))
     assert not jobs.is_busy(RELATIVE_POSE, one)
     assert jobs.is_busy(RELATIVE_POSE)
@@ -88,10 +88,10 @@ def test_a_cycle_is_from_the_begin_of_a_computation_to_the_end_of_its_rest() -> 
 @pytest.mark.parametrize(("before_its_end", "is_one_cycle"), [(0, False), (1, True)])
 def test_what_begins_after_the_rest_is_a_new_cycle(before_its_end: int, is_one_cycle: bool) -> None:
     jobs = Jobs()
-    done(jobs, Job(RELATIVE_POSE, a_pair(1)))
+    done(jobs, Job(RELATIVE_POSE, (a_pair(1),)))
     rested = T0 + 4 * TOOK
     ended = rested - before_its_end + TOOK
-    done(jobs, Job(RELATIVE_POSE, a_pair(2)), ended=ended)
+    done(jobs, Job(RELATIVE_POSE, (a_pair(2),)), ended=ended)
     since, until = jobs.cycles[RELATIVE_POSE]
     assert since == (T0 - TOOK if is_one_cycle else rested)
     assert until == ended + 4 * TOOK
@@ -100,7 +100,7 @@ def test_what_begins_after_the_rest_is_a_new_cycle(before_its_end: int, is_one_c
 def test_pairs_that_are_computed_one_after_the_other_rest_for_all_of_them() -> None:
     """Three windows of one round, each 0.1 s: 0.3 s of computing and 1.2 s of rest."""
     jobs = Jobs()
-    solves = [jobs.begin(Job(RELATIVE_POSE, a_pair(k)), lambda: None) for k in range(3)]
+    solves = [jobs.begin(Job(RELATIVE_POSE, (a_pair(k),)), lambda: None) for k in range(3)]
     for k, solve in enumerate(solves, start=1):
         jobs.finish(JobDone(T0 + k * TOOK, solve.job_id, None, TOOK))
     since, until = jobs.cycles[RELATIVE_POSE]

@@ -88,7 +88,7 @@ class Surroundings:
         if self._air is not None:
             self._air.on_motion(motion)
         reckoning = self._front.reckoning
-        (x, y, theta), utime = reckoning.pose.tolist(), reckoning.utime
+        (x, y, theta), utime = reckoning.pose, reckoning.utime
         if utime is None or utime == self.utime:
             return
         if motion.gap:

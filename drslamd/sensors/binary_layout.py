@@ -12,10 +12,14 @@ from typing import Any, Final, NamedTuple
 
 
 class Type(NamedTuple):
-    """How many bytes a value takes and how they are read."""
+    """How a value is read: its code in the language of `struct`, and what is made of that."""
 
-    size: int
-    read: Callable[[bytes], Any]
+    code: str
+    made: Callable[[bytes], Any] | None = None
+
+    @property
+    def size(self) -> int:
+        return struct.calcsize("<" + self.code)
 
 
 def _unsigned(raw: bytes) -> int:
@@ -26,24 +30,19 @@ def _signed(raw: bytes) -> int:
     return int.from_bytes(raw, "little", signed=True)
 
 
-def _float(raw: bytes) -> float:
-    (value,) = struct.unpack("<f", raw)
-    return float(value)
-
-
 def _version(raw: bytes) -> str:
     return ".".join(str(part) for part in reversed(raw))
 
 
-U8: Final = Type(1, _unsigned)
-U16: Final = Type(2, _unsigned)
-U24: Final = Type(3, _unsigned)
-U32: Final = Type(4, _unsigned)
-I16: Final = Type(2, _signed)
-I24: Final = Type(3, _signed)
-F32: Final = Type(4, _float)
-VERSION2: Final = Type(2, _version)
-VERSION4: Final = Type(4, _version)
+U8: Final = Type("B")
+U16: Final = Type("H")
+U24: Final = Type("3s", _unsigned)
+U32: Final = Type("I")
+I16: Final = Type("h")
+I24: Final = Type("3s", _signed)
+F32: Final = Type("f")
+VERSION2: Final = Type("2s", _version)
+VERSION4: Final = Type("4s", _version)
 
 
 class Field(NamedTuple):
@@ -83,59 +82,104 @@ class Block(NamedTuple):
     slots: Slots | None = None
 
 
-def read_field(data: bytes, at: int, field: Field) -> Any:
-    """The value of `field` in the block that starts at `at`."""
-    _, offset, (size, read), divisor, repeat = field
-    start = at + offset
-    if repeat == 1:
-        value = read(data[start : start + size])
-        return value if divisor == 1 else value / divisor
-    single = field._replace(offset=0, repeat=1)
-    return tuple(read_field(data, start + k * size, single) for k in range(repeat))
+class _Value(NamedTuple):
+    """A value that needs more than to be unpacked: where it stands among those that were."""
+
+    name: str
+    first: int
+    last: int
+    made: Callable[[bytes], Any] | None
+    divisor: int
+
+    def of(self, raw: tuple[Any, ...]) -> Any:
+        values = raw[self.first : self.last]
+        if self.made is not None:
+            values = tuple(map(self.made, values))
+        if self.divisor != 1:
+            values = tuple(value / self.divisor for value in values)
+        return values[0] if len(values) == 1 else values
 
 
-def read_block(data: bytes, at: int, end: int, block: Block) -> tuple[dict[str, Any], int] | None:
-    """Values of the block at `at` by name, with its tail, and where it ends.
+class BlockReader:
+    """Reads one kind of block, its table compiled into a `struct.Struct`.
 
-    Entries are tuples of such dictionaries, plain bytes are bytes. None when anything would pass
-    `end`.
+    Raises:
+        ValueError: values of the table overlap, or pass the end of the block.
     """
-    after = at + block.size
-    if after > end:
-        return None
-    values = {field.name: read_field(data, at, field) for field in block.fields}
-    if block.slots is not None:
-        values[block.slots.name] = _read_slots(data, at, block.slots)
-    if block.tail is None:
-        return values, after
-    number = read_field(data, at, block.tail.number)
-    tail = _read_tail(data, after, end, number, block.tail.entry)
-    if tail is None:
-        return None
-    values[block.tail.name], after = tail
-    return values, after
 
+    def __init__(self, block: Block) -> None:
+        self._size, self._tail, self._slots = block.size, block.tail, block.slots
+        number = (block.tail.number,) if block.tail is not None else ()
+        fields = sorted((*block.fields, *number), key=lambda field: field.offset)
+        codes, at = "<", 0
+        names: list[str] = []
+        self._more: list[_Value] = []
+        for field in fields:
+            if field.offset < at:
+                raise ValueError(f"{field.name} overlaps what stands before it")
+            codes += f"{field.offset - at}x" + field.type.code * field.repeat
+            at = field.offset + field.type.size * field.repeat
+            first, last = len(names), len(names) + field.repeat
+            if field.repeat > 1 or field.type.made is not None or field.divisor != 1:
+                self._more.append(_Value(field.name, first, last, field.type.made, field.divisor))
+            names += [field.name] * field.repeat
+        if at > block.size:
+            raise ValueError(f"{fields[-1].name} passes the end of its block")
+        self._names = tuple(names)
+        self._struct = struct.Struct(f"{codes}{block.size - at}x")
+        entry = block.tail.entry if block.tail is not None else None
+        self._entry = None if entry is None else BlockReader(entry)
+        self._slot = None if block.slots is None else BlockReader(block.slots.entry)
 
-def _read_tail(
-    data: bytes, at: int, end: int, number: int, entry: Block | None
-) -> tuple[bytes | tuple[dict[str, Any], ...], int] | None:
-    if entry is None:
-        return (data[at : at + number], at + number) if at + number <= end else None
-    entries = []
-    for _ in range(number):
-        one = read_block(data, at, end, entry)
-        if one is None:
+    def read(self, data: bytes, at: int, end: int) -> tuple[dict[str, Any], int] | None:
+        """Values of the block at `at` by name, with its tail, and where it ends.
+
+        Entries are tuples of such dictionaries, plain bytes are bytes. None when anything would
+        pass `end`.
+        """
+        after = at + self._size
+        if after > end:
             return None
-        values, at = one
-        entries.append(values)
-    return tuple(entries), at
+        values = self._values(self._struct.unpack_from(data, at))
+        if self._slots is not None and self._slot is not None:
+            start = at + self._slots.offset
+            entries = self._slot._in_a_row(data[start:], self._slots.number)
+            empty = self._slots.empty_id
+            values[self._slots.name] = tuple(e for e in entries if e["id"] != empty)
+        if self._tail is None:
+            return values, after
+        tail = self._read_tail(data, after, end, values.pop(self._tail.number.name))
+        if tail is None:
+            return None
+        values[self._tail.name], after = tail
+        return values, after
 
+    def _values(self, raw: tuple[Any, ...]) -> dict[str, Any]:
+        values = dict(zip(self._names, raw, strict=True))
+        for value in self._more:
+            values[value.name] = value.of(raw)
+        return values
 
-def _read_slots(data: bytes, at: int, slots: Slots) -> tuple[dict[str, Any], ...]:
-    entries = []
-    for k in range(slots.number):
-        start = at + slots.offset + k * slots.entry.size
-        values = {field.name: read_field(data, start, field) for field in slots.entry.fields}
-        if values["id"] != slots.empty_id:
+    def _in_a_row(self, data: bytes, number: int) -> tuple[dict[str, Any], ...]:
+        """So many blocks without a tail, one after the other."""
+        raw = self._struct.iter_unpack(data[: number * self._size])
+        return tuple(map(self._values, raw))
+
+    def _read_tail(
+        self, data: bytes, at: int, end: int, number: int
+    ) -> tuple[bytes | tuple[dict[str, Any], ...], int] | None:
+        entry = self._entry
+        if entry is None or entry._tail is None:
+            after = at + number * (1 if entry is None else entry._size)
+            if after > end:
+                return None
+            found = data[at:after]
+            return (found if entry is None else entry._in_a_row(found, number)), after
+        entries = []
+        for _ in range(number):
+            one = entry.read(data, at, end)
+            if one is None:
+                return None
+            values, at = one
             entries.append(values)
-    return tuple(entries)
+        return tuple(entries), at

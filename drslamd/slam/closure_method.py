@@ -7,8 +7,9 @@ which of them it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from drslamd.conventions import GRID_US, SECOND_US
 from drslamd.slam.calibration.window_calibration import PairCalibration, calibrated_window
@@ -26,19 +27,27 @@ AGREEMENT = Agreement(least=5, outnumber=2, confirms=True)
 PAPER_AGREEMENT = Agreement(least=2, outnumber=0, confirms=False)
 
 
+class PairWindow(NamedTuple):
+    """A window of one pair, and what is known of its sensors."""
+
+    window: Window
+    noise: PairNoise
+    known: PairCalibration
+
+
 @dataclass(frozen=True)
 class ClosureMethod:
     """One way.
 
     Attributes:
         rule: which window is looked at.
-        solve: module 1 on it, which may use what was learned of the sensors.
+        solve: module 1 on windows of several pairs, which may use what was learned of the sensors.
         agreement: which sets of closures are believed.
         uses_calibration: does what is learned serve modules 1 and 2, over restarts too?
     """
 
     rule: WindowRule
-    solve: Callable[[Window, PairNoise, PairCalibration], RelativePoseEstimate]
+    solve: Callable[[Sequence[PairWindow]], list[RelativePoseEstimate]]
     agreement: Agreement
     uses_calibration: bool
 
@@ -52,8 +61,9 @@ def drslamd_method(
         delta: step of the coarse search, rad.
     """
 
-    def solve(window: Window, noise: PairNoise, known: PairCalibration) -> RelativePoseEstimate:
-        return solver.solve(*calibrated_window(window, noise, known), delta)
+    def solve(windows: Sequence[PairWindow]) -> list[RelativePoseEstimate]:
+        better = [calibrated_window(*window) for window in windows]
+        return solver.solve_all([w for w, _ in better], [noise for _, noise in better], delta)
 
     bin_us = max(GRID_US, longest_us // POINTS)
     rule = WindowRule(longest_us, bin_us, confirm_us, drops_blocked=True)
@@ -69,8 +79,8 @@ def paper_method(tau: int, range_sigma: float, delta: float) -> ClosureMethod:
         delta: step of the coarse search, rad.
     """
 
-    def solve(window: Window, noise: PairNoise, known: PairCalibration) -> RelativePoseEstimate:
-        return algorithm_1.solve(window, range_sigma, delta)
+    def solve(windows: Sequence[PairWindow]) -> list[RelativePoseEstimate]:
+        return [algorithm_1.solve(window, range_sigma, delta) for window, _, _ in windows]
 
     rule = WindowRule(tau * GRID_US, bin_us=GRID_US, confirm_us=0, drops_blocked=False)
     return ClosureMethod(rule, solve, PAPER_AGREEMENT, uses_calibration=False)

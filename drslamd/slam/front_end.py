@@ -12,6 +12,7 @@ from drslamd.sensors.samples import Motion, RangeSample
 from drslamd.slam import settings
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
 from drslamd.slam.calibration.window_calibration import PairCalibration
+from drslamd.slam.closure_method import PairWindow
 from drslamd.slam.consistency.pair import Checked, PairTracker
 from drslamd.slam.doubt import Partners
 from drslamd.slam.graph.estimate import TeamEstimate
@@ -45,11 +46,11 @@ class Measurable(NamedTuple):
 
 
 class WindowJob(NamedTuple):
-    """Module 1 on one window: whose, which, and the computation."""
+    """Work for module 1: whose window, which, and what is known of the sensors."""
 
     pair: PairTracker
     request: WindowRequest
-    run: Callable[[], RelativePoseEstimate]
+    given: PairWindow
 
 
 class WhatIfJob(NamedTuple):
@@ -217,8 +218,9 @@ class FrontEnd:
             if isinstance(window, str):
                 pair.count(window)
             else:
-                run = self._computation(pair, window, b, estimate)
-                out.append(WindowJob(pair, window, run))
+                known = self._calibration(pair, estimate)
+                given = PairWindow(window.window, self._noise(pair, b), known)
+                out.append(WindowJob(pair, window, given))
         return out
 
     def _count_unknown_clocks(
@@ -228,11 +230,9 @@ class FrontEnd:
             if peer.ahead_us is None:
                 self.pairs[peer.chain.robot].count("clock of the peer not known well enough")
 
-    def _computation(
-        self, pair: PairTracker, found: WindowRequest, b: PairEnd, estimate: TeamEstimate | None
-    ) -> Callable[[], RelativePoseEstimate]:
-        known = self._calibration(pair, estimate)
-        return partial(self._method.solve, found.window, self._noise(pair, b), known)
+    def solve(self, windows: Sequence[PairWindow]) -> list[RelativePoseEstimate]:
+        """Module 1 on windows of several pairs at once."""
+        return self._method.solve(windows)
 
     def _noise(self, pair: PairTracker, b: PairEnd) -> PairNoise:
         bias_sigma = self._known.bias_sigma(pair.peer.robot, self._bias_sigma)

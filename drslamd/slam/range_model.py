@@ -123,24 +123,32 @@ class RangeModel:
         doubt = (gap_db - nlos_db + self.doubt_db) / self.doubt_db
         return self.blocked_sigma_m * min(max(doubt, 0.0), 1.0)
 
-    def correlated_covariance(self, t: Array, sigma: float) -> Array:
-        """(n, n): the slow and the white part of ranges at times t (n,), s, around their bias."""
-        slow = (self.slow_share * sigma) ** 2
-        covariance = np.exp(np.abs(t[:, None] - t) * (-1 / self.slow_s))
-        covariance *= slow
-        covariance.ravel()[:: len(t) + 1] += sigma**2 - slow
-        return np.asarray(covariance)
-
-    def covariance(self, t: Array, ranges: Array, noise: RangeNoise) -> Array:
-        """(n, n): white, slow and constant parts, and what a pair does at short range.
+    def correlated_covariance(self, t: Array, sigma: Array | float) -> Array:
+        """(..., n, n): the slow and the white part of ranges around their bias.
 
         Args:
-            t: (n,) s.
-            ranges: (n,) m.
+            t: (..., n) their times, s; sigma: (...) m.
+        """
+        square = np.square(sigma)[..., None, None]
+        slow = self.slow_share**2 * square
+        covariance = np.exp(np.abs(t[..., :, None] - t[..., None, :]) * (-1 / self.slow_s))
+        covariance *= slow
+        np.einsum("...ii->...i", covariance)[:] += (square - slow)[..., 0]
+        return np.asarray(covariance)
+
+    def covariance(
+        self, t: Array, ranges: Array, sigma: Array | float, bias_sigma: Array | float
+    ) -> Array:
+        """(..., n, n): white, slow and constant parts, and what a pair does at short range.
+
+        Args:
+            t: (..., n) s; ranges: (..., n) m.
+            sigma, bias_sigma: (...) see `RangeNoise`.
         """
         near = self.near_range_sigma(ranges)
-        covariance = self.correlated_covariance(t, noise.sigma)
-        covariance += near[:, None] * near + noise.bias_sigma**2
+        covariance = self.correlated_covariance(t, sigma)
+        covariance += near[..., :, None] * near[..., None, :]
+        covariance += np.square(bias_sigma)[..., None, None]
         return covariance
 
 

@@ -101,7 +101,7 @@ def test_a_team_goes_on_when_one_of_them_has_begun_again() -> None:
     pair = VirtualTeam(on=(0, 1))
     pair.run(5.0)
     old = pair.member(1).robot
-    old.front.reckoning._pose = np.array([1e-4 * (FAR + 1), 0.0, 0.0])
+    old.front.reckoning.pose = (1e-4 * (FAR + 1), 0.0, 0.0)
     pair.run(16.0)
     new = pair.member(1).robot
     assert new is not old

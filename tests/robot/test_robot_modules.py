@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from pair_scenes import BESIDE, asked_at, estimate_of
 from robot_scenes import RobotScene, sends, solves
+from slam_scenes import NOISE
 
 from drslamd.conventions import GRID_US, Chain, Segment
 from drslamd.events import Effect, JobDone, Solve
 from drslamd.gossip import messages
 from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, Job
+from drslamd.slam.calibration.window_calibration import PairCalibration
+from drslamd.slam.closure_method import PairWindow
 from drslamd.slam.front_end import WindowJob
 from drslamd.slam.graph.estimate import Learned, Lifted, TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.graph.public_poses import PublicPoses
+from drslamd.slam.range_model import RangeNoise
+from drslamd.slam.relative_pose.estimate import PairNoise, RelativePoseEstimate
 
 RBCD = '[optimizer]\nalgorithm = "rbcd"\n'
 
@@ -30,7 +36,9 @@ def answered(scene: RobotScene, job: Job, result: object) -> list[Effect]:
 def test_an_answer_of_module_1_goes_to_its_pair() -> None:
     scene = RobotScene()
     one, other = scene.own_pair(1), scene.own_pair(2)
-    assert answered(scene, Job(RELATIVE_POSE, other, asked_at(10)), estimate_of(BESIDE)) == []
+    assert (
+        answered(scene, Job(RELATIVE_POSE, (other,), (asked_at(10),)), [estimate_of(BESIDE)]) == []
+    )
     assert (one.closures_seen, other.closures_seen) == (0, 1)
     assert other.history[0].utime == 10 * GRID_US
 
@@ -177,12 +185,19 @@ def test_log_entries_are_repeated_to_whom_we_share_a_graph_with_and_not_otherwis
 def with_windows(monkeypatch: pytest.MonkeyPatch, *peers: int) -> RobotScene:
     """A robot that finds a window of each pair whenever it looks."""
     scene = RobotScene()
-    pairs = [scene.own_pair(peer) for peer in peers]
+    noise = PairNoise(RangeNoise(0.1, 0.3), NOISE, NOISE)
+    seen = PairWindow(asked_at(10).window, noise, PairCalibration())
+    for peer in peers:
+        scene.own_pair(peer)
 
     def found(*_: object) -> list[WindowJob]:
-        return [WindowJob(pair, asked_at(10), lambda: estimate_of(BESIDE)) for pair in pairs]
+        return [WindowJob(p, asked_at(10), seen) for p in scene.robot.front.pairs.values()]
+
+    def answers(windows: Sequence[PairWindow]) -> list[RelativePoseEstimate]:
+        return [estimate_of(BESIDE)] * len(windows)
 
     monkeypatch.setattr(scene.robot.front, "module1", found)
+    monkeypatch.setattr(scene.robot.front, "solve", answers)
     return scene
 
 
@@ -190,18 +205,27 @@ def ended(scene: RobotScene, solve: Solve, took_us: int) -> None:
     scene.robot.handle(JobDone(scene.utime, solve.job_id, solve.run(), took_us))
 
 
+def test_windows_of_all_pairs_are_computed_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = with_windows(monkeypatch, 1, 2)
+    (solve,) = solves(scene.tick(), RELATIVE_POSE)
+    ended(scene, solve, 1_000)
+    assert {peer: p.closures_seen for peer, p in scene.robot.front.pairs.items()} == {1: 1, 2: 1}
+
+
 def test_a_pair_whose_window_is_being_computed_gets_no_second_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    scene = with_windows(monkeypatch, 1, 2)
-    first, second = solves(scene.tick(), RELATIVE_POSE)
+    scene = with_windows(monkeypatch, 1)
+    (first,) = solves(scene.tick(), RELATIVE_POSE)
     assert solves(scene.tick(1), RELATIVE_POSE) == []
+    scene.own_pair(2)
+    (second,) = solves(scene.tick(1), RELATIVE_POSE)
+    assert solves(scene.tick(1), RELATIVE_POSE) == []
+    ended(scene, first, 1_000)
     ended(scene, second, 1_000)
     (again,) = solves(scene.tick(1), RELATIVE_POSE)
-    ended(scene, first, 1_000)
     ended(scene, again, 1_000)
-    seen = {peer: pair.closures_seen for peer, pair in scene.robot.front.pairs.items()}
-    assert seen == {1: 1, 2: 2}
+    assert {peer: p.closures_seen for peer, p in scene.robot.front.pairs.items()} == {1: 2, 2: 2}
 
 
 @pytest.mark.parametrize(("took_us", "goes_on"), [(240_000, True), (260_000, False)])

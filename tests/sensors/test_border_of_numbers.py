@@ -303,7 +303,7 @@ def test_a_range_that_is_not_finite_would_be_counted(
         return Frame(frame.kind, {**frame.values, "nodes": ({**first, name: value}, *rest)})
 
     uwb = a_module()
-    monkeypatch.setattr(linktrack_input, "decode", poisoned)
+    monkeypatch.setattr(linktrack_input, "decode_intact", poisoned)
     peers = [Peer(9, 1500), Peer(10, 1600)]
     samples = [
         sample

@@ -13,13 +13,14 @@ from drslamd.slam.closure_method import (
     PAPER_AGREEMENT,
     POINTS,
     ClosureMethod,
+    PairWindow,
     drslamd_method,
     paper_method,
 )
 from drslamd.slam.graph.estimate import Learned
 from drslamd.slam.range_model import RangeNoise
 from drslamd.slam.relative_pose import algorithm_1, solver
-from drslamd.slam.relative_pose.estimate import PairNoise, Verdict
+from drslamd.slam.relative_pose.estimate import PairNoise, RelativePoseEstimate, Verdict
 from drslamd.slam.relative_pose.window import Window
 
 SENSORS = PairNoise(RangeNoise(0.1, 0.3), NOISE, NOISE)
@@ -34,26 +35,31 @@ def window(bias: float = 0.0) -> tuple[Window, Array]:
     return curved_window(np.random.default_rng(0), bias=bias)
 
 
+def alone(method: ClosureMethod, seen: Window, known: PairCalibration) -> RelativePoseEstimate:
+    (answer,) = method.solve([PairWindow(seen, SENSORS, known)])
+    return answer
+
+
 @pytest.mark.parametrize("method", [DRSLAMD, PAPER])
 def test_both_find_the_pose_of_an_exact_window(method: ClosureMethod) -> None:
     seen, true = window()
-    (found,) = method.solve(seen, SENSORS, UNKNOWN).hypotheses
+    (found,) = alone(method, seen, UNKNOWN).hypotheses
     assert same_pose(found.a_T_b, true, 1e-3)
 
 
 def test_ours_takes_out_what_was_learned_and_the_papers_does_not() -> None:
     seen, true = window(bias=0.4)
-    (better,) = DRSLAMD.solve(seen, SENSORS, KNOWN).hypotheses
+    (better,) = alone(DRSLAMD, seen, KNOWN).hypotheses
     assert same_pose(better.a_T_b, true, 1e-3)
-    (plain,) = PAPER.solve(seen, SENSORS, KNOWN).hypotheses
+    (plain,) = alone(PAPER, seen, KNOWN).hypotheses
     assert not same_pose(plain.a_T_b, true, 0.1)
-    (unaware,) = PAPER.solve(seen, SENSORS, UNKNOWN).hypotheses
+    (unaware,) = alone(PAPER, seen, UNKNOWN).hypotheses
     assert np.array_equal(plain.a_T_b, unaware.a_T_b)
 
 
 def test_ours_is_the_solver_of_module_1_and_the_papers_is_algorithm_1() -> None:
     seen, _ = window(bias=0.1)
-    ours, theirs = (m.solve(seen, SENSORS, UNKNOWN).hypotheses[0] for m in (DRSLAMD, PAPER))
+    ours, theirs = (alone(m, seen, UNKNOWN).hypotheses[0] for m in (DRSLAMD, PAPER))
     assert ours.a_T_b == pytest.approx(solver.solve(seen, SENSORS, 0.1).hypotheses[0].a_T_b)
     printed = algorithm_1.solve(seen, 0.1, 0.1).hypotheses[0]
     assert np.array_equal(theirs.covariance, printed.covariance)
@@ -62,8 +68,8 @@ def test_ours_is_the_solver_of_module_1_and_the_papers_is_algorithm_1() -> None:
 def test_a_window_without_motion_is_a_verdict_for_ours_and_a_pose_for_the_papers() -> None:
     still = np.tile([[0.0, 0.0, 0.0]], (60, 1))
     seen, _ = window_of(still, still + [4.0, 0, 0])
-    assert DRSLAMD.solve(seen, SENSORS, UNKNOWN).verdict is Verdict.UNOBSERVABLE
-    assert PAPER.solve(seen, SENSORS, UNKNOWN).verdict is Verdict.UNIQUE
+    assert alone(DRSLAMD, seen, UNKNOWN).verdict is Verdict.UNOBSERVABLE
+    assert alone(PAPER, seen, UNKNOWN).verdict is Verdict.UNIQUE
 
 
 @pytest.mark.parametrize(("seconds", "bin_us"), [(5, GRID_US), (6, GRID_US), (12, 2 * GRID_US)])

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +19,7 @@ from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.odometry.correction import Correction
-from drslamd.slam.relative_pose.estimate import PairNoise, RelativePoseEstimate
+from drslamd.slam.relative_pose.estimate import PairNoise
 from drslamd.slam.relative_pose.range_buffer import MAX_UWB_IDS, RANGES_FRESH_US
 
 UNKNOWN_CLOCK = "clock of the peer not known well enough"
@@ -210,7 +209,7 @@ def test_a_window_ends_two_seconds_ago_and_holds_what_was_measured() -> None:
     when = (job.request.utime + window.t * SECOND_US) / GRID_US
     # medians of half a second or so
     assert window.ranges == pytest.approx(scene.distances(when), abs=0.02)
-    found = job.run()
+    (found,) = scene.front.solve([job.given])
     (hypothesis,) = found.hypotheses
     expected = scene.seen(round(job.request.utime / GRID_US))
     assert hypothesis.a_T_b[:2] == pytest.approx(expected[:2], abs=0.05)
@@ -220,7 +219,7 @@ def test_a_window_ends_two_seconds_ago_and_holds_what_was_measured() -> None:
 def noise_of(scene: FrontScene) -> PairNoise:
     """What module 1 is told of the sensors."""
     (job,) = scene.module1()
-    return cast(PairNoise, cast("partial[RelativePoseEstimate]", job.run).args[1])
+    return job.given.noise
 
 
 def test_module_1_is_told_how_wrong_both_robots_say_that_they_are() -> None:
@@ -241,7 +240,7 @@ def test_what_module_3_has_learned_of_a_bias_serves_module_1(is_used: bool, extr
     scene.drive(SECONDS)
     learned = TeamEstimate(Segment(0, 1, 0), {}, bias_m={(0, 1): Learned(1.5, 0.01)})
     (plain,), (told,) = scene.module1(), scene.module1(learned)
-    answers = [run.run().hypotheses for run in (plain, told)]
+    answers = [found.hypotheses for found in scene.front.solve([plain.given, told.given])]
     same = len(answers[0]) == len(answers[1]) and all(
         np.array_equal(a.a_T_b, b.a_T_b) for a, b in zip(*answers, strict=True)
     )

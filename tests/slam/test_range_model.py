@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from drslamd.slam.range_model import LINKTRACK, RangeModel, RangeNoise, residuals
+from drslamd.slam.range_model import LINKTRACK, RangeModel, residuals
 
 FAR = np.full(4, 50.0)
 """Where the bias of short ranges is none."""
@@ -27,7 +27,6 @@ def test_the_near_range_bias_fades_by_a_factor_of_e_every_three_metres() -> None
 
 
 def test_ranges_share_a_bias_and_a_slow_part() -> None:
-    noise = RangeNoise(0.1, 0.3)
     t = np.array([-9.0, -8.0, -3.0, 0.0])
     rng, count = np.random.default_rng(13), 200_000
     slow = np.empty((count, 4))
@@ -39,7 +38,7 @@ def test_ranges_share_a_bias_and_a_slow_part() -> None:
     errors = 0.1 * (LINKTRACK.slow_share * slow + white * rng.normal(size=(count, 4)))
     errors += 0.3 * rng.normal(size=(count, 1))
     seen = errors.T @ errors / count
-    assert np.allclose(LINKTRACK.covariance(t, FAR, noise), seen, atol=1e-3)
+    assert np.allclose(LINKTRACK.covariance(t, FAR, 0.1, 0.3), seen, atol=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -62,9 +61,9 @@ def test_short_ranges_share_a_bias_of_their_own() -> None:
         [0.14, 0.07, 0.0], abs=0.01
     )
     assert LINKTRACK.near_range_sigma(-0.3) == LINKTRACK.near_range_sigma(0.0)
-    t, noise = np.array([-100.0, 0.0]), RangeNoise(0.1, 0.3)
-    near = LINKTRACK.covariance(t, np.array([0.5, 1.5]), noise)
-    far = LINKTRACK.covariance(t, FAR[:2], noise)
+    t = np.array([-100.0, 0.0])
+    near = LINKTRACK.covariance(t, np.array([0.5, 1.5]), 0.1, 0.3)
+    far = LINKTRACK.covariance(t, FAR[:2], 0.1, 0.3)
     # at one short range as at the other, so their errors add to each other's covariance
     assert near[0, 1] - far[0, 1] == pytest.approx(0.143 * 0.074, abs=1e-3)
     assert near[1, 1] - far[1, 1] == pytest.approx(0.074**2, abs=1e-3)

@@ -20,13 +20,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from enum import Enum
+from operator import itemgetter
 from statistics import median
 from typing import Any, Final
 
 from drslamd.conventions import MILLISECOND_US
 from drslamd.sensors.device_clock import WINDOW_US, DeviceClock
 from drslamd.sensors.frame_scanner import FrameScanner
-from drslamd.sensors.linktrack.codec import LINKTRACK, Frame, Refusal, decode
+from drslamd.sensors.linktrack.codec import LINKTRACK, Frame, Refusal, decode_intact
 from drslamd.sensors.linktrack.linktrack_advice import LinkTrackWatch, Oddity, shown_id
 from drslamd.sensors.linktrack.linktrack_frames import EMPTY_ID, Kind, ModuleFault
 from drslamd.sensors.samples import RangeSample
@@ -58,7 +59,7 @@ ONE_MODULE_M: Final = 3.0
 _TAG: Final = 2
 _ANCHOR: Final = 1
 _SHORT_IDS: Final = frozenset({Kind.NODE_FRAME2, Kind.NODE_FRAME3})
-_MEASURED: Final = ("distance_m", "fp_rssi_db", "rx_rssi_db")
+_measured: Final = itemgetter("distance_m", "fp_rssi_db", "rx_rssi_db")
 _RANGING: Final = _SHORT_IDS | {Kind.NODE_FRAME5}
 _REFUSED_KINDS: Final = {
     Kind.ANCHOR_FRAME0: Refusal.LP_MODE,
@@ -160,7 +161,7 @@ class LinkTrackInput:
         }
 
     def _on_frame(self, data: bytes, utime: int) -> list[RangeSample]:
-        frame = decode(data)
+        frame = decode_intact(data)
         if isinstance(frame, Refusal):
             return self._refuse(frame, data[:2].hex(" ").upper(), utime)
         if frame.kind in _REFUSED_KINDS:
@@ -202,6 +203,8 @@ class LinkTrackInput:
             heard.setdefault(node["id"], []).append(node["distance_m"])
         if self._uwb_id in heard:
             self._watch.on_odd(Oddity.OWN_ID, shown_id(self._uwb_id), utime)
+        if len(heard) == len(nodes):
+            return
         for uwb_id, metres in heard.items():
             is_empty = uwb_id == EMPTY_ID and frame.kind in _SHORT_IDS
             if not is_empty and max(metres) - min(metres) > ONE_MODULE_M:
@@ -243,7 +246,7 @@ class LinkTrackInput:
             return RangeRefusal.EMPTY
         if node["id"] == self._uwb_id:
             return RangeRefusal.SELF
-        if not all(math.isfinite(node[name]) for name in _MEASURED):
+        if not all(map(math.isfinite, _measured(node))):
             return RangeRefusal.NOT_FINITE
         if not MIN_RANGE_M <= node["distance_m"] <= self._max_range_m:
             return RangeRefusal.LIMITS
@@ -251,6 +254,9 @@ class LinkTrackInput:
 
 
 def _sample(measured: int, peer: int, nodes: list[Mapping[str, Any]]) -> RangeSample:
+    if len(nodes) == 1:
+        metres, first_path_db, all_db = _measured(nodes[0])
+        return RangeSample(measured, peer, metres, all_db - first_path_db)
     return RangeSample(
         utime=measured,
         peer_uwb_id=peer,

@@ -16,25 +16,24 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from drslamd.slam.se2 import Array
+from drslamd.slam.se2 import Array, Index
 
 _NODES = np.arange(5) * (2 * math.pi / 5)
 
 
 def _node_terms() -> Array:
-    """v at the 25 nodes, phi along the first axis: (25, 7)."""
+    """v at the 25 nodes, phi along the first axis, with the factors that m has: (25, 7)."""
     phi, theta = np.repeat(_NODES, 5), np.tile(_NODES, 5)
     return np.stack(
         [
             np.ones(25),
-            np.cos(phi),
-            np.sin(phi),
-            np.cos(theta),
-            np.sin(theta),
-            np.cos(phi - theta),
-            np.sin(phi - theta),
+            -2 * np.cos(phi),
+            -2 * np.sin(phi),
+            -2 * np.cos(theta),
+            2 * np.sin(theta),
+            2 * np.cos(phi - theta),
+            2 * np.sin(phi - theta),
         ],
         axis=-1,
     )
@@ -53,17 +52,23 @@ def _grid(delta: float) -> tuple[Array, Array]:
     return ring[1:-1], (1 + 2 * np.cos(off) + 2 * np.cos(2 * off)) / 5
 
 
-def _ring(a: Array, b: Array, ranges: Array, rho: float, delta: float) -> tuple[Array, Array]:
-    """Angles (m,) and cost (m + 2, m + 2): the map, with its opposite edges around it."""
+def _rings(a: Array, b: Array, ranges: Array, rho: Array, delta: float) -> tuple[Array, Array]:
+    """Angles (m,) and costs (w, m + 2, m + 2): a map for each window, its opposite edges around it.
+
+    Args:
+        a, b: (w, n) points, x + iy; ranges: (w, n); rho: (w,).
+    """
     angles, kernel = _grid(delta)
-    ax, ay, bx, by = a[:, 0], a[:, 1], b[:, 0], b[:, 1]
-    m = np.empty((7, len(ranges)))
-    m[0] = ax * ax + ay * ay + bx * bx + by * by + rho * rho - ranges * ranges
-    m[1], m[2] = -2 * rho * ax, -2 * rho * ay
-    m[3], m[4] = -2 * (ax * bx + ay * by), -2 * (ay * bx - ax * by)
-    m[5], m[6] = 2 * rho * bx, 2 * rho * by
-    errors = _TERMS @ (m * (0.5 / np.maximum(ranges, 0.25)))
-    nodes = np.einsum("kn,kn->k", errors, errors).reshape(5, 5)
+    w, n = ranges.shape
+    rho = rho[:, None]
+    # m by its parts: |a|^2 + |b|^2 + rho^2 - r^2, then rho a, conj(a) b and rho b
+    parts = np.stack([rho * a, a.conj() * b, rho * b], axis=1)
+    m = np.empty((w, 7, n))
+    m[:, 1:] = parts.view(float).reshape(w, 3, n, 2).swapaxes(2, 3).reshape(w, 6, n)
+    m[:, 0] = (a * a.conj() + b * b.conj()).real + rho * rho - ranges * ranges
+    m *= (0.5 / np.maximum(ranges, 0.25))[:, None]
+    errors = _TERMS @ m
+    nodes = np.einsum("wkn,wkn->wk", errors, errors).reshape(w, 5, 5)
     return angles, kernel @ nodes @ kernel.T
 
 
@@ -79,19 +84,34 @@ def cost_map(a: Array, b: Array, ranges: Array, rho: float, delta: float) -> tup
     Returns:
         The m angles of each axis and the (m, m) cost, phi along the first axis.
     """
-    angles, ring = _ring(a, b, ranges, rho, delta)
-    return angles, np.asarray(ring[1:-1, 1:-1])
+    a_points, b_points = (x[None, :, 0] + 1j * x[None, :, 1] for x in (a, b))
+    angles, rings = _rings(a_points, b_points, ranges[None], np.array([rho]), delta)
+    return angles, np.asarray(rings[0, 1:-1, 1:-1])
 
 
 def seeds(
-    a: Array, b: Array, ranges: Array, rho: float, delta: float, most: int
-) -> NDArray[np.float64]:
-    """The best local minima of the map as poses a_T_b (k, 3), k <= most, best first."""
-    angles, ring = _ring(a, b, ranges, rho, delta)
-    m, cost = len(angles), ring[1:-1, 1:-1].ravel()
-    rows = np.minimum(np.minimum(ring[:-2], ring[1:-1]), ring[2:])
-    lowest = np.minimum(np.minimum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:])
-    at = np.flatnonzero(cost <= lowest.ravel())
-    at = at[np.argsort(cost[at], kind="stable")[:most]]
-    phi, theta = angles[at // m], angles[at % m]
-    return np.stack([rho * np.cos(phi), rho * np.sin(phi), theta], axis=-1)  # eq. (2)
+    a: Array, b: Array, ranges: Array, rho: Array, delta: float, most: int
+) -> tuple[Array, Index]:
+    """The best local minima of the map of each window.
+
+    Args:
+        a, b: (w, n) points in their frames, x + iy, m.
+        ranges: (w, n) m; where a place holds no measurement the points are 0 and this is rho.
+        rho: (w,) radius of the search, m.
+        most: minima of one window.
+
+    Returns:
+        Poses a_T_b (k, 3), those of a window beside each other and best first, and the window (k,)
+        of each.
+    """
+    angles, rings = _rings(a, b, ranges, rho, delta)
+    m, cost = len(angles), rings[:, 1:-1, 1:-1].ravel()
+    rows = np.minimum(np.minimum(rings[:, :-2], rings[:, 1:-1]), rings[:, 2:])
+    lowest = np.minimum(np.minimum(rows[:, :, :-2], rows[:, :, 1:-1]), rows[:, :, 2:])
+    at = (cost <= lowest.ravel()).nonzero()[0]
+    of = at // (m * m)
+    order = np.lexsort((cost[at], of)) if len(rho) > 1 else cost[at].argsort(kind="stable")
+    best = (np.arange(len(at)) - np.searchsorted(of, of)) < most
+    at, of = at[order][best], of[best]
+    phi, theta, rho = angles[at // m % m], angles[at % m], rho[of]
+    return np.stack([rho * np.cos(phi), rho * np.sin(phi), theta], axis=-1), of  # eq. (2)

@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import get_lapack_funcs
 
 from drslamd.slam.relative_pose.descent import WEAK_PRIOR
 from drslamd.slam.relative_pose.range_fit import Minima, RangeFit, stepped
 from drslamd.slam.relative_pose.window_noise import WindowNoise
-from drslamd.slam.se2 import Array
+from drslamd.slam.relative_pose.window_stack import Groups, middle
+from drslamd.slam.se2 import Array, Index
 
 MOST_ITERATIONS = 12
 SAME_SIGMAS = 0.5
@@ -24,6 +26,7 @@ SETTLED_CHI2 = 1e-2
 LONGEST = 0.5
 """m, rad: what one step may do."""
 
+_WEAK = WEAK_PRIOR * np.eye(3)
 _factorise, _solve = get_lapack_funcs(("potrf", "potrs"), dtype=np.float64)
 
 
@@ -34,70 +37,136 @@ class Refined(NamedTuple):
         minima: chi-squared is infinite where the covariance of the window is not one, which absurd
             odometry can bring about.
         e: (k, n) predicted minus measured ranges.
+        groups: whose they are; vague windows have none.
     """
 
     minima: Minima
     e: Array
+    groups: Groups
 
 
 def refine(
-    fit: RangeFit, noise: WindowNoise, centred: Array, wants_vague: bool = False
-) -> Refined | None:
-    """Where the noise of the window puts some minima (k, 2).
+    fit: RangeFit, noise: WindowNoise, centred: Array, groups: Groups, wants_vague: bool = False
+) -> Refined:
+    """Where the noise of their windows puts some minima (k, 2).
 
-    None where it leaves one vague, unless that is wanted too.
+    Nowhere where it leaves a window vague, unless that is wanted too.
     """
-    x = centred
-    made_at: tuple[Array, Array] | None = None
-    for n in range(MOST_ITERATIONS):
-        u, rows = fit.linear(x)
-        e = rows[:, 4]
-        if made_at is None or not _same(e, u, made_at, noise.sigma):
-            factors, sound = _factors(noise.covariance(u, x[:, 1], _weights(e, noise)))
-            made_at = e, u
-        weighted = np.array([_solve(f, r.T)[0] for r, f in zip(rows, factors, strict=True)])
+    run = _Refinement(fit, noise, centred, groups, wants_vague)
+    for _ in range(MOST_ITERATIONS):
+        if not len(run.at):
+            break
+        run.step()
+    return run.refined()
+
+
+class _Live(NamedTuple):
+    """What is known of k minima: poses, covariances, chi-squared, V^-1 rows and residuals."""
+
+    x: Array
+    covariance: Array
+    chi2: Array
+    weighted: Array
+    e: Array
+
+
+class _Refinement:
+    """Of some minima, each window until none of its minima needs another step.
+
+    Attributes:
+        at: those that still go on.
+    """
+
+    def __init__(
+        self, fit: RangeFit, noise: WindowNoise, x: Array, groups: Groups, wants_vague: bool
+    ) -> None:
+        k, n = len(x), noise.longest
+        self._fit, self._noise, self._of = fit, noise, groups.of
+        self._looks = not wants_vague
+        self._ended = _Live(
+            x.copy(), np.zeros((k, 3, 3)), np.zeros(k), np.zeros((k, n, 5)), np.zeros((k, n))
+        )
+        self._is_vague = np.zeros(k, dtype=bool)
+        self.at = np.arange(k)
+        self._x, self._factors, self._is_sound = x, [np.empty(0)] * k, np.ones(k, dtype=bool)
+        self._made_at = np.full((k, n), np.inf), np.zeros((k, n), dtype=complex)
+        self._attend(groups)
+
+    def step(self) -> None:
+        u, rows = self._live_fit.linear(self._x)
+        self._renew_factors(rows[:, 4], u)
+        weighted = np.array([_solve(f, r.T)[0] for r, f in zip(rows, self._factors, strict=True)])
         normal = rows @ weighted
-        covariance = np.linalg.inv(normal[:, :3, :3] + WEAK_PRIOR * np.eye(3))
+        covariance = np.linalg.inv(normal[:, :3, :3] + _WEAK)
         step = -(covariance @ normal[:, :3, 4:])[..., 0]
         promise = -(normal[:, 4, :3] * step).sum(axis=1)
-        minima = Minima(x, covariance, np.where(sound, normal[:, 4, 4] - promise, np.inf))
-        if n == 0 and not wants_vague and fit.is_vague(_as_they_scatter(minima, weighted, noise)):
-            return None
+        chi2 = np.where(self._is_sound, normal[:, 4, 4] - promise, np.inf)
         size = np.abs(step).max(axis=1)
-        x = stepped(x, step * np.minimum(1.0, LONGEST / (size + 1e-12))[:, None])
-        if ((size < SETTLED) | (promise < SETTLED_CHI2)).all():
-            break
-    minima = _as_they_scatter(minima._replace(centred=x), weighted, noise)
-    order = np.argsort(minima.chi2, kind="stable")
-    return Refined(Minima(*(values[order] for values in minima)), e[order])
+        ends = self._groups.where_all((size < SETTLED) | (promise < SETTLED_CHI2))
+        if self._looks:
+            self._looks = False
+            minima = self._as_they_scatter(Minima(self._x, covariance, chi2), weighted, self._of)
+            self._is_vague = self._live_fit.is_vague(minima, self._groups)
+            ends = ends | self._is_vague
+        self._x = stepped(self._x, step * np.minimum(1.0, LONGEST / (size + 1e-12))[:, None])
+        self._live = _Live(self._x, covariance, chi2, weighted, rows[:, 4])
+        if ends.any():
+            self._end(ends)
+
+    def refined(self) -> Refined:
+        self._end(np.ones(len(self.at), dtype=bool))
+        known = np.flatnonzero(~self._is_vague)
+        groups = Groups(self._of[known])
+        known = known[groups.in_order(self._ended.chi2[known])]
+        x, covariance, chi2, weighted, e = (values[known] for values in self._ended)
+        minima = self._as_they_scatter(Minima(x, covariance, chi2), weighted, groups.of)
+        return Refined(minima, e, groups)
+
+    def _end(self, ends: NDArray[np.bool_]) -> None:
+        """Some of those that still go on do no longer."""
+        if len(self.at):
+            for kept, now in zip(self._ended, self._live, strict=True):
+                kept[self.at[ends]] = now[ends]
+            self._live = _Live(*(values[~ends] for values in self._live))
+        stay = ~ends
+        self.at, self._x, self._is_sound = self.at[stay], self._x[stay], self._is_sound[stay]
+        self._made_at = self._made_at[0][stay], self._made_at[1][stay]
+        self._factors = [f for f, stays in zip(self._factors, stay.tolist(), strict=True) if stays]
+        self._attend(Groups(self._of[self.at]))
+
+    def _attend(self, groups: Groups) -> None:
+        self._groups, self._live_fit = groups, self._fit.rows(groups.of)
+        self._sigmas = self._noise.sigmas(groups.of)
+
+    def _renew_factors(self, e: Array, u: Array) -> None:
+        """Those of windows in which anything has moved since they were made."""
+        old_e, old_u = self._made_at
+        same = (np.abs(e - old_e) < SAME_SIGMAS * self._sigmas).all(axis=1)
+        same &= (np.abs(u - old_u) < SAME_SIGHT).all(axis=1)
+        anew = np.flatnonzero(~self._groups.where_all(same))
+        if not len(anew):
+            return
+        of, e, u = self._groups.of[anew], e[anew], u[anew]
+        old_e[anew], old_u[anew] = e, u
+        weights = self._weights(e, of)
+        covariance = self._noise.covariance(of, u, self._x[anew, 1], weights)
+        factors, self._is_sound[anew] = _factors(covariance)
+        for k, factor in zip(anew.tolist(), factors, strict=True):
+            self._factors[k] = factor
+
+    def _weights(self, e: Array, of: Index) -> Array:
+        """(k, n): ranges lose weight that are far from the middle of all."""
+        beyond = self._noise.huber_sigmas * self._noise.sigmas(of)
+        off = np.abs(e - middle(e, self._noise.counts[of])[:, None])
+        return np.asarray((beyond / np.maximum(off, beyond)) ** 2)
+
+    def _as_they_scatter(self, minima: Minima, weighted: Array, of: Index) -> Minima:
+        """Weights are those of what must be allowed for, the covariance that of what is known."""
+        gain = minima.covariance @ weighted[:, :, :3].transpose(0, 2, 1)
+        return minima._replace(covariance=minima.covariance + self._noise.excess(of, gain))
 
 
-def _as_they_scatter(minima: Minima, weighted: Array, noise: WindowNoise) -> Minima:
-    """Weights are those of what must be allowed for, the covariance that of what is known."""
-    gain = minima.covariance @ weighted[:, :, :3].transpose(0, 2, 1)
-    return minima._replace(covariance=minima.covariance + noise.excess(gain))
-
-
-def _same(e: Array, u: Array, before: tuple[Array, Array], sigma: float) -> bool:
-    same = np.abs(e - before[0]) < SAME_SIGMAS * sigma
-    same &= np.abs(u - before[1]) < SAME_SIGHT
-    return bool(same.all())
-
-
-def middle(values: Array) -> Array:
-    """Median along the last axis."""
-    n = values.shape[-1]
-    ordered = np.sort(values, axis=-1)
-    return np.asarray((ordered[..., (n - 1) // 2] + ordered[..., n // 2]) / 2)
-
-
-def _weights(e: Array, noise: WindowNoise) -> Array:
-    """(k, n): ranges lose weight that are far from the middle of all."""
-    beyond = noise.huber_sigmas * noise.sigma
-    return np.asarray((beyond / np.maximum(np.abs(e - middle(e)[:, None]), beyond)) ** 2)
-
-
-def _factors(covariance: Array) -> tuple[list[Array], Array]:
+def _factors(covariance: Array) -> tuple[list[Array], NDArray[np.bool_]]:
     """Cholesky factors out of lower triangles, and which of them there are."""
     # LAPACK reads columns: what is below the diagonal here is above it there
     found = [_factorise(c.T, overwrite_a=True, clean=False) for c in covariance]

@@ -1,4 +1,4 @@
-"""The ranges of one window as a function of the pose that they are to explain.
+"""The ranges of a window as a function of the pose that they are to explain.
 
 All of it works on centred poses: where the centroid of b's points lies, seen from the centroid of
 a's points in frame a, and how b is turned. A window that says little leaves a valley, and the
@@ -11,9 +11,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drslamd.slam.range_model import residuals
-from drslamd.slam.se2 import Array
+from drslamd.slam.relative_pose.window_stack import Groups, WindowStack
+from drslamd.slam.se2 import Array, Index
 
 AROUND_M = 1.0
 """Centroids nearer than this have no direction to speak of: steps are straight."""
@@ -29,10 +31,12 @@ SURELY_CHI2 = 10.0
 """A minimum that is no worse than the best by more than this is hardly ever excluded later."""
 POOR_FIT = 4.0
 """Chi-squared per degree of freedom beyond which the model does not explain the window."""
+_NOWHERE = 1e-300
+"""Added to a place, changes none but the origin."""
 
 
 class Minima(NamedTuple):
-    """k minima of one window.
+    """k minima, of one window or of several.
 
     Attributes:
         centred: (k, 2).
@@ -46,17 +50,46 @@ class Minima(NamedTuple):
 
 
 class RangeFit:
-    """The ranges of one window and the points between which they were measured.
+    """The ranges of windows and the points between which they were measured.
 
-    Centred poses are complex (k, 2): place x + iy in m, and heading as a unit number.
+    Centred poses are complex (k, 2): place x + iy in m, and heading as a unit number. Pose k is
+    held against the ranges of row k, or all against those of the only one.
     """
 
-    def __init__(self, a: Array, b: Array, ranges: Array) -> None:
-        """Points a, b (n, 2) in the reference frames of both robots; ranges (n,) m."""
-        a_points, b_points = a[:, 0] + 1j * a[:, 1], b[:, 0] + 1j * b[:, 1]
-        self._a_mean, self._b_mean = a_points.mean(), b_points.mean()
-        self._a, self._b = a_points - self._a_mean, b_points - self._b_mean
-        self._ranges = ranges
+    def __init__(
+        self, a: Array, b: Array, ranges: Array, held: NDArray[np.bool_] | None = None
+    ) -> None:
+        """
+        Args:
+            a, b: (w, n) points in the reference frames of both robots, x + iy, m.
+            ranges: (w, n) m.
+            held: (w, n) which places hold a measurement, where not all do.
+        """
+        n = a.shape[1] if held is None else held.sum(axis=1)
+        self._a_mean, self._b_mean = a.sum(axis=1) / n, b.sum(axis=1) / n
+        self._a, self._b = a - self._a_mean[:, None], b - self._b_mean[:, None]
+        self._ranges, self._held = ranges, held
+
+    @staticmethod
+    def of(stack: WindowStack) -> RangeFit:
+        return RangeFit(stack.points[0], stack.points[1], stack.ranges, stack.held)
+
+    @property
+    def counts(self) -> Index:
+        """(w,) measurements of each row."""
+        if self._held is None:
+            return np.full(len(self._ranges), self._ranges.shape[1])
+        return np.asarray(self._held.sum(axis=1))
+
+    def rows(self, of: Index) -> RangeFit:
+        """Those of windows `of` (k,); the only window stands for as many as are asked."""
+        if len(self._ranges) == 1:
+            return self
+        chosen: RangeFit = object.__new__(RangeFit)
+        chosen._a_mean, chosen._b_mean = self._a_mean[of], self._b_mean[of]
+        chosen._a, chosen._b, chosen._ranges = self._a[of], self._b[of], self._ranges[of]
+        chosen._held = None if self._held is None else self._held[of]
+        return chosen
 
     def centred(self, poses: Array) -> Array:
         """Centred poses of poses a_T_b (k, 3)."""
@@ -107,14 +140,14 @@ class RangeFit:
         """(k, 3, 3) of x, y, theta in frame a."""
         return self._as_if_straight(minima) + self.by_arcs(minima.centred, minima.covariance)
 
-    def is_vague(self, minima: Minima) -> bool:
-        """Whether the best fits, and one that counts is far from being known."""
-        if minima.chi2.min() > POOR_FIT * (len(self._ranges) - 3):
-            return False
+    def is_vague(self, minima: Minima, groups: Groups) -> NDArray[np.bool_]:
+        """(k,) whether the best of the same window fits, and one that counts is far from known."""
         limits = np.array([MAX_SIGMA_M, MAX_SIGMA_M, MAX_SIGMA_RAD]) * VAGUE
-        vague = np.einsum("kii->ki", self._as_if_straight(minima)) > limits**2
-        counts = minima.chi2 < minima.chi2.min() + SURELY_CHI2
-        return bool((vague.any(axis=1) & counts).any())
+        far = np.einsum("kii->ki", self._as_if_straight(minima)) > limits**2
+        best = groups.least(minima.chi2)
+        counts = minima.chi2 < best + SURELY_CHI2
+        fits = best <= POOR_FIT * (self.counts - 3)
+        return np.asarray(fits & ~groups.where_all(~(far.any(axis=1) & counts)))
 
     def _as_if_straight(self, minima: Minima) -> Array:
         m = self.by_step(minima.centred)
@@ -122,9 +155,10 @@ class RangeFit:
 
     def other_side(self, centred: Array) -> Array:
         """The same poses with b on the other side of a at the shortest range."""
-        n = int(np.argmin(self._ranges))
+        ranges = self._ranges if self._held is None else np.where(self._held, self._ranges, np.inf)
+        at = np.arange(len(ranges)), ranges.argmin(axis=1)
         out: Array = centred.copy()
-        out[:, 0] -= 2 * (centred[:, 0] + centred[:, 1] * self._b[n] - self._a[n])
+        out[:, 0] -= 2 * (centred[:, 0] + centred[:, 1] * self._b[at] - self._a[at])
         return out
 
     def linear(self, centred: Array) -> tuple[Array, Array]:
@@ -133,18 +167,22 @@ class RangeFit:
         Returns:
             Unit lines of sight from a to b in frame a, complex (k, n); and (k, 5, n): derivatives
             of the range by the three parts of a step (see `stepped`), by the bias, and the
-            predicted range minus the measured one.
+            predicted range minus the measured one. All are zero where there is no measurement.
         """
         turned = centred[:, 1:] * self._b
         sight = turned - self._a
         sight += centred[:, :1]
         e, u = residuals(sight, self._ranges)  # eq. (1)
         along = u * _direction(centred[:, :1]).conj()
-        rows = np.empty((len(centred), 5, len(self._ranges)))
+        rows = np.empty((len(centred), 5, self._ranges.shape[1]))
         rows[:, 0], rows[:, 1] = along.real, along.imag
-        rows[:, 2] = (u * turned.conj()).imag
+        np.multiply(turned, u.conj(), out=turned)
+        rows[:, 2] = -turned.imag
         rows[:, 3] = 1.0
         rows[:, 4] = e
+        if self._held is not None:
+            rows *= self._held[:, None]
+            u *= self._held
         return u, rows
 
 
@@ -156,8 +194,11 @@ def stepped(centred: Array, step: Array) -> Array:
     angles[:, 0] /= np.maximum(distance, AROUND_M)
     out: Array = np.exp(1j * angles)
     away = distance + step[:, 0]
-    arc, straight = away * out[:, 0], away + 1j * step[:, 1]
-    out[:, 0] = _direction(place) * np.where(distance > AROUND_M, arc, straight)
+    out[:, 0] *= away
+    near = distance <= AROUND_M
+    if near.any():
+        out[near, 0] = away[near] + 1j * step[near, 1]
+    out[:, 0] *= _direction(place)
     out[:, 1] *= centred[:, 1]
     return out
 
@@ -167,4 +208,6 @@ def _angle(number: Array) -> Array:
 
 
 def _direction(place: Array) -> Array:
-    return np.asarray(np.exp(1j * _angle(place)))
+    # nowhere is straight ahead
+    place = place + _NOWHERE
+    return np.asarray(place / np.abs(place))

@@ -9,7 +9,11 @@ and white noise, is in `algorithm_1`.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from drslamd.slam import se2
 from drslamd.slam.relative_pose import coarse_search
@@ -20,7 +24,7 @@ from drslamd.slam.relative_pose.estimate import (
     RelativePoseEstimate,
     Verdict,
 )
-from drslamd.slam.relative_pose.gls import Refined, middle, refine
+from drslamd.slam.relative_pose.gls import Refined, refine
 from drslamd.slam.relative_pose.range_fit import (
     MAX_SIGMA_M,
     MAX_SIGMA_RAD,
@@ -29,7 +33,8 @@ from drslamd.slam.relative_pose.range_fit import (
 )
 from drslamd.slam.relative_pose.window import Window
 from drslamd.slam.relative_pose.window_noise import WindowNoise
-from drslamd.slam.se2 import Array
+from drslamd.slam.relative_pose.window_stack import Groups, WindowStack, middle
+from drslamd.slam.se2 import Array, Index
 
 FEWEST_RANGES = 6
 SEEDS = 8
@@ -45,6 +50,8 @@ HYPOTHESES = 4
 """Poses of one window that are carried on."""
 EXCLUDED_CHI2 = 20.0
 """A minimum this much worse than the best (2 log-likelihood) is no longer carried."""
+MOST_AT_ONCE = 16
+"""Windows; of more, what is computed of them no longer stays in the caches."""
 NEWEST = 3
 """So many last measurements may not lie off the rest: near the end of a window a burst and
 odometry that has just failed look alike."""
@@ -60,97 +67,156 @@ def solve(window: Window, noise: PairNoise, delta: float) -> RelativePoseEstimat
         noise: of ranges and odometries.
         delta: step of the coarse search, radians.
     """
-    if len(window) < FEWEST_RANGES:
-        return RelativePoseEstimate(Verdict.TOO_FEW)
-    fit = RangeFit(window.a_points, window.b_points, window.ranges)
-    candidates = _candidates(window, fit, noise, delta)  # eq. (2), then eq. (1) from each seed
-    if candidates is None:
-        return RelativePoseEstimate(Verdict.UNOBSERVABLE)
-    refined = refine(fit, _window_noise(window, noise), candidates)
-    if refined is None:
-        return RelativePoseEstimate(Verdict.UNOBSERVABLE)
-    if _is_poor(refined, noise):
-        return RelativePoseEstimate(Verdict.POOR_FIT)
-    hypotheses = _not_excluded(fit, refined)
-    if not all(_is_observable(h.covariance) for h in hypotheses):
-        return RelativePoseEstimate(Verdict.UNOBSERVABLE)
-    verdict = Verdict.UNIQUE if len(hypotheses) == 1 else Verdict.AMBIGUOUS
-    return RelativePoseEstimate(verdict, hypotheses)
+    return solve_all([window], [noise], delta)[0]
 
 
-def least_chi2(window: Window, noise: PairNoise, delta: float) -> float:
-    """How badly a window fits at its best: 2 log-likelihood, also where it is vague."""
-    fit = RangeFit(window.a_points, window.b_points, window.ranges)
-    descent = _descent(window, fit, noise, delta)
-    descent.run(ITERATIONS)
-    best = descent.minima().centred[:1]
-    refined = refine(fit, _window_noise(window, noise), best, wants_vague=True)
-    return float("inf") if refined is None else float(refined.minima.chi2[0])
+def solve_all(
+    windows: Sequence[Window], noises: Sequence[PairNoise], delta: float
+) -> list[RelativePoseEstimate]:
+    """Relative poses of several pairs, each as it would be found alone.
+
+    Args:
+        noises: of ranges and odometries of each window, all of one range model.
+    """
+    answers = [RelativePoseEstimate(Verdict.TOO_FEW)] * len(windows)
+    enough = [k for k, window in enumerate(windows) if len(window) >= FEWEST_RANGES]
+    for first in range(0, len(enough), MOST_AT_ONCE):
+        at_once = enough[first : first + MOST_AT_ONCE]
+        found = _solved([windows[k] for k in at_once], [noises[k] for k in at_once], delta)
+        for k, estimate in zip(at_once, found, strict=True):
+            answers[k] = estimate
+    return answers
 
 
-def _candidates(window: Window, fit: RangeFit, noise: PairNoise, delta: float) -> Array | None:
-    """Centred poses (k, 2) of distinct minima; None as soon as it shows that the best is vague."""
-    descent = _descent(window, fit, noise, delta)
+def least_chi2(windows: Sequence[Window], noises: Sequence[PairNoise], delta: float) -> list[float]:
+    """How badly windows fit at their best: 2 log-likelihood, also where they are vague."""
+    found: list[float] = []
+    for first in range(0, len(windows), MOST_AT_ONCE):
+        at_once = slice(first, first + MOST_AT_ONCE)
+        stack = WindowStack.of(windows[at_once])
+        fit = RangeFit.of(stack)
+        descent = _descent(stack, fit, noises[at_once], delta)
+        descent.run(ITERATIONS)
+        minima, groups = descent.minima()
+        noise, best = WindowNoise(stack, noises[at_once]), groups.starts
+        best_groups = Groups(groups.of[best])
+        refined = refine(fit, noise, minima.centred[best], best_groups, wants_vague=True)
+        found += refined.minima.chi2.tolist()
+    return found
+
+
+def _solved(
+    windows: Sequence[Window], noises: Sequence[PairNoise], delta: float
+) -> list[RelativePoseEstimate]:
+    stack = WindowStack.of(windows)
+    fit = RangeFit.of(stack)
+    answers = [RelativePoseEstimate(Verdict.UNOBSERVABLE)] * len(windows)
+    centred, groups = _candidates(stack, fit, noises, delta)  # eq. (2), then eq. (1) from each seed
+    if not len(centred):
+        return answers
+    refined = refine(fit, WindowNoise(stack, noises), centred, groups)
+    if not len(refined.e):
+        return answers
+    is_poor = _is_poor(refined, stack, noises)
+    all_hypotheses = _not_excluded(fit, refined)
+    for (window, _), poor in zip(refined.groups.slices(), is_poor, strict=True):
+        hypotheses = all_hypotheses[window]
+        if poor:
+            answers[window] = RelativePoseEstimate(Verdict.POOR_FIT)
+        elif all(_is_observable(h.covariance) for h in hypotheses):
+            verdict = Verdict.UNIQUE if len(hypotheses) == 1 else Verdict.AMBIGUOUS
+            answers[window] = RelativePoseEstimate(verdict, hypotheses)
+    return answers
+
+
+def _candidates(
+    stack: WindowStack, fit: RangeFit, noises: Sequence[PairNoise], delta: float
+) -> tuple[Array, Groups]:
+    """Centred poses (k, 2) of distinct minima; of a window none as soon as its best are vague."""
+    descent = _descent(stack, fit, noises, delta)
     descent.run(FIRST_ITERATIONS)
-    if fit.is_vague(descent.minima()):
-        return None
+    minima, groups = descent.minima()
+    is_vague = np.zeros(len(stack.t), dtype=bool)
+    is_vague[groups.of] = fit.rows(groups.of).is_vague(minima, groups)
+    descent.leave(is_vague)
     descent.run(ITERATIONS - FIRST_ITERATIONS)
-    minima = descent.minima().centred
-    minima = minima[_distinct(fit.poses(minima))]
-    if window.ranges.min() < CLOSE_PASS_M:
-        minima = np.concatenate([minima, fit.other_side(minima)])
-        minima = minima[_distinct(fit.poses(minima))]
-    return minima
+    minima, groups = descent.minima()
+    centred, of = _distinct(fit, minima.centred, groups.of)
+    near = stack.least_ranges[of] < CLOSE_PASS_M
+    if near.any():
+        passed = fit.rows(of[near]).other_side(centred[near])
+        both = np.concatenate([of, of[near]])
+        order = np.argsort(both, kind="stable")
+        centred, of = _distinct(fit, np.concatenate([centred, passed])[order], both[order])
+    return centred, Groups(of)
 
 
-def _descent(window: Window, fit: RangeFit, noise: PairNoise, delta: float) -> Descent:
+def _descent(
+    stack: WindowStack, fit: RangeFit, noises: Sequence[PairNoise], delta: float
+) -> Descent:
     """From the seeds of the coarse search."""
-    nearest = np.argsort(np.abs(window.t), kind="stable")[:3]
-    rho = max(0.1, float(np.sort(window.ranges[nearest])[1]))
-    seeds = coarse_search.seeds(
-        window.a_points, window.b_points, window.ranges, rho=rho, delta=delta, most=SEEDS
+    rho = np.maximum(0.1, stack.latest_ranges)
+    ranges = (
+        stack.ranges if stack.held is None else np.where(stack.held, stack.ranges, rho[:, None])
     )
-    return Descent(fit, fit.centred(seeds), noise.ranges, noise.model)
+    a, b = stack.points[0], stack.points[1]
+    seeds, of = coarse_search.seeds(a, b, ranges, rho, delta, SEEDS)
+    centred = fit.rows(of).centred(seeds)
+    return Descent(fit, centred, [noise.ranges for noise in noises], of, noises[0].model)
 
 
-def _window_noise(window: Window, noise: PairNoise) -> WindowNoise:
-    return WindowNoise(
-        window, window.a_points, window.b_points, noise.ranges, noise.a, noise.b, noise.model
-    )
+def _is_poor(refined: Refined, stack: WindowStack, noises: Sequence[PairNoise]) -> list[bool]:
+    """Does not even the best minimum explain a window, or its end?"""
+    best = refined.groups.starts
+    of = refined.groups.of[best]
+    e, counts = refined.e[best], stack.counts[of]
+    newest = np.take_along_axis(e, counts[:, None] - 1 - np.arange(NEWEST), axis=1)
+    newest = np.abs(newest - middle(e, counts)[:, None])
+    sigma = np.array([noises[k].ranges.sigma for k in of.tolist()])
+    end_is_off = np.sort(newest, axis=1)[:, NEWEST // 2] > NEWEST_SIGMAS * sigma
+    misfit = refined.minima.chi2[best] > POOR_FIT * (counts - 3)
+    poor: list[bool] = (misfit | end_is_off).tolist()
+    return poor
 
 
-def _is_poor(refined: Refined, noise: PairNoise) -> bool:
-    """Does not even the best minimum explain the window, or its end?"""
-    e = refined.e[0]
-    newest = np.abs(e[-NEWEST:] - middle(e))
-    end_is_off = middle(newest) > NEWEST_SIGMAS * noise.ranges.sigma
-    return bool(refined.minima.chi2[0] > POOR_FIT * (len(e) - 3) or end_is_off)
-
-
-def _not_excluded(fit: RangeFit, refined: Refined) -> tuple[Hypothesis, ...]:
-    """The minima that the data cannot exclude, best first."""
-    minima, chi2 = refined.minima, refined.minima.chi2
-    poses, covariances = fit.poses(minima.centred), fit.covariances(minima)
+def _not_excluded(fit: RangeFit, refined: Refined) -> dict[int, tuple[Hypothesis, ...]]:
+    """The minima of each window that the data cannot exclude, best first."""
+    minima, groups = refined.minima, refined.groups
+    rows = fit.rows(groups.of)
+    poses, covariances = rows.poses(minima.centred), rows.covariances(minima)
     # under the full noise two candidates may have come to the same minimum
-    kept = [k for k in _distinct(poses) if chi2[k] < chi2[0] + EXCLUDED_CHI2][:HYPOTHESES]
-    return tuple(Hypothesis(poses[k], covariances[k], float(chi2[k])) for k in kept)
+    kept = _is_distinct(poses, groups.of)
+    kept &= minima.chi2 < groups.least(minima.chi2) + EXCLUDED_CHI2
+    found = {}
+    for window, span in groups.slices():
+        some = [k for k in range(span.start, span.stop) if kept[k]][:HYPOTHESES]
+        found[window] = tuple(
+            Hypothesis(poses[k], covariances[k], float(minima.chi2[k])) for k in some
+        )
+    return found
 
 
 def _is_observable(covariance: Array) -> bool:
-    xx, xy, yy = covariance[0, 0], covariance[0, 1], covariance[1, 1]
-    spread = (xx + yy) / 2 + np.hypot((xx - yy) / 2, xy)
-    return bool(spread < MAX_SIGMA_M**2 and covariance[2, 2] < MAX_SIGMA_RAD**2)
+    xx, xy, yy, tt = (float(covariance[at]) for at in ((0, 0), (0, 1), (1, 1), (2, 2)))
+    spread = (xx + yy) / 2 + math.hypot((xx - yy) / 2, xy)
+    return spread < MAX_SIGMA_M**2 and tt < MAX_SIGMA_RAD**2
 
 
-def _distinct(poses: Array) -> list[int]:
-    """Which of the poses (k, 3), best first, are not near a better one."""
-    if len(poses) == 1:
-        return [0]
-    off = poses[:, None] - poses
-    near = np.hypot(off[..., 0], off[..., 1]) < MERGE_M
-    near &= np.abs(se2.wrap(off[..., 2])) < MERGE_RAD
-    kept: list[int] = []
-    for k, row in enumerate(near.tolist()):
-        if not any(row[other] for other in kept):
-            kept.append(k)
+def _distinct(fit: RangeFit, centred: Array, of: Index) -> tuple[Array, Index]:
+    """Those of centred poses (k, 2), best first in each window, that are not near a better one."""
+    kept = _is_distinct(fit.rows(of).poses(centred), of)
+    return centred[kept], of[kept]
+
+
+def _is_distinct(poses: Array, of: Index) -> NDArray[np.bool_]:
+    """(k,) which of poses (k, 3), best first in each window, are not near a better one."""
+    kept = np.ones(len(poses), dtype=bool)
+    one, better = np.nonzero(np.tri(len(of), k=-1, dtype=bool) & (of[:, None] == of))
+    off = poses[one] - poses[better]
+    near = np.hypot(off[:, 0], off[:, 1]) < MERGE_M
+    near &= np.abs(se2.wrap(off[:, 2])) < MERGE_RAD
+    for k, other in zip(one[near].tolist(), better[near].tolist(), strict=True):
+        # whose better ones are judged already
+        if kept[other]:
+            kept[k] = False
     return kept

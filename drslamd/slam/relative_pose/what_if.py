@@ -139,20 +139,34 @@ class Question:
                 and as good as infinite.
         """
         found = np.full(len(cases), np.inf)
-        for place in first:
-            found[place] = self._cost(cases[place], noise, delta)
-        if not first or found.argmin() != 0:
-            for place in set(range(len(cases))) - set(first):
-                found[place] = self._cost(cases[place], noise, delta)
+        self._ask(found, cases, first or range(len(cases)), noise, delta)
+        if first and found.argmin() != 0:
+            others = [place for place in range(len(cases)) if place not in set(first)]
+            self._ask(found, cases, others, noise, delta)
         return found
 
-    def _cost(self, case: Case, noise: PairNoise, delta: float) -> float:
+    def _ask(
+        self,
+        found: Array,
+        cases: Sequence[Case],
+        places: Sequence[int],
+        noise: PairNoise,
+        delta: float,
+    ) -> None:
+        """Fill in what some of the cases cost, all of them at once."""
+        windows = {place: self._as_if(cases[place]) for place in places}
+        possible = {place: window for place, window in windows.items() if window is not None}
+        noises = [noise] * len(possible)
+        found[list(possible)] = solver.least_chi2(list(possible.values()), noises, delta)
+
+    def _as_if(self, case: Case) -> Window | None:
+        """The window under one case; None where it cannot be."""
         if not (self.a.can_be(case.a) and self.b.can_be(case.b)):
-            return float("inf")
+            return None
         a, b = self.a.repaired(case.a), self.b.repaired(case.b)
         if not (np.isfinite(a).all() and np.isfinite(b).all()):
-            return float("inf")
-        return solver.least_chi2(replace(self.window, a_poses=a, b_poses=b), noise, delta)
+            return None
+        return replace(self.window, a_poses=a, b_poses=b)
 
 
 def ask(request: WindowRequest, a: PairEnd, b: PairEnd) -> Question:

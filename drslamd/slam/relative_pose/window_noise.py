@@ -14,20 +14,23 @@ matrix product of rank fourteen.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any
 
 import numpy as np
 
 from drslamd.slam.odometry.noise import OdometryNoise, growth, random_covariance
-from drslamd.slam.range_model import LINKTRACK, RangeModel, RangeNoise
-from drslamd.slam.relative_pose.window import Window
-from drslamd.slam.se2 import Array
+from drslamd.slam.relative_pose.estimate import PairNoise
+from drslamd.slam.relative_pose.window_stack import WindowStack
+from drslamd.slam.se2 import Array, Index
 
+_SIGMAS = tuple(field.name for field in fields(OdometryNoise))
 _MATRIX = [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
 """Where a packed covariance has the elements of its matrix."""
 
 
 def way_twists(
-    poses: Array, noises: Sequence[OdometryNoise], before: int, antenna_sigma: float = 0.0
+    poses: Array, noises: Sequence[OdometryNoise], before: Index, antenna_sigma: float = 0.0
 ) -> Array:
     """What the noise of odometry adds up to between measurements and reference time.
 
@@ -35,7 +38,7 @@ def way_twists(
         poses: (m, n, 3) of m robots, each in its body frame at the reference time; between them,
             and between them and the origin, the noise arises.
         noises: sigmas of each robot.
-        before: how many measurements lie before the reference time.
+        before: (m,) how many measurements lie before the reference time.
         antenna_sigma: how far the point that ranges are measured from may be beside the antenna, m.
 
     Returns:
@@ -45,19 +48,24 @@ def way_twists(
     """
     m, n = poses.shape[:2]
     paths, heading = poses[:, :, :2], poses[:, :, 2]
-    track, there = np.zeros((m, n + 1, 2)), np.arange(n)
-    there[before:] += 1
-    track[:, there] = paths
+    robot, there = np.arange(m)[:, None], np.arange(n) + (np.arange(n) >= before[:, None])
+    track = np.zeros((m, n + 1, 2))
+    track[robot, there] = paths
     sums = growth(track)
-    sums = (sums[:, there] - sums[:, before, None]).transpose(0, 2, 1)
+    way = np.moveaxis(sums[robot, there] - sums[robot, before[:, None]], -1, 0)
+    # the sigmas of all robots as those of one, whose numbers are columns
+    columns: Any = np.array([[getattr(n, name) for name in _SIGMAS] for n in noises]).T[..., None]
+    noise = OdometryNoise(*columns)
     out = np.zeros((m, 7, 3, n))
     cos, sin = antenna_sigma * np.cos(heading), antenna_sigma * np.sin(heading)
     out[:, 5, 0], out[:, 5, 1], out[:, 6, 0], out[:, 6, 1] = cos, sin, -sin, cos
-    for robot, noise in enumerate(noises):
-        way = sums[robot]
-        out[robot, :3] = random_covariance(noise, np.where(way[0] < 0, -way, way))[_MATRIX]
-        out[robot, 3] = noise.yaw_rad_per_m * way[[1, 2, 0]]
-        out[robot, 4, :2] = noise.scale * paths[robot].T
+    random = random_covariance(noise, np.where(way[0] < 0, -way, way))
+    for row, packed in enumerate(_MATRIX):
+        for column, place in enumerate(packed):
+            out[:, row, column] = random[place]
+    for column, place in enumerate((1, 2, 0)):
+        out[:, 3, column] = noise.yaw_rad_per_m * way[place]
+    out[:, 4, :2] = (noise.scale * paths.transpose(2, 0, 1)).transpose(1, 0, 2)
     return out
 
 
@@ -67,79 +75,109 @@ def moments(points: Array, directions: Array) -> Array:
     return np.stack([directions.real, directions.imag, turned], axis=-2)
 
 
-def odometry_covariance(twist: Array, moment: Array, before: int) -> Array:
+def odometry_covariance(twist: Array, moment: Array, before: Index) -> Array:
     """(k, n, n): what odometry noise does to the residuals; only the lower triangles are meant.
 
     Args:
-        twist: (m, 7, 3, n) `way_twists` of m robots.
+        twist: (k or 1, m, 7, 3, n) `way_twists` of m robots.
         moment: (k, m, 3, n) `moments` of the antennas along the lines of sight.
-        before: how many measurements lie before the reference time.
+        before: (k,) how many measurements lie before the reference time.
     """
     k, n = len(moment), moment.shape[-1]
-    far = (twist * moment[:, :, None]).sum(axis=3)
+    far = twist[:, :, :, 0] * moment[:, :, None, 0]
+    far += twist[:, :, :, 1] * moment[:, :, None, 1]
+    far += twist[:, :, :, 2] * moment[:, :, None, 2]
+    constant = far[:, :, 3:].reshape(k, -1, n)
     near = far.copy()
     # of two measurements before the reference time the first is the farther one; after it the
     # noise is another, and the last is
-    near[:, :, :3, :before] = moment[..., :before]
-    constant = far[:, :, 3:].reshape(k, -1, n)
-    far[:, :, :3, before:] = moment[..., before:]
+    for row, split in enumerate(before.tolist()):
+        near[row, :, :3, :split] = moment[row, ..., :split]
+        far[row, :, :3, split:] = moment[row, ..., split:]
     lower = far.reshape(k, -1, n).transpose(0, 2, 1) @ near.reshape(k, -1, n)
-    across = constant[:, :, before:].transpose(0, 2, 1) @ constant[:, :, :before]
-    lower[:, before:, :before] = across
+    for row, split in enumerate(before.tolist()):
+        if split < n:
+            across = constant[row, :, split:].T @ constant[row, :, :split]
+            lower[row, split:, :split] = across
     return np.asarray(lower)
 
 
 class WindowNoise:
-    """The covariance of the residuals of one window, for any relative pose."""
+    """The covariances of the residuals of windows, for any relative poses.
 
-    def __init__(
-        self,
-        window: Window,
-        a_points: Array,
-        b_points: Array,
-        ranges: RangeNoise,
-        a: OdometryNoise,
-        b: OdometryNoise,
-        model: RangeModel = LINKTRACK,
-    ) -> None:
-        """Noise of a window with antennas at a_points, b_points (n, 2), of its sensors."""
-        self.sigma = ranges.sigma
+    Attributes:
+        counts: (w,) measurements of each window; longest: to which all are filled up.
+        huber_sigmas: see `RangeModel`.
+    """
+
+    def __init__(self, stack: WindowStack, noises: Sequence[PairNoise]) -> None:
+        """
+        Args:
+            noises: of the sensors of each window, all of one range model.
+
+        Raises:
+            ValueError: they are of several.
+        """
+        model = noises[0].model
+        if any(noise.model is not model and noise.model != model for noise in noises):
+            raise ValueError("windows of several range models")
+        self.counts, self.longest = stack.counts, stack.t.shape[1]
         self.huber_sigmas = model.huber_sigmas
-        self._before = window.before
-        self._ranges = model.covariance(window.t, window.ranges, ranges)
-        self._t, self._model = window.t, model
-        self._excess = ranges.scatter**2 - 1
-        self._points = np.stack([_complex(a_points), _complex(b_points)])
-        poses = np.stack([window.a_poses, window.b_poses])
-        self._twists = way_twists(poses, (a, b), self._before, model.antenna_sigma_m)
+        self._t, self._model, self._held = stack.t, model, stack.held
+        ranges = [(n.ranges.sigma, n.ranges.bias_sigma, n.ranges.scatter) for n in noises]
+        sigma, bias, scatter = np.array(ranges).T
+        self._sigma, self._excess = sigma, scatter**2 - 1
+        self._before = stack.before
+        self._points = stack.points.transpose(1, 0, 2)
+        robots = [noise.a for noise in noises] + [noise.b for noise in noises]
+        poses = stack.poses.reshape(-1, self.longest, 3)
+        twists = way_twists(poses, robots, np.tile(stack.before, 2), model.antenna_sigma_m)
+        self._twists = twists.reshape(2, -1, 7, 3, self.longest).swapaxes(0, 1)
+        self._ranges = model.covariance(stack.t, stack.ranges, sigma, bias)
+        if self._held is not None:
+            # what fills a window up has a noise of its own, and none in common with the rest
+            self._twists *= self._held[:, None, None, None]
+            self._ranges *= self._held[:, None]
+            self._ranges *= self._held[:, :, None]
+            np.einsum("wnn->wn", self._ranges)[:] += ~self._held
 
-    def covariance(self, u: Array, heading: Array, weights: Array) -> Array:
+    def sigmas(self, of: Index) -> Array:
+        """(k, 1) of single ranges of windows `of` (k,)."""
+        return np.asarray(self._sigma[of, None])
+
+    def covariance(self, of: Index, u: Array, heading: Array, weights: Array) -> Array:
         """(k, n, n), of which only the lower triangles are meant.
 
         Args:
-            u: (k, n) unit lines of sight in frame a, complex.
+            of: (k,) windows.
+            u: (k, n) unit lines of sight in frame a, complex, 0 where there is no measurement.
             heading: (k,) of b in frame a, complex.
             weights: (k, n) in (0, 1], thin out outliers.
         """
+        rows = self._rows(of)
         directions = np.stack([u, u * heading[:, None].conj()], axis=1)
-        moment = moments(self._points, directions)
-        covariance = odometry_covariance(self._twists, moment, self._before)
-        covariance += self._ranges
-        np.einsum("kii->ki", covariance)[:] += self.sigma**2 * (1 / weights - 1)
+        moment = moments(self._points[rows], directions)
+        covariance = odometry_covariance(self._twists[rows], moment, self._before[of])
+        covariance += self._ranges[rows]
+        diagonal = covariance.reshape(len(u), -1)[:, :: self.longest + 1]
+        diagonal += self.sigmas(of) ** 2 * (1 / weights - 1)
         return covariance
 
-    def excess(self, gain: Array) -> Array:
+    def excess(self, of: Index, gain: Array) -> Array:
         """(k, 3, 3) what ranges that scatter otherwise than allowed for add to a covariance.
 
         Args:
+            of: (k,) windows.
             gain: (k, 3, n) how the estimate follows the residuals, gain G: with true noise V' in
                 the place of V the covariance G V G' becomes G V' G' (a sandwich).
         """
-        if not self._excess:
+        if not self._excess[of].any():
             return np.zeros((len(gain), 3, 3))
-        scatter = self._model.correlated_covariance(self._t, self.sigma)
-        return np.asarray(self._excess * (gain @ scatter @ gain.transpose(0, 2, 1)))
+        rows = self._rows(of)
+        scatter = self._model.correlated_covariance(self._t[rows], self._sigma[rows])
+        added = gain @ scatter @ gain.transpose(0, 2, 1)
+        return np.asarray(self._excess[of, None, None] * added)
 
-
-def _complex(points: Array) -> Array:
-    return np.asarray(points[:, 0] + 1j * points[:, 1])
+    def _rows(self, of: Index) -> Index | slice:
+        """The only window stands for as many as are asked."""
+        return slice(None) if len(self._t) == 1 else of

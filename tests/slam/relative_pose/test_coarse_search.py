@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from slam_scenes import Array, curved_window, matrix
+from window_scenes import seeds_of
 
 from drslamd.slam.relative_pose import coarse_search
 from drslamd.slam.relative_pose.window import Window
@@ -92,12 +93,12 @@ def test_seeds_are_the_lowest_local_minima_best_first() -> None:
     ]
     assert len(expected) >= 3
     for most in (1, 2, len(expected), len(expected) + 5):
-        seeds = coarse_search.seeds(a, b, ranges, rho, 0.1, most)
+        seeds = seeds_of(a, b, ranges, rho, 0.1, most)
         assert np.allclose(seeds, expected[:most])
 
 
 def test_a_range_of_nothing_does_not_divide_by_nothing() -> None:
     points = np.zeros((6, 2))
-    seeds = coarse_search.seeds(points, points, np.zeros(6), 0.1, 0.5, 3)
+    seeds = seeds_of(points, points, np.zeros(6), 0.1, 0.5, 3)
     assert np.isfinite(seeds).all()
     assert len(seeds) == 3

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 from slam_scenes import Array, curved_window, matrix, wander, window_of
+from window_scenes import fit_between, fit_of
 
 from drslamd.slam.range_model import LINKTRACK, RangeNoise
 from drslamd.slam.relative_pose.descent import (
@@ -18,7 +19,7 @@ from drslamd.slam.relative_pose.descent import (
     SETTLED_CHI2,
     Descent,
 )
-from drslamd.slam.relative_pose.range_fit import RangeFit, stepped
+from drslamd.slam.relative_pose.range_fit import stepped
 from drslamd.slam.relative_pose.window import Window
 
 NOISE = RangeNoise(0.1, 0.3)
@@ -33,13 +34,9 @@ def noisy_window(seed: int, burst_m: float = 0.0) -> tuple[Window, Array]:
     return replace(window, ranges=ranges), true
 
 
-def fit_of(window: Window) -> RangeFit:
-    return RangeFit(window.a_points, window.b_points, window.ranges)
-
-
 def descended(window: Window, seeds: Array) -> Descent:
     fit = fit_of(window)
-    descent = Descent(fit, fit.centred(seeds), NOISE)
+    descent = Descent(fit, fit.centred(seeds), [NOISE])
     descent.run(ITERATIONS)
     return descent
 
@@ -61,7 +58,7 @@ def plain_cost(window: Window, unknowns: Array) -> float:
 def test_it_ends_where_a_general_minimiser_ends(seed: int, burst_m: float) -> None:
     window, true = noisy_window(seed, burst_m)
     best = minimize(lambda x: plain_cost(window, x), np.append(true, 0.2), method="BFGS")
-    found = descended(window, (true + [0.5, -0.4, 0.2])[None]).minima()
+    found = descended(window, (true + [0.5, -0.4, 0.2])[None]).minima()[0]
     assert best.fun - 1e-3 < found.chi2[0] < best.fun + SETTLED_CHI2
     pose = fit_of(window).poses(found.centred)[0]
     spread = np.sqrt(np.diag(best.hess_inv)[:3] * 2)
@@ -82,15 +79,15 @@ def test_the_covariance_is_the_dense_inverse_with_the_bias_left_unknown() -> Non
     columns = [(distances(s * h) - distances(-s * h)) / (2 * h) for s in np.eye(3)]
     j = np.column_stack([*columns, np.ones(50)])
     information = j.T @ j / NOISE.sigma**2 + np.diag([0, 0, 0, NOISE.bias_sigma**-2])
-    found = descended(window, true[None]).minima()
+    found = descended(window, true[None]).minima()[0]
     assert np.allclose(found.covariance[0], np.linalg.inv(information)[:3, :3], rtol=1e-4)
 
 
 def at_distances(*metres: float) -> Descent:
     """Two robots that stand four metres apart; seeds at other distances, no step taken."""
     still = np.zeros((6, 2))
-    fit = RangeFit(still, still, np.full(6, 4.0))
-    return Descent(fit, fit.centred(np.array([[d, 0.0, 0.0] for d in metres])), NOISE)
+    fit = fit_between(still, still, np.full(6, 4.0))
+    return Descent(fit, fit.centred(np.array([[d, 0.0, 0.0] for d in metres])), [NOISE])
 
 
 @pytest.mark.parametrize(
@@ -104,12 +101,12 @@ def test_what_is_far_worse_than_the_best_is_left_out(
     best = 6 * best_sigmas**2
     worse = 6 * (5 * sigmas - 6.25)
     assert (worse < HOPELESS * best + HOPELESS_CHI2) is is_left
-    found = at_distances(4 + 0.1 * sigmas, 4 + 0.1 * best_sigmas).minima()
+    found = at_distances(4 + 0.1 * sigmas, 4 + 0.1 * best_sigmas).minima()[0]
     assert found.chi2 == pytest.approx([best, worse] if is_left else [best])
 
 
 def test_minima_come_best_first() -> None:
-    found = at_distances(4.3, 4.0, 3.9, 4.2).minima()
+    found = at_distances(4.3, 4.0, 3.9, 4.2).minima()[0]
     assert np.abs(found.centred[:, 0]) == pytest.approx([4.0, 3.9, 4.2, 4.3])
 
 
@@ -117,11 +114,11 @@ def test_no_step_makes_a_seed_worse() -> None:
     window, true = noisy_window(5)
     fit = fit_of(window)
     seeds = fit.centred(true + np.random.default_rng(6).normal(0, 0.7, (8, 3)))
-    descent = Descent(fit, seeds, NOISE)
-    costs = [descent.minima().chi2[0]]
+    descent = Descent(fit, seeds, [NOISE])
+    costs = [descent.minima()[0].chi2[0]]
     for _ in range(ITERATIONS):
         descent.run(1)
-        costs.append(descent.minima().chi2[0])
+        costs.append(descent.minima()[0].chi2[0])
     assert (np.diff(costs) <= 0).all()
 
 
@@ -129,7 +126,7 @@ def test_a_window_that_says_nothing_leaves_finite_minima() -> None:
     """Nobody moves: direction and heading are anything."""
     descent = at_distances(4.0, 5.0)
     descent.run(ITERATIONS)
-    found = descent.minima()
+    found, _ = descent.minima()
     assert np.isfinite(found.chi2).all()
     assert np.isfinite(found.covariance).all()
     assert found.covariance[0, 2, 2] > 1e6
@@ -139,11 +136,11 @@ def test_a_valley_is_followed_around_its_arc() -> None:
     """A standing peer says nothing of its heading: any is as good, and the way there is short."""
     rng = np.random.default_rng(4)
     window, true = window_of(wander(rng, 50, 0.2), np.tile([5.0, 1.0, 0.3], (50, 1)))
-    fit = RangeFit(window.a_points, window.b_points, window.ranges)
+    fit = fit_of(window)
     seeds = np.array([true + [0.5, -0.4, 0.0], true + [0.5, -0.4, 2.0]])
-    descent = Descent(fit, fit.centred(seeds), NOISE)
+    descent = Descent(fit, fit.centred(seeds), [NOISE])
     descent.run(ITERATIONS)
-    refined = fit.poses(descent.minima().centred)
+    refined = fit.poses(descent.minima()[0].centred)
     assert len(refined) == 2
     assert np.hypot(*(refined[:, :2] - true[:2]).T).max() < 0.05
 
@@ -151,20 +148,20 @@ def test_a_valley_is_followed_around_its_arc() -> None:
 def test_a_descent_that_is_settled_does_nothing_more() -> None:
     rng = np.random.default_rng(6)
     window, true = curved_window(rng, 6.0, 50, 0.2)
-    fit = RangeFit(window.a_points, window.b_points, window.ranges)
-    once, twice = (Descent(fit, fit.centred(true[None]), NOISE) for _ in range(2))
+    fit = fit_of(window)
+    once, twice = (Descent(fit, fit.centred(true[None]), [NOISE]) for _ in range(2))
     once.run(ITERATIONS)
     twice.run(ITERATIONS)
     twice.run(ITERATIONS)
-    assert np.array_equal(once.minima().centred, twice.minima().centred)
+    assert np.array_equal(once.minima()[0].centred, twice.minima()[0].centred)
 
 
 def test_ranges_that_are_known_to_scatter_less_leave_a_window_less_vague() -> None:
     rng = np.random.default_rng(6)
     window, true = curved_window(rng, 6.0, 50, 0.2)
-    fit = RangeFit(window.a_points, window.b_points, window.ranges)
+    fit = fit_of(window)
     plain, quiet, loud = (
-        Descent(fit, fit.centred(true[None]), replace(NOISE, scatter=scatter)).minima()
+        Descent(fit, fit.centred(true[None]), [replace(NOISE, scatter=scatter)]).minima()[0]
         for scatter in (1.0, 0.5, 2.0)
     )
     assert np.allclose(quiet.covariance, plain.covariance / 4)

@@ -9,14 +9,17 @@ import pytest
 from scipy.linalg import eigvalsh
 from scipy.optimize import least_squares
 from slam_scenes import NOISE, Array, curved_window, matrix, same_pose
+from window_scenes import fit_of, noise_of, of_one
 
 from drslamd.slam.range_model import RangeNoise
-from drslamd.slam.relative_pose.gls import middle, refine
+from drslamd.slam.relative_pose import gls
 from drslamd.slam.relative_pose.range_fit import RangeFit
 from drslamd.slam.relative_pose.window import Window
 from drslamd.slam.relative_pose.window_noise import WindowNoise
+from drslamd.slam.se2 import Index
 
 RANGES = RangeNoise(0.1, 0.3)
+ONE = np.zeros(1, dtype=np.int64)
 
 
 def noisy(seed: int) -> tuple[Window, Array]:
@@ -26,15 +29,20 @@ def noisy(seed: int) -> tuple[Window, Array]:
 
 
 def parts(window: Window, ranges: RangeNoise = RANGES) -> tuple[RangeFit, WindowNoise]:
-    a, b = window.a_points, window.b_points
-    return RangeFit(a, b, window.ranges), WindowNoise(window, a, b, ranges, NOISE, NOISE)
+    return fit_of(window), noise_of(window, ranges, NOISE, NOISE)
+
+
+def refine(fit: RangeFit, noise: WindowNoise, centred: Array) -> gls.Refined | None:
+    """Of the only window; None where it is vague."""
+    refined = gls.refine(fit, noise, centred, of_one(len(centred)))
+    return refined if len(refined.e) else None
 
 
 def whitened(window: Window, noise: WindowNoise, at: Array) -> Array:
     """L with L L' the inverse of the covariance at a pose, no range thinned out."""
     e = at[:2] + window.b_points @ matrix(at)[:2, :2].T - window.a_points
     u = e @ [1, 1j] / np.hypot(*e.T)
-    lower = noise.covariance(u[None], np.exp(1j * at[2:]), np.ones((1, len(u))))[0]
+    lower = noise.covariance(ONE, u[None], np.exp(1j * at[2:]), np.ones((1, len(u))))[0]
     return np.linalg.cholesky(np.linalg.inv(np.tril(lower) + np.tril(lower, -1).T))
 
 
@@ -135,7 +143,7 @@ def test_a_window_that_stays_vague_under_its_noise_is_not_judged() -> None:
     fit, noise = parts(window)
     assert refine(fit, noise, fit.centred(true[None])) is not None
     lost = replace(NOISE, yaw_rad_per_sqrt_m=3.0)
-    noise = WindowNoise(window, window.a_points, window.b_points, RANGES, lost, lost)
+    noise = noise_of(window, RANGES, lost, lost)
     assert refine(fit, noise, fit.centred(true[None])) is None
 
 
@@ -146,8 +154,8 @@ def test_a_covariance_that_is_none_leaves_an_infinite_misfit(
     fit, noise = parts(window)
     plain = WindowNoise.covariance
 
-    def spoiled(self: WindowNoise, u: Array, heading: Array, weights: Array) -> Array:
-        covariance = plain(self, u, heading, weights)
+    def spoiled(self: WindowNoise, of: Index, u: Array, heading: Array, weights: Array) -> Array:
+        covariance = plain(self, of, u, heading, weights)
         covariance[0, 5, 5] = -1.0
         return covariance
 
@@ -156,9 +164,3 @@ def test_a_covariance_that_is_none_leaves_an_infinite_misfit(
     assert judged is not None
     assert np.isfinite(judged.minima.chi2[0])
     assert judged.minima.chi2[1] == np.inf
-
-
-@pytest.mark.parametrize("count", [1, 2, 3, 6, 7])
-def test_the_middle_is_the_median(count: int) -> None:
-    values = np.random.default_rng(count).normal(size=(4, count))
-    assert np.allclose(middle(values), np.median(values, axis=1))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigvalsh
 from slam_scenes import Array, curved_window, matrix, same_pose
+from window_scenes import fit_between, fit_of, of_one
 
 from drslamd.slam.relative_pose import range_fit
 from drslamd.slam.relative_pose.range_fit import Minima, RangeFit, stepped
@@ -16,7 +17,7 @@ def scene(seed: int, apart: float = 6.0) -> tuple[RangeFit, Array, Array, Array]
     rng = np.random.default_rng(seed)
     window, true = curved_window(rng, apart, 50, 0.2)
     a, b = window.a_points, window.b_points
-    return RangeFit(a, b, window.ranges), a, b, true
+    return fit_of(window), a, b, true
 
 
 def some_poses(true: Array) -> Array:
@@ -119,30 +120,30 @@ def test_a_window_is_vague_as_soon_as_one_minimum_that_counts_is(
 ) -> None:
     """Seen from the centroids, which lie at the antennas of two robots that did not move."""
     still = np.zeros((6, 2))
-    fit = RangeFit(still, still, np.full(6, 4.0))
+    fit = fit_between(still, still, np.full(6, 4.0))
     limit = [range_fit.MAX_SIGMA_M, range_fit.MAX_SIGMA_M, range_fit.MAX_SIGMA_RAD][part]
     covariance = np.tile(1e-4 * np.eye(3), (2, 1, 1))
     covariance[1, part, part] = (times * range_fit.VAGUE * limit) ** 2
     centred = fit.centred(np.array([[4.0, 0.0, 1.0], [4.0, 0.0, -1.0]]))
     worse = 7.0 + np.array([0.0, chi2 * range_fit.SURELY_CHI2])
-    assert fit.is_vague(Minima(centred, covariance, worse)) is vague
+    assert fit.is_vague(Minima(centred, covariance, worse), of_one(2)).tolist() == [vague] * 2
 
 
 @pytest.mark.parametrize(("share", "vague"), [(0.999, True), (1.001, False)])
 def test_a_window_that_fits_nothing_is_not_called_vague(share: float, vague: bool) -> None:
     """Sensors that contradict each other are another verdict than too little motion."""
     still = np.zeros((9, 2))
-    fit = RangeFit(still, still, np.full(9, 4.0))
+    fit = fit_between(still, still, np.full(9, 4.0))
     covariance = np.tile(100.0 * np.eye(3), (1, 1, 1))
     chi2 = np.array([share * range_fit.POOR_FIT * (9 - 3)])
     minima = Minima(fit.centred(np.array([[4.0, 0.0, 1.0]])), covariance, chi2)
-    assert fit.is_vague(minima) is vague
+    assert fit.is_vague(minima, of_one(1)).tolist() == [vague]
 
 
 def test_the_other_side_is_as_far_away_where_both_were_nearest() -> None:
     rng = np.random.default_rng(11)
     window, true = curved_window(rng, 1.0, 50, 0.2)
-    fit = RangeFit(window.a_points, window.b_points, window.ranges)
+    fit = fit_of(window)
     other = fit.poses(fit.other_side(fit.centred(true[None])))[0]
     n = int(np.argmin(window.ranges))
     before, after = (

@@ -19,15 +19,15 @@ from slam_scenes import (
     wander,
     window_of,
 )
+from window_scenes import fit_of, seeds_of
 
 from drslamd.slam import se2
-from drslamd.slam.range_model import LINKTRACK, RangeNoise
-from drslamd.slam.relative_pose import algorithm_1, coarse_search, solver
+from drslamd.slam.range_model import LINKTRACK, RangeModel, RangeNoise
+from drslamd.slam.relative_pose import algorithm_1, solver
 from drslamd.slam.relative_pose.algorithm_1 import linear, window_residuals
 from drslamd.slam.relative_pose.descent import ITERATIONS, Descent
 from drslamd.slam.relative_pose.estimate import PairNoise, RelativePoseEstimate, Verdict
-from drslamd.slam.relative_pose.range_fit import RangeFit
-from drslamd.slam.relative_pose.solver import solve
+from drslamd.slam.relative_pose.solver import solve, solve_all
 from drslamd.slam.relative_pose.window import Window
 
 SENSORS = PairNoise(RangeNoise(0.10, 0.30), NOISE, NOISE)
@@ -319,10 +319,10 @@ def minpack(window: Window, seeds: Array) -> Array:
 
 
 def refined(window: Window, seeds: Array) -> Array:
-    fit = RangeFit(window.a_points, window.b_points, window.ranges)
-    descent = Descent(fit, fit.centred(seeds), SENSORS.ranges)
+    fit = fit_of(window)
+    descent = Descent(fit, fit.centred(seeds), [SENSORS.ranges])
     descent.run(ITERATIONS)
-    return fit.poses(descent.minima().centred)
+    return fit.poses(descent.minima()[0].centred)
 
 
 @pytest.mark.slow
@@ -336,7 +336,7 @@ def test_the_refinement_reaches_the_minima_of_minpack() -> None:
         ranges[rng.choice(60, 6, replace=False)] += 0.8
         noisy = with_ranges(window, ranges)
         a, b = noisy.a_points, noisy.b_points
-        seeds = coarse_search.seeds(a, b, ranges, max(0.1, float(ranges[-1])), DELTA, 8)
+        seeds = seeds_of(a, b, ranges, max(0.1, float(ranges[-1])), DELTA, 8)
         ours = refined(noisy, seeds)[0]
         theirs = minpack(noisy, seeds)
         assert cost_at_the_best_bias(noisy, ours) < cost_of(noisy, theirs) + 0.1
@@ -399,3 +399,63 @@ def test_the_pose_is_that_of_the_reference_time_and_later_ranges_count(seed: int
     assert (window.before, earlier.before) == (60, 56)
     true = se2.between(a[-5], b[-5])
     assert same_pose(solved(earlier).hypotheses[0].a_T_b, true, 1e-6)
+
+
+# windows of several pairs at once
+
+
+def some_windows() -> list[tuple[Window, PairNoise]]:
+    """Of unlike length, of every verdict, one with robots that meet, each with its own noise."""
+    rng, out = np.random.default_rng(31), []
+    for k, count in enumerate([60, 60, 25, 60, 5, 60, 41, 60, 12, 60]):
+        window, _ = curved_window(rng, 6.0 * (k % 3), count)
+        ranges = np.abs(window.ranges + rng.normal(0, 1.0 if k == 5 else 0.05, count))
+        at = -1 - 2 * (k % 2)
+        window = replace(
+            window,
+            ranges=ranges,
+            t=window.t - window.t[at],
+            a_poses=se2.between(window.a_poses[at], window.a_poses),
+            b_poses=se2.between(window.b_poses[at], window.b_poses),
+        )
+        noise = PairNoise(RangeNoise(0.1, 0.05 * (k + 1), 0.8 + 0.05 * k), NOISE, NOISE)
+        out.append((window, replace(noise, b=replace(NOISE, scale=0.02 + 0.01 * (k % 2)))))
+    still, _ = window_of(straight((0, 0, 0), 60, 0.0), straight((4, 0, 1), 60, 0.0))
+    ambiguous, _ = window_of(straight((0, 0, 0), 60, 0.25), straight((3, 4, 2.0), 60, 0.2))
+    return [*out, (still, SENSORS), (ambiguous, SENSORS)]
+
+
+@pytest.mark.parametrize("at_once", [16, 3])
+def test_each_of_several_windows_is_answered_as_if_it_was_alone(
+    at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(solver, "MOST_AT_ONCE", at_once)
+    windows, noises = zip(*some_windows(), strict=True)
+    together = solve_all(windows, noises, DELTA)
+    apart = [solve(window, noise, DELTA) for window, noise in some_windows()]
+    assert {estimate.verdict for estimate in together} == set(Verdict)
+    for ours, alone in zip(together, apart, strict=True):
+        assert ours.verdict is alone.verdict
+        for h, g in zip(ours.hypotheses, alone.hypotheses, strict=True):
+            assert np.abs(h.a_T_b - g.a_T_b).max() < 1e-10
+            assert np.allclose(h.covariance, g.covariance, rtol=1e-6)
+            assert h.chi2 == pytest.approx(g.chi2, rel=1e-6)
+
+
+def test_so_is_how_badly_it_fits_at_its_best() -> None:
+    some = [(window, noise) for window, noise in some_windows() if len(window) > 5]
+    windows, noises = zip(*some, strict=True)
+    apart = [solver.least_chi2([window], [noise], DELTA)[0] for window, noise in some]
+    assert solver.least_chi2(windows, noises, DELTA) == pytest.approx(apart, rel=1e-6)
+
+
+def test_where_there_is_nothing_to_solve_there_is_no_answer() -> None:
+    assert solve_all([], [], DELTA) == []
+    assert solver.least_chi2([], [], DELTA) == []
+
+
+def test_windows_of_unlike_sensors_are_not_solved_at_once() -> None:
+    window, _ = curved(0)
+    other = replace(SENSORS, model=RangeModel(slow_s=1.0))
+    with pytest.raises(ValueError, match="several range models"):
+        solve_all([window, window], [SENSORS, other], DELTA)

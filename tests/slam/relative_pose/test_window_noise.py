@@ -8,19 +8,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from slam_scenes import NOISE, Array, seen_from_last, wander
+from window_scenes import noise_of
 
 from drslamd.slam import se2
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.range_model import LINKTRACK, RangeNoise
 from drslamd.slam.relative_pose.window import Window
 from drslamd.slam.relative_pose.window_noise import (
-    WindowNoise,
     moments,
     odometry_covariance,
     way_twists,
 )
 
 QUIET = OdometryNoise(1e-12, 1e-12, 1e-12, 1e-12)
+BOTH = np.zeros(2, dtype=np.int64)
+"""Two poses of the only window."""
 ANTENNA = 0.03
 """m; of each robot, by x and y, see `RangeModel.antenna_sigma_m`."""
 PARTS = {
@@ -46,8 +48,9 @@ def of_one_robot(
     antenna_sigma: float = 0.0,
 ) -> Array:
     moment = moments(points @ [1, 1j], directions @ [1, 1j])
-    twist = way_twists(path[None], [noise], before, antenna_sigma)
-    return from_lower(odometry_covariance(twist, moment[None, None], before)[0])
+    split = np.array([before])
+    twist = way_twists(path[None], [noise], split, antenna_sigma)
+    return from_lower(odometry_covariance(twist[None], moment[None, None], split)[0])
 
 
 def noisy_windows(
@@ -147,14 +150,14 @@ def test_the_noise_of_a_window_is_that_of_its_ranges_and_both_robots(reference: 
     ranges, of_b = RangeNoise(0.1, 0.3), replace(NOISE, scale=0.06)
     heading = np.array([0.7, -2.0])
     u = np.exp(1j * np.random.default_rng(15).uniform(-0.5, 0.5, (2, 40)))
-    covariance = WindowNoise(window, a, b, ranges, NOISE, of_b).covariance(
-        u, np.exp(1j * heading), np.ones((2, 40))
+    covariance = noise_of(window, ranges, NOISE, of_b).covariance(
+        BOTH, u, np.exp(1j * heading), np.ones((2, 40))
     )
     for k in range(2):
         in_a = np.stack([u[k].real, u[k].imag], axis=-1)
         in_b = se2.rotate(-heading[k], in_a)
         expected = (
-            LINKTRACK.covariance(window.t, window.ranges, ranges)
+            LINKTRACK.covariance(window.t, window.ranges, 0.1, 0.3)
             + of_one_robot(a, window.a_poses, in_a, NOISE, reference + 1, ANTENNA)
             + of_one_robot(b, window.b_poses, in_b, of_b, reference + 1, ANTENNA)
         )
@@ -163,11 +166,11 @@ def test_the_noise_of_a_window_is_that_of_its_ranges_and_both_robots(reference: 
 
 
 def test_an_outlier_that_weighs_a_quarter_is_twice_as_uncertain() -> None:
-    window, a, b = drive(39)
-    noise = WindowNoise(window, a, b, RangeNoise(0.1, 0.3), QUIET, QUIET)
+    window, _, _ = drive(39)
+    noise = noise_of(window, RangeNoise(0.1, 0.3), QUIET, QUIET)
     weights = np.ones((2, 40))
     weights[1, 7] = 0.25
-    plain, thinned = noise.covariance(np.ones((2, 40)) + 0j, np.ones(2) + 0j, weights)
+    plain, thinned = noise.covariance(BOTH, np.ones((2, 40)) + 0j, np.ones(2) + 0j, weights)
     assert plain[7, 7] == pytest.approx(0.1**2 + 0.3**2 + 2 * ANTENNA**2)
     assert thinned[7, 7] == pytest.approx(0.2**2 + 0.3**2 + 2 * ANTENNA**2)
     assert np.count_nonzero(np.tril(thinned - plain)) == 1
@@ -175,14 +178,14 @@ def test_an_outlier_that_weighs_a_quarter_is_twice_as_uncertain() -> None:
 
 @pytest.mark.parametrize("scatter", [0.6, 1.5])
 def test_what_follows_ranges_is_as_wrong_as_they_scatter(scatter: float) -> None:
-    window, a, b = drive(30)
-    said = WindowNoise(window, a, b, RangeNoise(0.1, 0.3, scatter), NOISE, NOISE)
-    true = WindowNoise(window, a, b, RangeNoise(0.1 * scatter, 0.3), NOISE, NOISE)
+    window, _, _ = drive(30)
+    said = noise_of(window, RangeNoise(0.1, 0.3, scatter), NOISE, NOISE)
+    true = noise_of(window, RangeNoise(0.1 * scatter, 0.3), NOISE, NOISE)
     rng = np.random.default_rng(16)
     u, heading, ones = np.exp(1j * rng.uniform(size=(2, 40))), np.ones(2) + 0j, np.ones((2, 40))
     gain = rng.normal(size=(2, 3, 40))
-    for k, excess in enumerate(said.excess(gain)):
-        covariances = [from_lower(n.covariance(u, heading, ones)[k]) for n in (said, true)]
+    for k, excess in enumerate(said.excess(BOTH, gain)):
+        covariances = [from_lower(n.covariance(BOTH, u, heading, ones)[k]) for n in (said, true)]
         wrong, right = (gain[k] @ c @ gain[k].T for c in covariances)
         assert np.allclose(wrong + excess, right, rtol=0, atol=1e-9)
         assert np.abs(excess).max() > 0.01

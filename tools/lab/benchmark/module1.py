@@ -14,6 +14,7 @@ from drslamd.slam.relative_pose.descent import ITERATIONS, Descent
 from drslamd.slam.relative_pose.estimate import RelativePoseEstimate
 from drslamd.slam.relative_pose.range_fit import RangeFit
 from drslamd.slam.relative_pose.window import Window, binned
+from drslamd.slam.relative_pose.window_stack import WindowStack
 from lab.benchmark import timing, windows
 from lab.benchmark.rows import Peer, Row
 from lab.recordings.recording import Array
@@ -76,13 +77,13 @@ def full(window: Window) -> RelativePoseEstimate:
 
 def refined(window: Window, seeds: int) -> Array:
     """(seeds, 3) the minima that our search finds from so many seeds."""
-    a, b = window.a_points, window.b_points
-    rho = float(np.median(window.ranges[-3:]))
-    found = coarse_search.seeds(a, b, window.ranges, rho, DELTA, seeds)
-    fit = RangeFit(a, b, window.ranges)
-    descent = Descent(fit, fit.centred(found), windows.NOISE.ranges)
+    stack = WindowStack.of([window])
+    a, b, rho = stack.points[0], stack.points[1], stack.latest_ranges
+    found, _ = coarse_search.seeds(a, b, stack.ranges, rho, DELTA, seeds)
+    fit = RangeFit.of(stack)
+    descent = Descent(fit, fit.centred(found), [windows.NOISE.ranges])
     descent.run(ITERATIONS)
-    return fit.poses(descent.minima().centred)
+    return fit.poses(descent.minima()[0].centred)
 
 
 def grid(window: Window) -> Array:
