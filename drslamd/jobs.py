@@ -19,6 +19,7 @@ CONSISTENCY = "consistency"
 OPTIMIZER = "optimizer"
 WHAT_IF = "what_if"
 RELOCATION = "relocation"
+POINTS = "points"
 
 REST = 4
 """How many times as long as it computed a module rests."""
@@ -26,11 +27,16 @@ REST = 4
 
 @dataclass(frozen=True)
 class Job:
-    """A computation: its module, the pair that it is about, and the window that it looks at."""
+    """A computation: its module, the pair that it is about, and the window that it looks at.
+
+    Attributes:
+        told: gets what comes out and the time, where it is about no pair; is there news to tell?
+    """
 
     module: str
     pair: PairTracker | None = None
     request: WindowRequest | None = None
+    told: Callable[[Any, int], bool] | None = None
 
     def tell_pair(self, result: Any) -> bool:
         """Give a pair what was found for it; False where it is not about one pair."""

@@ -11,6 +11,7 @@ from drslamd.config import Config
 from drslamd.config_wheels import SerialWheelSection
 from drslamd.conventions import SECOND_US
 from drslamd.events import NetworkState, Port, PortCondition, PortState, Slept
+from drslamd.gossip.message_types import PoseState
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.team import Team
 from drslamd.jobs import OPTIMIZER, RELATIVE_POSE, DutyCycle, Jobs
@@ -154,6 +155,11 @@ def _state(robot: Stages) -> str | None:
 def why_not_localised(robot: Stages, utime: int) -> str | None:
     """The first stage at which it stops, None when the robot is localised."""
     where = robot.whereabouts(utime)
+    if where.state is PoseState.POSITION:
+        return (
+            "its place is known and its heading is not: it stands, and other robots have found it; "
+            "drive a metre or two"
+        )
     if where.is_old:
         seconds = where.age_us // SECOND_US
         relocation = robot.front.relocation
