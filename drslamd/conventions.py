@@ -47,6 +47,23 @@ class Chain(NamedTuple):
     epoch: int
 
 
+FIRST_NODE = 1 << 16
+"""Modules that no robot of the team carries are numbered by their UWB id from here on."""
+NODE_EPOCH = 1
+"""They never start."""
+
+
+def node_chain(uwb_id: int) -> Chain:
+    """The name of a module that stands without a robot; its samples are the places where it stood,
+    counted from 0."""
+    return Chain(FIRST_NODE + uwb_id, NODE_EPOCH)
+
+
+def is_node(number: int) -> bool:
+    """Is it such a module, where robots are named?"""
+    return number >= FIRST_NODE
+
+
 class Segment(NamedTuple):
     """A part of a chain without a break in its odometry."""
 

@@ -19,6 +19,7 @@ CONSISTENCY = "consistency"
 OPTIMIZER = "optimizer"
 WHAT_IF = "what_if"
 RELOCATION = "relocation"
+POINTS = "points"
 
 REST = 4
 """How many times as long as it computed a module rests."""
@@ -26,11 +27,16 @@ REST = 4
 
 @dataclass(frozen=True)
 class Job:
-    """A computation: its module, the pairs that it is about, and the window of each."""
+    """A computation: its module, the pairs that it is about, and the window of each.
+
+    Attributes:
+        told: gets what comes out and the time, where it is about no pair; is there news to tell?
+    """
 
     module: str
     pairs: tuple[PairTracker, ...] = ()
     requests: tuple[WindowRequest, ...] = ()
+    told: Callable[[Any, int], bool] | None = None
 
     def tell_pairs(self, result: Any) -> bool:
         """Give the pairs what was found for them; False where it is not about pairs."""

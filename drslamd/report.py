@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from drslamd.conventions import GRID_US, SECOND_US
+from drslamd.conventions import GRID_US, SECOND_US, is_node
 from drslamd.events import PortCondition
 from drslamd.gossip.message_types import PoseState
 from drslamd.gossip.peer import Peer
-from drslamd.reports import clock_report
+from drslamd.reports import clock_report, point_report
 from drslamd.robot import Robot
 from drslamd.slam.consistency.pair import PairTracker
 from drslamd.slam.graph.trajectory import deform_track
@@ -38,6 +38,7 @@ def status(robot: Robot, utime: int) -> dict[str, Any]:
         "network": _network(robot, utime),
         "peers": _peers(robot, utime),
         "pairs": {str(k): _pair(pair) for k, pair in sorted(robot.front.pairs.items())},
+        "points": point_report.points(robot),
         "graph": _graph(robot),
     }
 
@@ -57,15 +58,17 @@ def _pose(robot: Robot, utime: int) -> dict[str, Any]:
         return {"state": state_name(where.state)}
     _, pose, covariance = where.pose
     spread = np.linalg.eigvalsh(covariance[:2, :2])[-1]
+    is_known = where.state is not PoseState.POSITION
+    sigma_deg = math.degrees(math.sqrt(float(covariance[2, 2])))
     return {
         "state": state_name(where.state),
         "frame": estimate.frame.robot,
         "age_s": round(where.age_us / SECOND_US, 3),
         "x_m": round(float(pose[0]), 4),
         "y_m": round(float(pose[1]), 4),
-        "theta_deg": round(math.degrees(float(pose[2])), 3),
+        "theta_deg": round(math.degrees(float(pose[2])), 3) if is_known else None,
         "sigma_m": round(math.sqrt(float(spread)), 4),
-        "sigma_deg": round(math.degrees(math.sqrt(float(covariance[2, 2]))), 3),
+        "sigma_deg": round(sigma_deg, 3) if is_known else None,
     }
 
 
@@ -166,8 +169,13 @@ def _pair(pair: PairTracker) -> dict[str, Any]:
 def _graph(robot: Robot) -> dict[str, Any]:
     estimate, learned, own = robot.back.estimate, robot.calibration.latest, robot.own.robot
     out: dict[str, Any] = {
-        "group": sorted({segment.robot for segment in robot.back.group}),
-        "keyframes": {str(k): len(c.keyframes) for k, c in robot.back.graph.view.chains.items()},
+        "group": sorted({s.robot for s in robot.back.group if not is_node(s.robot)}),
+        "keyframes": {
+            str(k): len(c.keyframes)
+            for k, c in robot.back.graph.view.chains.items()
+            if not is_node(k)
+        },
+        "modules": point_report.modules(robot),
     }
     if estimate is not None:
         out |= {
@@ -195,7 +203,7 @@ def trajectories(robot: Robot, utime: int) -> dict[str, Any]:
     """
     estimate = robot.back.estimate
     if estimate is None:
-        return {"frame": None, "robots": {}}
+        return {"frame": None, "robots": {}, "modules": {}}
     out = {}
     for number, solved in sorted(estimate.trajectories.items()):
         n, poses = solved.n, solved.poses
@@ -207,9 +215,11 @@ def trajectories(robot: Robot, utime: int) -> dict[str, Any]:
             "epoch": solved.chain.epoch,
             "utime": (n * GRID_US).astype(np.int64).tolist(),
             "poses": np.round(poses, 6).tolist(),
+            "has_heading": number not in estimate.points,
             "clock": clock_report.clock(robot, solved.chain, utime),
         }
-    return {"frame": estimate.frame.robot, "robots": out}
+    modules = point_report.modules(robot)
+    return {"frame": estimate.frame.robot, "robots": out, "modules": modules}
 
 
 def closures(robot: Robot) -> dict[str, Any]:

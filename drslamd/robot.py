@@ -47,7 +47,7 @@ from drslamd.gossip.bounds import is_sayable
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
-from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, RELOCATION, WHAT_IF, Job, Jobs
+from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, WHAT_IF, Job, Jobs
 from drslamd.memory import Memory
 from drslamd.near.surroundings import Surroundings
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
@@ -135,7 +135,7 @@ class Robot:
             self._repeat: TURN_US if config.optimizer.algorithm == "rbcd" else REPEAT_US,
             self._send_status: SECOND_US,
             self._send_odometry: SECOND_US,
-            self._relocate: PLACE_US,
+            self._place: PLACE_US,
             self._extend_log: SECOND_US,
             self._relative_poses: round(SECOND_US / config.relative_pose.rate_hz),
             self._what_if: SECOND_US,
@@ -282,11 +282,12 @@ class Robot:
         run = self.back.begin(self.team.present(utime), set(self.team.living(utime)), utime)
         return [self.jobs.begin(Job(OPTIMIZER), run)] if run else []
 
-    def _relocate(self, utime: int) -> list[Effect]:
-        """After a hole in our odometry: where do ranges to localised peers place us?"""
-        run = self.standing.relocate(self.neighbours(utime), utime)
-        is_free = self.jobs.is_free(RELOCATION, utime)
-        return [self.jobs.begin(Job(RELOCATION), run)] if run and is_free else []
+    def _place(self, utime: int) -> list[Effect]:
+        """After a hole in our odometry: where do ranges place us? And where is what stands?"""
+        asked = self.standing.asked(
+            self.neighbours(utime), self.team.robot_of_uwb, self.jobs.is_free, utime
+        )
+        return [self.jobs.begin(Job(name, told=told), run) for name, run, told in asked]
 
     def _take_turn(self, utime: int) -> list[Effect]:
         """With `rbcd`: move if it is our turn now, and say what others wait for."""
@@ -298,10 +299,9 @@ class Robot:
 
     def _on_job(self, event: JobDone) -> list[Effect]:
         job = self.jobs.finish(event)
-        if job.module == RELOCATION:
-            is_found = self.standing.on_relocated(event.result, event.utime)
-            actions = (self._extend_log, self._optimize) if is_found else ()
-            return [effect for action in actions for effect in action(event.utime)]
+        if job.told is not None:
+            is_news = job.told(event.result, event.utime)
+            return [*self._extend_log(event.utime), *self._optimize(event.utime)] if is_news else []
         if job.tell_pairs(event.result):
             return []
         said = self.back.on_solution(event.result, event.utime)

@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
 from drslamd.config import Config
 from drslamd.gossip.team import Team
+from drslamd.jobs import POINTS, RELOCATION
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.doubt import Doubt, Partners, doubt_of, doubted_partners
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.graph.estimate import PoseNow
 from drslamd.slam.peer_in_range import PeerInRange
+from drslamd.slam.points.point_targets import point_targets
+from drslamd.slam.points.points import Answer
 from drslamd.slam.pose_now import pose_now
 from drslamd.slam.relative_pose.pair_end import PairEnd
 from drslamd.slam.relocation.relocation import Found
 from drslamd.whereabouts import NOWHERE, Whereabouts, likely_speeds, whereabouts
+
+
+class Asked(NamedTuple):
+    """A computation, by the name of its module, and who gets what comes out and the time."""
+
+    module: str
+    run: Callable[[], object]
+    told: Callable[[Any, int], bool]
 
 
 class Standing:
@@ -40,20 +52,55 @@ class Standing:
         if self._namesakes.is_own_id_used(utime):
             return NOWHERE
         track, gap_m = self._front.reckoning.track, self._front.watch.gap_m
-        by_ranges = self._front.relocation.by_ranges(utime)
+        by_ranges, estimate = self._front.relocation.by_ranges(utime), self._back.estimate
+        is_point = estimate is not None and self._robot in estimate.points
+        most = self._most_mps
         return whereabouts(
-            self.pose(), track, self._most_mps, self._doubt(), utime, gap_m, by_ranges
+            self.pose(), track, most, self._doubt(), utime, gap_m, by_ranges, is_point
         )
 
-    def relocate(self, neighbours: list[PeerInRange], utime: int) -> Callable[[], Found] | None:
-        """After a hole in our odometry, see `Relocation.look`; only where module 3 then goes on by
-        ranges, not where it would have nothing but that closure."""
+    def asked(
+        self,
+        neighbours: list[PeerInRange],
+        carrier: Callable[[int], int | None],
+        is_free: Callable[[str, int], bool],
+        utime: int,
+    ) -> Iterator[Asked]:
+        """Where ranges place us after a hole in our odometry, and where what stands is; only where
+        module 3 then goes on by ranges, not where it would have nothing but those closures.
+
+        Args:
+            carrier: says which robot carries a UWB module; is_free: is a computation of that name?
+        """
         if not self._ranges_solve:
-            return None
+            return
         front, back = self._front, self._back
         track = front.reckoning.track
-        return front.relocation.look(
+        found = front.relocation.look(
             neighbours, front.ranges, track, back.graph, back.estimate, self._speed, utime
+        )
+        if found and is_free(RELOCATION, utime):
+            yield Asked(RELOCATION, found, self.on_relocated)
+        own = self._own_end()
+        if own is None or not is_free(POINTS, utime):
+            return
+        targets = point_targets(
+            front.ranges.fresh(utime), neighbours, carrier, back.graph, back.estimate, utime
+        )
+        places = front.points.look(targets, front.ranges, own, back.graph, back.estimate, utime)
+        if places:
+            yield Asked(POINTS, places, self._on_places)
+
+    def _own_end(self) -> PairEnd | None:
+        data = self._back.graph.chains.get(self._robot)
+        track = self._front.reckoning.track
+        return PairEnd(track, data) if data is not None and len(track) > 1 else None
+
+    def _on_places(self, answers: list[Answer], utime: int) -> bool:
+        """See `Points.on_found`."""
+        front, back = self._front, self._back
+        return front.points.on_found(
+            answers, front.ranges, self._own_end(), back.graph, back.estimate
         )
 
     def _speed(self) -> float:
@@ -61,9 +108,7 @@ class Standing:
 
     def on_relocated(self, found: Found, utime: int) -> bool:
         """See `Relocation.on_found`."""
-        data = self._back.graph.chains.get(self._robot)
-        own = PairEnd(self._front.reckoning.track, data) if data is not None else None
-        return self._front.relocation.on_found(found, own, utime)
+        return self._front.relocation.on_found(found, self._own_end(), utime)
 
     def is_doubted(self) -> tuple[bool, bool]:
         """Does odometry of ours, or of anybody, say less than what was ranged?"""

@@ -64,6 +64,7 @@ def whereabouts(
     utime: int,
     gap_m: float = 0.0,
     by_ranges: ByRanges | None = None,
+    is_point: bool = False,
 ) -> Whereabouts:
     """What to say of a robot at `utime`.
 
@@ -75,6 +76,7 @@ def whereabouts(
         gap_m: how far all ranges of this second are off: the pose is as wrong as that, whatever the
             reason, and long before anybody can say which.
         by_ranges: where it is without odometry, as ranges have it.
+        is_point: is its heading unknown?
     """
     is_old = found is None or utime - found.utime > VALID_US
     if is_old and by_ranges is not None:
@@ -83,7 +85,8 @@ def whereabouts(
         return NOWHERE
     age_us = utime - found.utime
     if age_us <= VALID_US:
-        state = PoseState.DOUBTFUL if doubt else PoseState.LOCALISED
+        known = PoseState.DOUBTFUL if doubt else PoseState.LOCALISED
+        state = PoseState.POSITION if is_point else known
         wider = found.covariance + np.diag([gap_m**2, gap_m**2, 0.0])
         return Whereabouts(state, found._replace(covariance=wider), age_us, doubt)
     if age_us > LOST_US:

@@ -57,6 +57,7 @@ SLAM_ORDER = [
     "peer_in_range",
     "relative_pose",
     "relocation",
+    "points",
     "consistency",
     "calibration",
     "optimizer",

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from drslamd.conventions import FIRST_NODE, is_node
 from drslamd.slam.doubt import Doubt, Reason
 from drslamd.slam.odometry.mounting import Fault, Repair
 from drslamd.slam.relative_pose.mounting_search import MountingSearch, is_learned
@@ -97,12 +98,12 @@ def doubt(found: Doubt | None) -> str | None:
             "the pose is doubtful: later measurements moved it further than was claimed; wheels "
             "slipped or stood, or sight was blocked, within the last half minute"
         )
-    if len(found.peers) == 1:
+    if len(found.peers) == 1 and not is_node(found.peers[0]):
         return (
             f"the pose is doubtful: ranges to robot {found.peers[0]} and the odometry of both do "
             "not fit; wheels of one of them slip, or sight is blocked"
         )
-    peers = " and ".join(map(str, found.peers))
+    peers = " and ".join(map(named_robot, found.peers))
     return (
         f"the pose is doubtful: ranges to robots {peers} do not fit the odometry of this robot; "
         "its wheels slip or stand, or its antenna is covered so that sight is blocked"
@@ -119,9 +120,14 @@ def _long(level: float) -> str:
     return f"about {round(2 * level) / 2} times as long" if level > 1 else "at most half as long"
 
 
+def named_robot(number: int) -> str:
+    """A robot by its number, or a module that none carries by its UWB id."""
+    return f"module {number - FIRST_NODE}" if is_node(number) else str(number)
+
+
 def partners(robots: Iterable[int]) -> str | None:
     """One sentence on other robots to whom ranges do not fit; None while there are none."""
-    named = " and ".join(str(robot) for robot in sorted(robots))
+    named = " and ".join(named_robot(robot) for robot in sorted(robots))
     if not named:
         return None
     return (

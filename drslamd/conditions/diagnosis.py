@@ -11,6 +11,7 @@ from drslamd.config import Config
 from drslamd.config_wheels import SerialWheelSection
 from drslamd.conventions import SECOND_US
 from drslamd.events import NetworkState, Port, PortCondition, PortState, Slept
+from drslamd.gossip.message_types import PoseState
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.team import Team
 from drslamd.jobs import OPTIMIZER, RELATIVE_POSE, DutyCycle, Jobs
@@ -158,6 +159,11 @@ def why_not_localised(robot: Stages, utime: int) -> str | None:
     where = robot.whereabouts(utime)
     if robot.team.namesakes.is_own_id_used(utime):
         return "not localised: another robot uses the id of this one; no other reason counts"
+    if where.state is PoseState.POSITION:
+        return (
+            "its place is known and its heading is not: it stands, and other robots have found it; "
+            "drive a metre or two"
+        )
     if where.is_old:
         seconds = where.age_us // SECOND_US
         relocation = robot.front.relocation

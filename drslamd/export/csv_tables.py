@@ -15,7 +15,7 @@ from drslamd.export import stamps
 from drslamd.export.answers import keyframe_times, seconds
 from drslamd.export.files import replaced
 
-STATES = ("not localised", "localised", "doubtful", "stale")
+STATES = ("not localised", "localised", "doubtful", "stale", "position")
 """Words of `PoseState`."""
 POSE_ROW = ("x_m", "y_m", "theta_rad")
 COVARIANCE_ROW = ("xx_m2", "xy_m2", "xt_m_rad", "yy_m2", "yt_m_rad", "tt_rad2")
@@ -30,6 +30,7 @@ def write(folder: Path, answer: Mapping[str, Any]) -> list[Path]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     timed = [name for name in ("odometry", "closures", "ranges") if name in answer]
+    timed += ["module_ranges"] if answer.get("modules") else []
     tables = {f"{name}.csv": _timed(answer, name) for name in timed}
     tables |= {"keyframes.csv": keyframe_rows(answer)} if "keyframes" in answer else {}
     tables |= {
@@ -41,6 +42,14 @@ def write(folder: Path, answer: Mapping[str, Any]) -> list[Path]:
             ("t_unix_s", "robot", "state", "frame", *POSE_ROW, *COVARIANCE_ROW), _poses(answer)
         ),
     }
+    if answer.get("modules"):
+        tables["modules.csv"] = _text(
+            ("module", "x_m", "y_m", "xx_m2", "xy_m2", "yy_m2"),
+            (
+                [k, m["x_m"], m["y_m"], *m["covariance_m2"]]
+                for k, m in sorted(answer["modules"].items(), key=lambda item: int(item[0]))
+            ),
+        )
     for name, text in tables.items():
         replaced(folder / name, text)
     return [folder / name for name in tables]

@@ -2,7 +2,8 @@
 
 ``VERTEX_SE2 t key x y theta`` of solved keyframes, ``EDGE_SE2 t i j x y theta`` and six of the
 covariance, ``EDGE_RANGE t i j range variance``; UNIX seconds, m and rad. A key is a letter for the
-robot, in the order of their ids, and the number of its keyframe. Odometry is without the scale and
+robot, in the order of their ids, and the number of its keyframe; a module that no robot carries is
+``VERTEX_XY``, L and its UWB id. Odometry is without the scale and
 yaw rate that were learned; a range is between the keyframes themselves: without the bias that was
 learned, and with antennas and short ways since carried there.
 """
@@ -56,6 +57,7 @@ def write(folder: Path, answer: Mapping[str, Any]) -> list[Path]:
                 stamp, ij = seconds(at[j]), f"{names[i]} {names[j]}"
                 lines.append(f"EDGE_SE2 {stamp} {ij} {_numbers(pose)} {_numbers(packed)}")
     lines += _ranges(columns(answer, "ranges"), at, names, where)
+    lines += _landmarks(answer, at, names, where)
     replaced(path, "".join(f"{line}\n" for line in lines))
     return [path]
 
@@ -89,6 +91,28 @@ def _ranges(
             between = float(np.hypot(*(where[j] - where[i])[:2])) - residual
             ij = f"{names[i]} {names[j]}"
             out.append(f"EDGE_RANGE {seconds(at[i])} {ij} {between:.6f} {sigma * sigma:.9g}")
+    return out
+
+
+def _landmarks(
+    answer: Mapping[str, Any],
+    at: Mapping[int, int],
+    names: Mapping[int, str],
+    where: Mapping[int, Array],
+) -> list[str]:
+    """Modules that no robot carries, and the ranges to them."""
+    places = {int(k): np.array([m["x_m"], m["y_m"]]) for k, m in answer.get("modules", {}).items()}
+    out = [f"VERTEX_XY L{k} {_numbers(place)}" for k, place in sorted(places.items())]
+    ranges = columns(answer, "module_ranges")
+    if not ranges:
+        return out
+    told = [ranges[name].tolist() for name in ("module", "i", "sigma_m", "residual_m")]
+    for module, first, sigma, residual in zip(*told, strict=True):
+        k, i = int(module), int(first)
+        if i in at and k in places:
+            between = float(np.hypot(*(places[k] - where[i][:2]))) - residual
+            ends = f"{names[i]} L{k}"
+            out.append(f"EDGE_RANGE {seconds(at[i])} {ends} {between:.6f} {sigma * sigma:.9g}")
     return out
 
 

@@ -20,7 +20,12 @@ COMPONENT = 197
 """MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY: who sends such messages to an autopilot."""
 LOCAL_FRD, BODY_FRD = 20, 12
 """MAV_FRAME."""
-QUALITY = {PoseState.LOCALISED: 100, PoseState.DOUBTFUL: 1, PoseState.STALE: 1}
+QUALITY = {
+    PoseState.LOCALISED: 100,
+    PoseState.DOUBTFUL: 1,
+    PoseState.STALE: 1,
+    PoseState.POSITION: 1,
+}
 """Percent; ArduPilot's VISO_QUAL_MIN says what it takes."""
 
 

@@ -44,6 +44,9 @@ class PoseState(IntEnum):
     STALE = 3
     """No odometry: a position by ranges, whose heading means nothing (its sigma is that of any), or
     the last pose, as uncertain as the way that may have been driven since."""
+    POSITION = 4
+    """It stands, and others have found its place; its heading is not known, and means nothing in a
+    pose: its sigma is that of any."""
 
 
 @dataclass(frozen=True)

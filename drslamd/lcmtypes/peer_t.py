@@ -8,7 +8,11 @@ from io import BytesIO
 import struct
 
 class peer_t(object):
-    """ A trajectory that items of a graph_t refer to. """
+    """
+    A trajectory that items of a graph_t refer to, or a module that no robot carries: id 255, and the
+    UWB id of the module in the place of the epoch. What is a keyframe of a robot is a number for each
+    place where such a module stood.
+    """
 
     __slots__ = ["id", "epoch"]
 

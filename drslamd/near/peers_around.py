@@ -165,4 +165,4 @@ class PeersAround:
 def _state(peer: Peer | None) -> PoseState:
     """What its pose is worth: it is in the solution, and may know what speaks against it."""
     said = peer.pose.state if peer is not None and peer.pose is not None else PoseState.LOCALISED
-    return said if said in (PoseState.DOUBTFUL, PoseState.STALE) else PoseState.LOCALISED
+    return PoseState.LOCALISED if said is PoseState.NOT_LOCALISED else said

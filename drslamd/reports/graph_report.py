@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from drslamd.conventions import GRID_US
+from drslamd.conventions import FIRST_NODE, GRID_US
 from drslamd.history import pose_history
-from drslamd.reports import clock_report
+from drslamd.reports import clock_report, point_report
 from drslamd.robot import Robot
 from drslamd.slam import se2, settings
-from drslamd.slam.graph import team_frame
+from drslamd.slam.graph import standing_points, team_frame
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer import factors
@@ -57,6 +57,7 @@ def graph(robot: Robot, utime: int) -> dict[str, Any]:
         chains |= {k: solved.chain for k, solved in estimate.trajectories.items()}
         team = _problem(robot, estimate)
         out |= _tables(team, robot) if team else {}
+        out["modules"] = point_report.modules(robot)
     out["clocks"] = {
         str(k): clock_report.clock(robot, chain, utime) for k, chain in sorted(chains.items())
     }
@@ -68,9 +69,12 @@ def _problem(robot: Robot, estimate: TeamEstimate) -> TeamProblem | None:
     was withdrawn since."""
     held = robot.back.graph
     connected = [group for group in team_frame.groups(held) if estimate.frame in group]
-    if not connected:
+    members, points = standing_points.with_points(
+        estimate.frame, connected[0] if connected else set(), held
+    )
+    if estimate.frame not in members:
         return None
-    group = Group(connected[0], estimate.frame)
+    group = Group(members, estimate.frame, points)
     return build_problem(held, group, estimate, settings.banded_optimizer(robot.config))
 
 
@@ -87,18 +91,33 @@ def _tables(team: TeamProblem, robot: Robot) -> dict[str, Any]:
     bias = team.start.bias[ranges.pair] if len(pairs) else np.zeros(0)
     told = [names[ranges.robots], ranges.i, ranges.j, ranges.measured, ranges.sigma, bias, error]
     edges = problem.odometry
+    is_robot = problem.robot < FIRST_NODE
+    to_robots = is_robot[ranges.i] & is_robot[ranges.j]
+    closures = factors.closures(robot.back.graph, places)
+    closures = closures.chosen(is_robot[closures.i] & is_robot[closures.j])
     odometry = BetweenFactors(edges.i, edges.j, corrected(edges, team.start), edges.covariance)
     return {
         "keyframes": _table(
-            KEYFRAME_COLUMNS, np.column_stack([*names_and_times, poses[:, :2], angles, wheels])
+            KEYFRAME_COLUMNS,
+            np.column_stack([*names_and_times, poses[:, :2], angles, wheels])[is_robot],
         ),
         "odometry": _table(EDGE_COLUMNS, _edges(odometry)),
-        "closures": _table(EDGE_COLUMNS, _edges(factors.closures(robot.back.graph, places))),
+        "closures": _table(EDGE_COLUMNS, _edges(closures)),
         "ranges": _table(
             ("a", "b", "i", "j", "range_m", "sigma_m", "bias_m", "residual_m"),
-            _by_time(np.column_stack(told), 2),
+            _by_time(np.column_stack(told)[to_robots], 2),
+        ),
+        "module_ranges": _table(
+            ("robot", "module", "i", "range_m", "sigma_m", "bias_m", "residual_m"),
+            _to_modules(np.column_stack(told)[~to_robots]),
         ),
     }
+
+
+def _to_modules(told: Array) -> Array:
+    """Rows of ranges to modules that no robot carries, which measure nothing themselves."""
+    rows = np.column_stack([told[:, 0], told[:, 1] - FIRST_NODE, told[:, 2], told[:, 4:]])
+    return np.asarray(rows[np.argsort(rows[:, 2], kind="stable")])
 
 
 def _odometry(team: TeamProblem, robot: Robot) -> Array:

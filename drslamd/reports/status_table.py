@@ -63,8 +63,12 @@ def _pose(pose: dict[str, Any]) -> str:
         return str(pose["state"])
     return (
         f"{pose['state']} in the frame of robot {pose['frame']}, x {pose['x_m']:.2f} m, "
-        f"y {pose['y_m']:.2f} m, {pose['theta_deg']:.1f} deg, sigma {pose['sigma_m']:.2f} m"
+        f"y {pose['y_m']:.2f} m, {_heading(pose)}, sigma {pose['sigma_m']:.2f} m"
     )
+
+
+def _heading(pose: dict[str, Any]) -> str:
+    return "heading not known" if pose["theta_deg"] is None else f"{pose['theta_deg']:.1f} deg"
 
 
 def _inputs(now: dict[str, Any], before: dict[str, Any] | None, seconds: float) -> list[str]:

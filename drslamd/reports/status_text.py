@@ -18,8 +18,7 @@ def lines(s: dict[str, Any]) -> list[str]:
     if "frame" in pose:
         out.append(
             f"{pose['state']} in the frame of robot {pose['frame']}: x {pose['x_m']:.2f} m, "
-            f"y {pose['y_m']:.2f} m, {pose['theta_deg']:.1f} deg "
-            f"(sigma {pose['sigma_m']:.2f} m, {pose['sigma_deg']:.1f} deg)"
+            f"y {pose['y_m']:.2f} m, " + _heading(pose)
         )
     else:
         out.append(pose["state"])  # the problems above say why
@@ -40,11 +39,24 @@ def lines(s: dict[str, Any]) -> list[str]:
             f"of {pair['closures_seen']} ({windows})"
         )
     out.append(f"group {s['graph']['group'] or 'none'}")
+    out += [
+        f"module {uwb_id} stands at x {m['x_m']:.2f} m, y {m['y_m']:.2f} m "
+        f"(sigma {m['sigma_m']:.2f} m)"
+        for uwb_id, m in s["graph"].get("modules", {}).items()
+    ]
     recording = s.get("recording")
     if recording:
         size = recording["bytes"] / 1e6
         out.append(f"recorded {size:.1f} MB in {recording['folder']}, now {recording['file']}")
     return out
+
+
+def _heading(pose: dict[str, Any]) -> str:
+    if pose["theta_deg"] is None:
+        return f"heading not known (sigma {pose['sigma_m']:.2f} m)"
+    return (
+        f"{pose['theta_deg']:.1f} deg (sigma {pose['sigma_m']:.2f} m, {pose['sigma_deg']:.1f} deg)"
+    )
 
 
 def _sensor(name: str, sensor: dict[str, Any]) -> list[str]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from drslamd.config import Config
 from drslamd.conventions import Chain, Segment
 from drslamd.slam import settings
-from drslamd.slam.graph import team_frame
+from drslamd.slam.graph import standing_points, team_frame
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.history import History
 from drslamd.slam.graph.measurements import GraphEntry
@@ -40,7 +40,7 @@ class BackEnd:
 
     Attributes:
         history: where we were.
-        group: segments that are connected to our current one, as the last job knew them.
+        group: segments and points that are connected to our current one, as the last job knew them.
         estimate: of that group; None while we are in none.
         exchange: of public poses, with `rbcd`.
     """
@@ -103,13 +103,17 @@ class BackEnd:
             self._known = now
             return None
         current = Segment(*self._own, int(chain.keyframes.segment[-1]))
-        self.group = team_frame.group_of(current, self.graph, self._looks_back)
-        gauge = team_frame.gauge_segment(self.group, present)
+        members = team_frame.group_of(current, self.graph, self._looks_back)
+        points: frozenset[Segment] = frozenset()
+        if self._looks_back:
+            members, points = standing_points.with_points(current, members, self.graph)
+        self.group = members | points
+        gauge = team_frame.gauge_segment(members, present)
         if gauge is None:
             self.estimate, self._known = None, now
             return None
         same = self.exchange.held(gauge.chain)
-        job = self._optimizer.job(self.graph, Group(self.group, gauge), self.estimate, same)
+        job = self._optimizer.job(self.graph, Group(members, gauge, points), self.estimate, same)
         if job is None:
             self.exchange.wait(utime)
             return None

@@ -22,6 +22,8 @@ from drslamd.slam.keyframe_selector import KeyframeSelector
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.dead_reckoning import DeadReckoning
 from drslamd.slam.peer_in_range import PeerInRange
+from drslamd.slam.points.point_tracker import Sensors
+from drslamd.slam.points.points import Points
 from drslamd.slam.range_model import RangeNoise
 from drslamd.slam.range_watch import Partner, RangeWatch
 from drslamd.slam.relative_pose import what_if
@@ -102,6 +104,9 @@ class FrontEnd:
         self.watch = RangeWatch(section.range_sigma_m, tuning.ranges)
         self.relocation = Relocation(
             Own(own.robot, self.model, section.range_sigma_m, tuning.ranges)
+        )
+        self.points = Points(
+            own, Sensors(RangeNoise(section.range_sigma_m, self._bias_sigma), tuning.ranges)
         )
         self._keyframes = KeyframeSelector()
 
@@ -329,10 +334,11 @@ class FrontEnd:
             pair.sampler.sample(pair.ranges, a, b, pair.peer, is_doubted)
             for pair, a, b in self._measurable(neighbours, graph, utime)
         ]
-        return [measurement for measurement in found if measurement is not None]
+        told = [measurement for measurement in found if measurement is not None]
+        return told + self.points.tell_ranges()
 
     def tell_closures(self) -> list[ClosureMeasurement]:
         """Closures to tell the team, and to withdraw."""
         every = not self._has_ranges_in_graph
         told = [c for pair in self.pairs.values() for c in pair.tell(every)]
-        return [*told, *self.relocation.tell()]
+        return [*told, *self.relocation.tell(), *self.points.tell()]

@@ -1,4 +1,8 @@
-"""Where a robot is now: its last solved pose, carried on by odometry."""
+"""Where a robot is now: its last solved pose, carried on by odometry.
+
+Of a point nobody knows the heading. When it begins to drive, odometry says how far it comes and not
+where to.
+"""
 
 from __future__ import annotations
 
@@ -28,6 +32,10 @@ def pose_now(
         return None
     way = estimate.correction(robot).path(track.poses[last - track.n0 : now - track.n0 + 1])
     step = se2.between(way[:1], way)
+    if robot in estimate.points:
+        aside = float(np.hypot(*step[-1, :2]))
+        wide = known + np.diag([aside**2, aside**2, 0.0])
+        return PoseNow(now * GRID_US, solved.poses[-1].copy(), wide)
     pose = se2.compose(solved.poses[-1], step[-1])
     level = estimate.odometry_level.get(robot, 1.0)
     return PoseNow(

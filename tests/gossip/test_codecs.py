@@ -199,7 +199,7 @@ ACCEPTED: list[tuple[Any, ...]] = [
     ("PUBLIC", "values", (1e6,) * 24),
 ]
 REFUSED: list[tuple[Any, ...]] = [
-    ("STATUS", "state", 4),
+    ("STATUS", "state", 5),
     ("STATUS", "state", -1),
     ("STATUS", "frame", 255),
     ("STATUS", "frame", -1),
@@ -262,7 +262,7 @@ REFUSED: list[tuple[Any, ...]] = [
     ("GRAPH", "n_traits", 7),
     ("GRAPH", "keyframes", 0, "n", -1),
     ("GRAPH", "keyframes", 0, "segment", -1),
-    ("GRAPH", "peers", 0, "id", 255),
+    ("GRAPH", "peers", 0, "id", 256),
     ("GRAPH", "ranges", 0, "peer", 1),
     ("GRAPH", "ranges", 0, "peer", -1),
     ("GRAPH", "ranges", 0, "a_n", -1),
@@ -280,7 +280,7 @@ REFUSED: list[tuple[Any, ...]] = [
     ("GRAPH", "closures", 0, "covariance", (1, 1.01, 0, 1, 0, 1)),
     ("GRAPH", "closures", 0, "covariance", (1, NAN, 0, 1, 0, 1)),
     ("GRAPH", "closures", 0, "covariance", (1, 0, 0, INF, 0, 1)),
-    ("POSE", "state", 4),
+    ("POSE", "state", 5),
     ("POSE", "state", -1),
     ("POSE", "frame", -1),
     ("POSE", "x", NAN),

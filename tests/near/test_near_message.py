@@ -67,7 +67,7 @@ def test_on_lcm_the_nearest_have_room_in_one_datagram() -> None:
         {"speed_mps": math.inf},
         {"covariance": (-1.0, 0.0, 0.0, 1.0, 0.0, 1.0)},
         {"covariance": (math.nan, 0.0, 0.0, 1.0, 0.0, 1.0)},
-        {"state": 4},
+        {"state": 5},
         {"frame": 255},
         {"utime": -1},
         {"resets": -1},

@@ -66,6 +66,13 @@ def test_a_position_by_ranges_stands_in_for_a_pose_that_is_old_or_none(
     assert (where.age_us == 7 * SECOND_US) is is_by_ranges
 
 
+@pytest.mark.parametrize("doubt", [None, DOUBT])
+def test_what_stands_has_a_position_and_never_a_heading(doubt: Doubt | None) -> None:
+    found = PoseNow(T0, np.array([1.0, 2.0, 0.5]), COVARIANCE)
+    where = whereabouts(found, a_track(0.0), 3.0, doubt, T0, is_point=True)
+    assert where.state is PoseState.POSITION
+
+
 def test_who_has_no_pose_is_not_localised() -> None:
     assert whereabouts(None, a_track(0.5), 3.0, None, T0) == NOWHERE
     # nothing speaks against a pose that is none

@@ -170,3 +170,11 @@ def test_odometry_that_is_believed_less_adds_so_much_more() -> None:
     assert np.array_equal(worse.pose, usual.pose)
     others = known(team=replace(estimate(), odometry_level={7: 3.0}))
     assert np.array_equal(others.covariance, usual.covariance)
+
+
+def test_a_point_that_begins_to_drive_may_be_anywhere_on_a_circle() -> None:
+    """It is said to be where it stood, as uncertain as it is far from there."""
+    stood = known(team=replace(estimate(), points=frozenset([4])))
+    assert stood.pose == pytest.approx(SOLVED)
+    aside = math.dist(PATH[10][:2], PATH[-1][:2])
+    assert stood.covariance - KNOWN == pytest.approx(np.diag([aside**2, aside**2, 0.0]), abs=1e-3)

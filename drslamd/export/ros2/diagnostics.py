@@ -8,7 +8,13 @@ from typing import Any
 from drslamd.export.ros2.nouns import Message, header
 
 OK, WARN, ERROR, STALE = 0, 1, 2, 3
-LEVELS = {"localised": OK, "doubtful": WARN, "stale": STALE, "not localised": ERROR}
+LEVELS = {
+    "localised": OK,
+    "position": WARN,
+    "doubtful": WARN,
+    "stale": STALE,
+    "not localised": ERROR,
+}
 
 
 def diagnostics(status: Mapping[str, Any], unix_us: int) -> Message:

@@ -30,6 +30,7 @@ from drslamd.gossip.entries.measurement_codecs import (
     read_model,
     read_peer,
     read_range,
+    said_peer,
     traits_of,
 )
 from drslamd.slam.graph.chapters import COUNTS_FOR, PER_ENTRY
@@ -71,7 +72,7 @@ def packed(chapter: Chapter) -> bytes:
         closures.append([place - begin, c.peer, c.a_n, c.b_n, *ends, *doubt])
     counts = map(len, (peers, chapter.models, keyframes, ranges, closures))
     out = [_HEAD.pack(chapter.layer, *chapter.parts, chapter.first, *counts)]
-    out += [_PEER.pack(*peer) for peer in peers]
+    out += [_PEER.pack(*said_peer(peer)) for peer in peers]
     out += [_MODEL.pack(seq, *traits_of(model)) for seq, model in chapter.models]
     out += [_planes(keyframes), _planes(ranges), _planes(closures)]
     return zlib.compress(b"".join(out), 9)

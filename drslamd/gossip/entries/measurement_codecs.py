@@ -9,7 +9,14 @@ from collections.abc import Sequence
 from typing import Any
 
 from drslamd import lcmtypes
-from drslamd.conventions import ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain
+from drslamd.conventions import (
+    FIRST_NODE,
+    ROTATION_STEP_RAD,
+    TRANSLATION_STEP_M,
+    Chain,
+    is_node,
+    node_chain,
+)
 from drslamd.gossip import bounds
 from drslamd.gossip.bounds import LEAST_SIGMA, MAX_TRAIT, TRAITS, bounded
 from drslamd.slam.graph.measurements import (
@@ -20,6 +27,9 @@ from drslamd.slam.graph.measurements import (
 )
 from drslamd.slam.robot_model import RobotModel
 
+NODES = 255
+"""In the place of a peer's id: a module that no robot carries, its UWB id in the place of the epoch
+(`MAX_ROBOT_ID` leaves that number free)."""
 MILLIMETRE_M = 1e-3
 CORRECTION_STEP = 1 / 50
 """Of the scale and turn with which a closure was found."""
@@ -50,7 +60,14 @@ def read_model(traits: Sequence[float]) -> RobotModel:
 
 
 def read_peer(p: Any) -> Chain:
+    if p.id == NODES:
+        return node_chain(bounded("uwb id", p.epoch, 0, bounds.MAX_UWB_ID))
     return Chain(bounds.robot(p.id), bounds.epoch(p.epoch))
+
+
+def said_peer(chain: Chain) -> tuple[int, int]:
+    """The id and the epoch that stand for a peer in a message."""
+    return (NODES, chain.robot - FIRST_NODE) if is_node(chain.robot) else chain
 
 
 def traits_of(model: RobotModel) -> tuple[float, ...]:
@@ -65,7 +82,7 @@ def peers_of(entry: GraphEntry) -> list[Chain]:
 
 def filled_peer(chain: Chain) -> Any:
     out = lcmtypes.peer_t()
-    out.id, out.epoch = chain
+    out.id, out.epoch = said_peer(chain)
     return out
 
 

@@ -69,8 +69,8 @@ class TeamEstimate:
 
     Attributes:
         trajectories: by robot.
-        joint: (3 k, 3 k) covariance of x, y, theta of the last poses of the first k robots in the
-            order of `trajectories`; of the others nothing is claimed.
+        joint: (3 k, 3 k) covariance of x, y, theta of the last poses of the first k in the order of
+            `everybody`; of the others nothing is claimed.
         bias_m: range bias of each pair, m.
         scale, yaw: of each robot's odometry, fraction and rad/m.
         near_bias_m: of the team, at range 0 (`RangeModel.near_range_shape`).
@@ -86,6 +86,8 @@ class TeamEstimate:
         converged: is it good enough to be used?
         settled: is it the same from wherever it was begun?
         lifted: state of the relaxation, with `rbcd`.
+        nodes: by number, the places of modules that no robot carries.
+        points: what stands, and of which only the place is known: every node, and parked robots.
     """
 
     frame: Segment
@@ -108,11 +110,18 @@ class TeamEstimate:
     converged: bool = True
     settled: bool = True
     lifted: Lifted | None = None
+    nodes: dict[int, Trajectory] = field(default_factory=dict)
+    points: frozenset[int] = frozenset()
 
     @property
     def is_final(self) -> bool:
         """Would another solution of the same be no other?"""
         return self.converged and self.settled
+
+    @property
+    def everybody(self) -> dict[int, Trajectory]:
+        """Robots, and after them what stands without one."""
+        return {**self.trajectories, **self.nodes}
 
     def covariance(self, robot: int) -> Array | None:
         """(3, 3) of the last pose of a robot; None where nothing is known of it."""
@@ -132,7 +141,7 @@ class TeamEstimate:
         joint = self.joint_of(a, b)
         if joint is None:
             return None
-        w_T_a, w_T_b = (self.trajectories[robot].poses[-1] for robot in (a, b))
+        w_T_a, w_T_b = (self.everybody[robot].poses[-1] for robot in (a, b))
         a_T_b = se2.between(w_T_a, w_T_b)
         a_T_b[2] = se2.wrap(a_T_b[2])
         turn = np.eye(3)
@@ -148,6 +157,6 @@ class TeamEstimate:
         return Correction(*(part.get(robot, Learned()).value for part in parts))
 
     def _rows(self, robot: int) -> slice | None:
-        robots = list(self.trajectories)
+        robots = [*self.trajectories, *self.nodes]
         at = 3 * robots.index(robot) if robot in robots else len(self.joint)
         return slice(at, at + 3) if at < len(self.joint) else None

@@ -11,16 +11,26 @@ robot may send nonsense, and then only its own trajectory is nonsense.
 
 from __future__ import annotations
 
-from drslamd.conventions import Chain
+from drslamd.conventions import Chain, is_node
 from drslamd.slam.graph.chain_data import ChainData
-from drslamd.slam.graph.measurements import Chapter, GraphEntry
+from drslamd.slam.graph.measurements import Chapter, GraphEntry, Keyframe
 from drslamd.slam.graph.pair_data import PairData
 from drslamd.slam.graph.thinning.graph_view import GraphView, Thinning
 from drslamd.slam.graph.thinning.time_cells import RECENT_S
 
+MAX_NODES = 256
+"""Modules without a robot; a radio cell holds 64, and a team drives through some cells."""
+MAX_PLACES = 512
+"""Where one of them stood: whoever carries it about all day comes to less."""
+
 
 class PoseGraph:
-    """All chains and pairs that this robot holds."""
+    """All chains and pairs that this robot holds.
+
+    Attributes:
+        nodes: of modules that no robot carries: a keyframe and a segment for each place where one
+            stood, because nothing leads from one to the next.
+    """
 
     def __init__(self, recent_s: int = RECENT_S) -> None:
         """
@@ -28,6 +38,7 @@ class PoseGraph:
             recent_s: how long nothing is thinned.
         """
         self.chains: dict[int, ChainData] = {}
+        self.nodes: dict[int, ChainData] = {}
         self.pairs: dict[tuple[int, int], PairData] = {}
         self._thinning = Thinning(recent_s)
         self._view: GraphView | None = None
@@ -38,7 +49,7 @@ class PoseGraph:
     def view(self) -> GraphView:
         """What module 3 solves: old times thinned, and the same for all who hold the same."""
         if self._view is None:
-            self._view = self._thinning.view(self.chains, self.usable())
+            self._view = self._thinning.view(self.chains, self.nodes, self.usable())
         return self._view
 
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
@@ -55,11 +66,11 @@ class PoseGraph:
         for k in entry.keyframes:
             data.add(k)
         for place, r in enumerate(entry.ranges):
-            pair = self._pair(origin, r.peer)
+            pair = self._pair(origin, r.peer, r.b_n)
             if pair:
                 pair.add_range(entry.seq, place, r)
         for place, c in enumerate(entry.closures):
-            pair = self._pair(origin, c.peer)
+            pair = self._pair(origin, c.peer, c.b_n)
             if pair:
                 pair.add_closure(entry.seq, place, c)
         if entry.chapter:
@@ -72,11 +83,11 @@ class PoseGraph:
         for k in chapter.keyframes:
             data.add(k)
         for place, r in chapter.ranges:
-            pair = self._pair(data.chain, r.peer)
+            pair = self._pair(data.chain, r.peer, r.b_n)
             if pair:
                 pair.take_range(place, r, chapter.layer)
         for place, c in chapter.closures:
-            pair = self._pair(data.chain, c.peer)
+            pair = self._pair(data.chain, c.peer, c.b_n)
             if pair:
                 pair.take_closure(place, c, chapter.layer)
         if any(chapter.parts) and seq > data.latest_chapter and self._forgets:
@@ -85,8 +96,11 @@ class PoseGraph:
                 if pair.a == data.chain:
                     pair.fade(seq)
 
-    def _pair(self, a: Chain, b: Chain) -> PairData | None:
-        """The pair's data; None for a start of b that is already past, and for a pair of one."""
+    def _pair(self, a: Chain, b: Chain, b_n: int) -> PairData | None:
+        """The pair's data; None for a start of b that is already past, for a pair of one, and for
+        one module or one place of it too many."""
+        if is_node(b.robot) and not self._has_stood(b, b_n):
+            return None
         pair = self.pairs.get((a.robot, b.robot))
         if pair and pair.a == a and pair.b == b:
             return pair
@@ -95,6 +109,15 @@ class PoseGraph:
         pair = self.pairs[a.robot, b.robot] = PairData(a, b)
         pair.fade(self.chains[a.robot].latest_chapter)
         return pair
+
+    def _has_stood(self, node: Chain, place: int) -> bool:
+        """A module stood at a place: is there room for that?"""
+        if place >= MAX_PLACES or (node.robot not in self.nodes and len(self.nodes) >= MAX_NODES):
+            return False
+        data = self.nodes.setdefault(node.robot, ChainData(node))
+        if place not in data.keyframes.n:
+            data.add(Keyframe(place, place, 0, 0, 0))
+        return True
 
     def forget(self, robot: int) -> None:
         """Drop a robot's chain and what was measured by it."""
@@ -112,7 +135,7 @@ class PoseGraph:
         ]
 
     def _is_current(self, chain: Chain) -> bool:
-        data = self.chains.get(chain.robot)
+        data = (self.nodes if is_node(chain.robot) else self.chains).get(chain.robot)
         return data is not None and data.chain == chain
 
     def digest(self, robots: set[int]) -> int:

@@ -65,6 +65,8 @@ def positions(ascending: Array, wanted: Array) -> tuple[Index, NDArray[np.bool_]
     return at, there
 
 
+NO_HEADING = np.pi**2 / 3
+"""Variance of a heading that may be any, rad^2: whoever claims so much claims nothing."""
 RANGE_COLUMNS = 11
 """Of `RangeTable`."""
 
@@ -197,6 +199,11 @@ class ClosureTable:
     def packed(self) -> Array:
         """(k, 6) covariances as `se2.packed` has them."""
         return self.rows[:, 8:14]
+
+    @property
+    def tells_place_only(self) -> NDArray[np.bool_]:
+        """(k,) do they say where b stood, and nothing of its heading?"""
+        return np.asarray(self.packed[:, 5] > 0.75 * NO_HEADING)
 
     @property
     def corrected(self) -> Array:

@@ -1,9 +1,10 @@
 """Who is connected to whom, whose frame is the frame of the team, and where everybody starts.
 
-Closures join segments of trajectories into groups. A group lives in the frame of its lowest living
-robot: ``w`` is the odometry frame of that robot's first segment in the group. Poses that were
-solved before are kept as they were; new ones follow by odometry from the nearest that is known,
-and a trajectory that was never placed is placed by its closures.
+Closures join segments of trajectories into groups; what stands, and of which only the place is
+known, belongs to one as a point (`standing_points`). A group lives in the frame of its lowest
+living robot: ``w`` is the odometry frame of that robot's first segment in the group. Poses that
+were solved before are kept as they were; new ones follow by odometry from the nearest that is
+known, and a trajectory that was never placed is placed by its closures.
 """
 
 from __future__ import annotations
@@ -33,16 +34,25 @@ class Group:
 
     Attributes:
         members: its segments; frame: the one whose odometry frame is the team's.
+        points: what stands, and has a place in it and no heading.
     """
 
     members: set[Segment]
     frame: Segment
+    points: frozenset[Segment] = frozenset()
+
+    @property
+    def everything(self) -> set[Segment]:
+        """Members and points."""
+        return self.members | self.points
 
 
 def groups(graph: PoseGraph) -> list[set[Segment]]:
     """Sets of segments that closures join; a segment without closure is in none."""
     group_of: dict[Segment, set[Segment]] = {}
     for joint in joints(graph):
+        if joint.tells_place_only:
+            continue
         joined = group_of.get(joint.a, {joint.a}) | group_of.get(joint.b, {joint.b})
         for segment in joined:
             group_of[segment] = joined
@@ -66,11 +76,16 @@ def group_of(current: Segment, graph: PoseGraph, looks_back: bool) -> set[Segmen
 
 
 class Joint(NamedTuple):
-    """Two segments, and the closures that join them."""
+    """Two segments, and the closures that join them.
+
+    Attributes:
+        tells_place_only: do these say where b stood and nothing of its heading?
+    """
 
     a: Segment
     b: Segment
     closures: ClosureTable
+    tells_place_only: bool = False
 
 
 def joints(graph: PoseGraph) -> list[Joint]:
@@ -82,11 +97,12 @@ def joints(graph: PoseGraph) -> list[Joint]:
         at_b, _ = b.find(pair.closures.b_n)
         ends = np.stack([a.segment[at_a], b.segment[at_b]], axis=-1)
         for one, other in np.unique(ends, axis=0).tolist():
-            these = (ends == (one, other)).all(axis=1)
-            joint = Joint(
-                Segment(*pair.a, one), Segment(*pair.b, other), pair.closures.chosen(these)
+            these = pair.closures.chosen((ends == (one, other)).all(axis=1))
+            whole = ~these.tells_place_only
+            found = these.chosen(whole) if whole.any() else these
+            out.append(
+                Joint(Segment(*pair.a, one), Segment(*pair.b, other), found, not whole.any())
             )
-            out.append(joint)
     return out
 
 
@@ -111,7 +127,7 @@ def placed(
     """
     out: dict[Segment, Array] = {}
     known = _in_frame(graph, group.frame, previous)
-    for segment in sorted(group.members):
+    for segment in sorted(group.everything):
         keyframes = _corrected(graph, segment, corrections)
         trajectory = known.get(segment.robot)
         if trajectory is not None and trajectory.chain == segment.chain:
@@ -121,8 +137,8 @@ def placed(
                 out[segment] = by_odometry(keyframes, keyframes.chosen(there), trajectory.poses[at])
     if group.frame not in out:
         out = {group.frame: _corrected(graph, group.frame, corrections).poses}
-    while len(out) < len(group.members):
-        segment, n, poses = _next_to_place(graph, group.members, out)
+    while len(out) < len(group.everything):
+        segment, n, poses = _next_to_place(graph, group.everything, out)
         keyframes = _corrected(graph, segment, corrections)
         anchors = keyframes.chosen(np.searchsorted(keyframes.n, n))
         out[segment] = by_odometry(keyframes, anchors, poses)
@@ -149,7 +165,7 @@ def _in_frame(
     if previous is None:
         return {}
     if previous.frame == frame:
-        return previous.trajectories
+        return previous.everybody
     old = previous.trajectories.get(frame.robot)
     if old is None or old.chain != frame.chain:
         return {}
@@ -161,7 +177,7 @@ def _in_frame(
     w_T_old = se2.compose(known.poses[0], se2.inverse(before))
     return {
         robot: Trajectory(t.chain, t.n, se2.compose(w_T_old[None], t.poses))
-        for robot, t in previous.trajectories.items()
+        for robot, t in previous.everybody.items()
     }
 
 

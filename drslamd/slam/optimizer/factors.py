@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.conventions import Segment
-from drslamd.slam.graph import team_frame
+from drslamd.slam.graph import standing_points, team_frame
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.tables import CLOSURE_COLUMNS, RANGE_COLUMNS, ClosureTable, RangeTable
@@ -65,13 +65,18 @@ class Numbering:
         return np.where(there, place[at], -1)
 
 
-def numbering(graph: PoseGraph, members: set[Segment]) -> Numbering:
-    """Number all keyframes of `members`."""
+def numbering(
+    graph: PoseGraph, members: set[Segment], points: Set[Segment] = frozenset()
+) -> Numbering:
+    """Number all keyframes of `members`, and those of `points` where they stand."""
     place, when, robots, keyframes = {}, [], [], []
-    for robot in sorted({s.robot for s in members}):
+    for robot in sorted({s.robot for s in members | points}):
         chain = graph.view.chains[robot]
         wanted = [s.segment for s in members if s.chain == chain.chain]
         inside = np.isin(chain.keyframes.segment, wanted)
+        for point in points:
+            if point.chain == chain.chain:
+                inside |= standing_points.where_it_stands(graph, point)
         place[robot] = np.where(inside, 0, -1)
         keyframes.append(chain.keyframes.n[inside])
         when.append(keyframes[-1] - graph.view.shifts[robot])
@@ -125,7 +130,8 @@ def initial_poses(
     initial = np.zeros((len(places.n), 3))
     for segment, poses in team_frame.placed(graph, group, previous, known).items():
         rows = graph.view.chains[segment.robot].keyframes.of_segment(segment.segment)
-        initial[places.place[segment.robot][rows]] = poses
+        at = places.place[segment.robot][rows]
+        initial[at[at >= 0]] = poses[at >= 0]
     # where the frame is said nobody's memory of it, but the odometry that defines it
     initial[gauge_place(graph, group, places)] = graph.view.segment(group.frame).poses[0]
     return initial

@@ -129,6 +129,8 @@ def _state(seen: RobotSeen) -> list[str]:
         return ["is in doubt: measurements contradict its pose; look at its wheels and antenna"]
     if seen.state is PoseState.STALE:
         return ["has no odometry: the pose is its last one; cable and power of the base"]
+    if seen.state is PoseState.POSITION:
+        return ["stands, and others have found its place: its heading is known once it drives"]
     return []
 
 

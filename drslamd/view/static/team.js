@@ -1,5 +1,6 @@
 // What is known of the team: paths, pairs, closures, and who is where at any time that is held.
 
+const STANDINGS = ["away", "localised", "doubtful", "stale", "position"];
 export const LOCALISED = 1, DOUBTFUL = 2, STALE = 3, BY_ODOMETRY = 9;
 export const SILENCE_S = 5;
 const GAP_S = 4; // poses farther apart are not joined
@@ -165,18 +166,18 @@ export class Team {
     if (closures.size > MOST_CLOSURES) closures.delete(closures.keys().next().value);
   }
 
-  // what a robot is worth at a time: "localised", "doubtful", "stale", "lost" or "away"
+  // what a robot is worth at a time: one of STANDINGS, or "lost"
   standing(robot, t, isLive) {
     if (isLive) {
       const { info } = robot;
       if (!info) return "away";
       if (info.leaving || t - Math.max(info.heard, robot.path.t.at(-1) ?? -1e9) > SILENCE_S) return "lost";
-      return ["away", "localised", "doubtful", "stale"][info.state];
+      return STANDINGS[info.state];
     }
     const row = robot.path.at(t);
     if (!row || row.state === BY_ODOMETRY) return "away";
     if (row.age > SILENCE_S) return "lost";
-    return ["away", "localised", "doubtful", "stale"][row.state];
+    return STANDINGS[row.state];
   }
 
   // frames in which robots have a path, that of most of them first

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 from message_builders import CORRECTED, COVARIANCE
 
-from drslamd.conventions import Chain
+from drslamd.conventions import Chain, node_chain
 from drslamd.gossip.entries import chapter_packing
 from drslamd.gossip.entries.chapter_packing import packed, unpacked
 from drslamd.slam.graph.measurements import (
@@ -62,6 +62,13 @@ def test_what_is_packed_comes_back() -> None:
     assert is_close(unpacked(packed(SAMPLE), SEQ), SAMPLE)
     nothing = Chapter(2, 3, (0, 0, 0))
     assert unpacked(packed(nothing), SEQ) == nothing
+
+
+def test_modules_that_no_robot_carries_are_peers_like_others() -> None:
+    node = node_chain(77)
+    ranges = (*SAMPLE.ranges, (place(6), ranged(40, node, 2.0)))
+    chapter = replace(SAMPLE, ranges=ranges)
+    assert unpacked(packed(chapter), SEQ).ranges == ranges
 
 
 def test_what_came_back_is_packed_to_the_same_bytes() -> None:

@@ -190,5 +190,5 @@ def is_well(bench: Bench) -> bool:
     if len(frames) != 1 or None in estimates or len(members) < len(bench.hardware):
         return False
     states = {member.robot.whereabouts(member.clock.local(bench.now)).state for member in members}
-    is_placed = not states & {PoseState.NOT_LOCALISED, PoseState.STALE}
+    is_placed = not states & {PoseState.NOT_LOCALISED, PoseState.STALE, PoseState.POSITION}
     return is_placed and agreement.is_everywhere(members, bench.now)

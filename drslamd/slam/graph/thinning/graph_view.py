@@ -8,7 +8,7 @@ from hashlib import blake2b
 
 import numpy as np
 
-from drslamd.conventions import Chain, Segment
+from drslamd.conventions import Chain, Segment, is_node
 from drslamd.slam.graph import clocks
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.pair_data import PairData
@@ -28,7 +28,8 @@ class GraphView:
     """All chains, and all pairs of them.
 
     Attributes:
-        chains: by robot, those without a keyframe left out.
+        chains: by robot, those without a keyframe left out; modules that no robot carries are
+            among them, at a time before all others.
         pairs: whose both chains are there, in the order of their robots.
         shifts: clock of each robot minus that of the first of its team, samples.
     """
@@ -46,7 +47,7 @@ class GraphView:
         """A number that two robots share when they hold the same graph of these robots."""
         h = blake2b(digest_size=8)
         for robot, view in sorted(self.chains.items()):
-            if robot in robots:
+            if robot in robots and not is_node(robot):
                 h.update(repr((view.chain, view.model.numbers())).encode())
                 links = view.links
                 for values in (view.keyframes.rows, links.measured, links.sums, links.by_turn):
@@ -74,17 +75,26 @@ class Thinning:
         self._chains: dict[Chain, ChainThinning] = {}
         self._pairs: dict[tuple[Chain, Chain], PairThinning] = {}
 
-    def view(self, chains: Mapping[int, ChainData], pairs: list[PairData]) -> GraphView:
+    def view(
+        self,
+        chains: Mapping[int, ChainData],
+        nodes: Mapping[int, ChainData],
+        pairs: list[PairData],
+    ) -> GraphView:
         """The graph as it is now.
 
         Args:
-            chains: all that are held, by robot; pairs: of two of these.
+            chains: all that are held, by robot; nodes: likewise of modules that no robot carries;
+            pairs: of two of these.
         """
         known = {robot: data for robot, data in sorted(chains.items()) if len(data.keyframes)}
         newest = {robot: int(data.keyframes.rows[-1, 0]) for robot, data in known.items()}
-        ahead = {(pair.a.robot, pair.b.robot): pair.ahead() for pair in pairs}
+        clocked = [pair for pair in pairs if not is_node(pair.b.robot)]
+        ahead = {(pair.a.robot, pair.b.robot): pair.ahead() for pair in clocked}
         teams = clocks.shifts(set(chains), {k: found for k, found in ahead.items() if found})
         steps, recent = ages(newest, teams), recent_s(len(chains), self._recent_s)
+        known |= nodes
+        steps |= dict.fromkeys(nodes, 0)
         before, self._chains, views = self._chains, {}, {}
         for robot, data in known.items():
             thinning = before.get(data.chain) or ChainThinning()
@@ -93,7 +103,8 @@ class Thinning:
         return GraphView(
             chains=views,
             pairs=self._views_of_pairs(known, pairs, views),
-            shifts={robot: shift for team in teams for robot, shift in team.items()},
+            shifts=dict.fromkeys(nodes, 0.0)
+            | {robot: shift for team in teams for robot, shift in team.items()},
         )
 
     def _views_of_pairs(

@@ -15,7 +15,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from drslamd.conventions import Chain
+from drslamd.conventions import Chain, is_node
+from drslamd.slam.graph import standing_points
 from drslamd.slam.graph.estimate import Learned, TeamEstimate, Trajectory
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
@@ -99,8 +100,8 @@ def build_problem(
     graph: PoseGraph, group: Group, previous: TeamEstimate | None, numbers: BandedOptimizer
 ) -> TeamProblem:
     """Number the group's poses by time and collect its factors."""
-    places = factors.numbering(graph, group.members)
-    robots = sorted({s.robot for s in group.members})
+    places = factors.numbering(graph, group.members, group.points)
+    robots = sorted({s.robot for s in group.everything})
     chains = [graph.view.chains[robot] for robot in robots]
     ranges, pairs = factors.ranges(graph, places)
     closures = factors.closures(graph, places)
@@ -137,7 +138,7 @@ def _knows(previous: TeamEstimate | None, group: Group, keyframes: Mapping[Chain
     """Is there a good solution of these keyframes (k,) in the frame of the group?"""
     if previous is None or previous.frame != group.frame or not previous.converged:
         return False
-    known = {t.chain: t.n for t in previous.trajectories.values()}
+    known = {t.chain: t.n for t in previous.everybody.values()}
     return known.keys() == keyframes.keys() and all(
         np.array_equal(known[chain], n) for chain, n in keyframes.items()
     )
@@ -200,17 +201,23 @@ def _solve(team: TeamProblem, group: Group) -> TeamEstimate:
     )
     learned, spread, doubted = solution.calibration, solution.spread, solution.doubted
     assert spread is not None
+    paths = {
+        chain.robot: Trajectory(
+            chain, team.problem.n[mine[chain.robot]], solution.poses[mine[chain.robot]]
+        )
+        for chain in team.chains
+    }
+    points = frozenset(s.robot for s in group.points) - {s.robot for s in group.members}
     turn = _named(list(mine), learned.turn, spread.turn)
     x, y = (_named(list(mine), learned.antenna[:, k], spread.antenna[:, k]) for k in (0, 1))
     return TeamEstimate(
         frame=group.frame,
-        trajectories={
-            chain.robot: Trajectory(
-                chain, team.problem.n[mine[chain.robot]], solution.poses[mine[chain.robot]]
-            )
-            for chain in team.chains
-        },
-        joint=solution.joint,
+        trajectories={robot: path for robot, path in paths.items() if not is_node(robot)},
+        nodes={number: path for number, path in paths.items() if is_node(number)},
+        points=points,
+        joint=standing_points.without_headings(
+            solution.joint, np.isin([chain.robot for chain in team.chains], list(points))
+        ),
         bias_m=_named(team.pairs, learned.bias, spread.bias),
         scale=_named(list(mine), learned.scale, spread.scale),
         yaw=_named(list(mine), learned.yaw, spread.yaw),

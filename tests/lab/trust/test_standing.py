@@ -1,0 +1,30 @@
+"""How things that stand are measured."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from lab.trust.standing import MOVED_M, STANDS, Run, lines, recorded
+
+
+def test_lines_say_the_median_and_the_worst() -> None:
+    runs = [
+        Run(5.0, 12.0, [0.1, 0.2], 0, 0, [1.0, 2.0]),
+        Run(7.0, 20.0, [0.3], 2, 1, [3.0], 9.0, 0.25),
+        Run(8.0, 30.0, [], 0, 0, []),
+    ]
+    said = "\n".join(lines("moved", runs))
+    assert "two places or one: after 7 s (median), 8 s (most); one: 20 s, 30 s" in said
+    assert "0.200 m off (median), 0.300 m (most); squared error by its covariance 2.00" in said
+    assert "sigmas off): 2; headings: 1" in said
+    assert "after 0 s (median), 9 s (most); drivers meanwhile at most 0.25 m off" in said
+
+
+@pytest.mark.parametrize(("what", "robots"), [("robot", 3), ("module", 2), ("moved", 2)])
+def test_what_stands_is_a_robot_or_a_module_that_measures_nothing(what: str, robots: int) -> None:
+    recording, stands = recorded(what, 1, 4.0)
+    assert len(recording.trails) == robots
+    assert (STANDS in recording.ranges[:, 2]) is True
+    assert bool((recording.ranges[:, 1] == STANDS).any()) is (what == "robot")
+    moved = float(np.hypot(*(stands[-1] - stands[0])))
+    assert moved == pytest.approx(MOVED_M if what == "moved" else 0.0)
