@@ -46,8 +46,9 @@ from drslamd.gossip.bounds import is_sayable
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
-from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, WHAT_IF, Job, Jobs
+from drslamd.jobs import OPTIMIZER, RELATIVE_POSE, Job, Jobs
 from drslamd.memory import Memory
+from drslamd.modules import Modules
 from drslamd.near.surroundings import Surroundings
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.samples import Motion
@@ -119,6 +120,7 @@ class Robot:
         self.network: NetworkState | None = None
         self.slept: Slept | None = None
         self.jobs = Jobs()
+        self.modules = Modules(self.front, self.back, self.team, self.jobs)
         self.timers = Timers(self._periods())
         self.memory = Memory(self.own, self.team.seal, self.calibration)
         self._handlers: dict[type[Any], Callable[[Any], list[Effect]]] = {
@@ -145,8 +147,8 @@ class Robot:
             self._extend_log: SECOND_US,
             self._relative_poses: round(SECOND_US / config.relative_pose.rate_hz),
             self._what_if: SECOND_US,
-            self._consistency: round(SECOND_US / config.consistency.rate_hz),
-            self._optimize: round(SECOND_US / config.optimizer.rate_hz),
+            self.modules.consistency: round(SECOND_US / config.consistency.rate_hz),
+            self.modules.optimize: round(SECOND_US / config.optimizer.rate_hz),
             self._check_health: SECOND_US,
             self._save: SAVE_US,
         }
@@ -203,6 +205,8 @@ class Robot:
             return []
         if isinstance(received.message, GraphEntry):
             self.back.insert(received.origin, received.message)
+            if received.message.closures and self.back.estimate is None:
+                return self.modules.optimize(event.utime)
         elif isinstance(received.message, PublicPoses):
             self.back.hear(received.origin, received.message)
             return self._take_turn(event.utime)
@@ -253,54 +257,38 @@ class Robot:
     # the three modules
 
     def _relative_poses(self, utime: int) -> list[Effect]:
-        """Module 1: a window of ranges and both odometries, for each pair that we own."""
-        if self.jobs.is_resting(RELATIVE_POSE, utime):
-            return []
-        peers = self.neighbours(utime)
-        windows = self.front.module1(peers, self.back.graph, self.back.estimate, utime)
-        return [
-            self.jobs.begin(Job(RELATIVE_POSE, window.pair, window.request), window.run)
-            for window in windows
-            if not self.jobs.is_busy(RELATIVE_POSE, window.pair)
-        ]
+        return self.modules.relative_poses(self.neighbours(utime), utime)
 
     def _what_if(self, utime: int) -> list[Effect]:
-        """Where windows disagree again and again: which mistake in the mountings explains them?"""
-        if self.jobs.is_busy(WHAT_IF) or self.jobs.is_resting(WHAT_IF, utime):
-            return []
-        asked = self.front.what_if(self.neighbours(utime), self.back.graph, utime)
-        return [self.jobs.begin(Job(WHAT_IF, w.pair, w.request), w.run) for w in asked]
-
-    def _consistency(self, utime: int) -> list[Effect]:
-        """Module 2: which of a pair's closures belong together."""
-        return [
-            self.jobs.begin(Job(CONSISTENCY, pair), run)
-            for pair, run in self.front.module2(self.back.graph, self.back.estimate)
-        ]
-
-    def _optimize(self, utime: int) -> list[Effect]:
-        """Module 3: the team's pose graph."""
-        if self.jobs.is_busy(OPTIMIZER) or self.jobs.is_resting(OPTIMIZER, utime):
-            return []
-        run = self.back.begin(self.team.present(utime), set(self.team.living(utime)), utime)
-        return [self.jobs.begin(Job(OPTIMIZER), run)] if run else []
+        return self.modules.what_if(self.neighbours(utime), utime)
 
     def _take_turn(self, utime: int) -> list[Effect]:
         """With `rbcd`: move if it is our turn now, and say what others wait for."""
         exchange = self.back.exchange
         is_due = exchange.is_waiting or self.back.is_urgent
-        effects = self._optimize(utime) if is_due else []
+        effects = self.modules.optimize(utime) if is_due else []
         would_move = exchange.is_waiting and not self.jobs.is_resting(OPTIMIZER, utime)
         at_rest = not would_move and not self.jobs.is_busy(OPTIMIZER)
         return [*effects, *self.broadcast.public(exchange.answers(utime, at_rest), utime)]
 
     def _on_job(self, event: JobDone) -> list[Effect]:
-        if self.jobs.finish(event).tell_pair(event.result):
-            return []
+        job = self.jobs.finish(event)
+        if job.tell_pair(event.result):
+            return self._hurry(job, event.utime)
         said = self.back.on_solution(event.result, event.utime)
         public = self.broadcast.public(said, event.utime)
         self.calibration.update(self.back.estimate, self.own.robot, self.front.pairs)
         return [*self.broadcast.pose(self.whereabouts(event.utime), event.utime), *public]
+
+    def _hurry(self, job: Job, utime: int) -> list[Effect]:
+        """What leads to a first pose does not wait for its turn."""
+        pair = job.pair
+        if pair is None or pair.is_told:
+            return []
+        if pair.connected and not pair.is_refused:
+            return [*self._extend_log(utime), *self.modules.optimize(utime)]
+        is_answered = job.module == RELATIVE_POSE
+        return self.modules.consistency(utime, pair) if is_answered else []
 
     # what we know of ourselves
 
