@@ -3,17 +3,16 @@
 `Robot.handle` reads no clock, draws no random number and does no I/O. The story is the paper's:
 
     ranges and motions in           `_on_serial`, `_on_can`
-    module 1  relative poses        `_relative_poses`
-    module 2  consistency           `_consistency`
+    module 1  relative poses        `Modules.relative_poses`
+    module 2  consistency           `Modules.consistency`
     our log: keyframes, ranges and closures that are kept, to the team     `_extend_log`
-    module 3  pose graph            `_optimize`
+    module 3  pose graph            `Modules.optimize`
     our pose out                    `pose`
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 from drslamd.broadcast import Broadcast
@@ -47,8 +46,9 @@ from drslamd.gossip.bounds import is_sayable
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
-from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, WHAT_IF, Job, Jobs
+from drslamd.jobs import OPTIMIZER, RELATIVE_POSE, Jobs
 from drslamd.memory import Memory
+from drslamd.modules import Modules
 from drslamd.near.surroundings import Surroundings
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.samples import Motion
@@ -56,6 +56,7 @@ from drslamd.sensors.wheels.wheel_input import WheelInput
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.calibration.calibration_store import CalibrationStore
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
+from drslamd.slam.consistency.pair import PairTracker
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.graph.estimate import PoseNow
 from drslamd.slam.graph.measurements import GraphEntry
@@ -112,6 +113,7 @@ class Robot:
         self.network: NetworkState | None = None
         self.slept: Slept | None = None
         self.jobs = Jobs()
+        self.modules = Modules(self.front, self.back, self.team, self.jobs)
         self.timers = Timers(self._periods())
         self.memory = Memory(self.own, self.team.seal, self.calibration)
         self._handlers: dict[type[Any], Callable[[Any], list[Effect]]] = {
@@ -139,8 +141,8 @@ class Robot:
             self._extend_log: SECOND_US,
             self._relative_poses: round(SECOND_US / config.relative_pose.rate_hz),
             self._what_if: SECOND_US,
-            self._consistency: round(SECOND_US / config.consistency.rate_hz),
-            self._optimize: round(SECOND_US / config.optimizer.rate_hz),
+            self.modules.consistency: round(SECOND_US / config.consistency.rate_hz),
+            self.modules.optimize: round(SECOND_US / config.optimizer.rate_hz),
             self._check_health: SECOND_US,
             self._save: SAVE_US,
         }
@@ -199,6 +201,8 @@ class Robot:
             return []
         if isinstance(received.message, GraphEntry):
             self.back.insert(received.origin, received.message)
+            if received.message.closures and self.back.estimate is None:
+                return self.modules.optimize(event.utime)
         elif isinstance(received.message, PublicPoses):
             self.back.hear(received.origin, received.message)
             return self._take_turn(event.utime)
@@ -249,50 +253,19 @@ class Robot:
     # the three modules
 
     def _relative_poses(self, utime: int) -> list[Effect]:
-        """Module 1: a window of ranges and both odometries, for all pairs that we own."""
-        if self.jobs.is_resting(RELATIVE_POSE, utime):
-            return []
-        peers = self.neighbours(utime)
-        found = self.front.module1(peers, self.back.graph, self.back.estimate, utime)
-        free = [window for window in found if not self.jobs.is_busy(RELATIVE_POSE, window.pair)]
-        if not free:
-            return []
-        pairs, requests, windows = zip(*free, strict=True)
-        run = partial(self.front.solve, windows)
-        return [self.jobs.begin(Job(RELATIVE_POSE, pairs, requests), run)]
+        return self.modules.relative_poses(self.neighbours(utime), utime)
 
     def _what_if(self, utime: int) -> list[Effect]:
-        """Where windows disagree again and again: which mistake in the mountings explains them?"""
-        if not self.jobs.is_free(WHAT_IF, utime):
-            return []
-        asked = self.front.what_if(self.neighbours(utime), self.back.graph, utime)
-        return [self.jobs.begin(Job(WHAT_IF, (w.pair,), (w.request,)), w.run) for w in asked]
-
-    def _consistency(self, utime: int) -> list[Effect]:
-        """Module 2: which of a pair's closures belong together."""
-        return [
-            self.jobs.begin(Job(CONSISTENCY, (pair,)), run)
-            for pair, run in self.front.module2(self.back.graph, self.back.estimate)
-        ]
-
-    def _optimize(self, utime: int) -> list[Effect]:
-        """Module 3: the team's pose graph."""
-        if not self.jobs.is_free(OPTIMIZER, utime):
-            return []
-        run = self.back.begin(self.team.present(utime), set(self.team.living(utime)), utime)
-        return [self.jobs.begin(Job(OPTIMIZER), run)] if run else []
+        return self.modules.what_if(self.neighbours(utime), utime)
 
     def _place(self, utime: int) -> list[Effect]:
-        """After a hole in our odometry: where do ranges place us? And where is what stands?"""
-        asked = self.standing.asked(
-            self.neighbours(utime), self.team.robot_of_uwb, self.jobs.is_free, utime
-        )
-        return [self.jobs.begin(Job(name, told=told), run) for name, run, told in asked]
+        return self.modules.place(self.standing, self.neighbours(utime), utime)
 
     def _take_turn(self, utime: int) -> list[Effect]:
         """With `rbcd`: move if it is our turn now, and say what others wait for."""
         exchange = self.back.exchange
-        effects = self._optimize(utime) if exchange.is_waiting or self.back.is_urgent else []
+        is_due = exchange.is_waiting or self.back.is_urgent
+        effects = self.modules.optimize(utime) if is_due else []
         would_move = exchange.is_waiting and not self.jobs.is_resting(OPTIMIZER, utime)
         at_rest = not would_move and not self.jobs.is_busy(OPTIMIZER)
         return [*effects, *self.broadcast.public(exchange.answers(utime, at_rest), utime)]
@@ -301,13 +274,22 @@ class Robot:
         job = self.jobs.finish(event)
         if job.told is not None:
             is_news = job.told(event.result, event.utime)
-            return [*self._extend_log(event.utime), *self._optimize(event.utime)] if is_news else []
+            tell = (self._extend_log, self.modules.optimize) if is_news else ()
+            return [effect for action in tell for effect in action(event.utime)]
         if job.tell_pairs(event.result):
-            return []
+            return [e for pair in job.pairs for e in self._hurry(job.module, pair, event.utime)]
         said = self.back.on_solution(event.result, event.utime)
         public = self.broadcast.public(said, event.utime)
         self.calibration.update(self.back.estimate, self.own.robot, self.front.pairs)
         return [*self.broadcast.pose(self.whereabouts(event.utime), event.utime), *public]
+
+    def _hurry(self, module: str, pair: PairTracker, utime: int) -> list[Effect]:
+        """What leads to a first pose does not wait for its turn."""
+        if pair.is_told:
+            return []
+        if pair.connected and not pair.is_refused:
+            return [*self._extend_log(utime), *self.modules.optimize(utime)]
+        return self.modules.consistency(utime, pair) if module == RELATIVE_POSE else []
 
     # what we know of ourselves
 

@@ -33,6 +33,7 @@ RINGS = {
         "broadcast",
         "near",
         "conditions",
+        "modules",
         "robot",
         "reports",
         "report",

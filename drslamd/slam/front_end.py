@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from functools import partial
 from typing import NamedTuple
 
 from drslamd.config import Config
@@ -31,7 +30,6 @@ from drslamd.slam.relative_pose.estimate import PairNoise, RelativePoseEstimate
 from drslamd.slam.relative_pose.pair_end import PairEnd
 from drslamd.slam.relative_pose.range_buffer import RANGES_FRESH_US, RangeBuffers
 from drslamd.slam.relative_pose.range_sampler import RangeSampler
-from drslamd.slam.relative_pose.what_if import Case
 from drslamd.slam.relative_pose.window_request import WindowRequest, request
 from drslamd.slam.relocation.relocation import Relocation
 from drslamd.slam.relocation.sightings import Own
@@ -62,16 +60,6 @@ class WhatIfJob(NamedTuple):
     pair: PairTracker
     request: WindowRequest
     run: Callable[[], tuple[Array, float]]
-
-
-def _asked(
-    question: what_if.Question,
-    cases: Sequence[Case],
-    noise: PairNoise,
-    delta: float,
-    first: Sequence[int],
-) -> tuple[Array, float]:
-    return question.costs(cases, noise, delta, first), question.way_m
 
 
 class FrontEnd:
@@ -269,19 +257,14 @@ class FrontEnd:
         """Begin the searches for mistakes in mountings that are due, where windows disagree."""
         out = []
         for pair, a, b in self._measurable(neighbours, graph, utime):
-            if not (
-                self._method.agreement.confirms
-                and pair.search.is_due(utime, pair.awaits_confirmation)
-            ):
+            search, awaits = pair.search, pair.awaits_confirmation
+            if not (self._method.agreement.confirms and search.is_due(utime, awaits)):
                 continue
             found = request(pair.ranges, a, b, self._method.rule, self._range_model)
             if isinstance(found, str):
                 continue
-            pair.search.begin(utime)
-            question = what_if.ask(found, a, b)
-            noise = self._noise(pair, b)
-            search = pair.search
-            run = partial(_asked, question, search.cases, noise, self._delta, search.asked_first)
+            search.begin(utime, awaits)
+            run = search.question(what_if.ask(found, a, b), self._noise(pair, b), self._delta)
             out.append(WhatIfJob(pair, found, run))
         return out
 
@@ -294,16 +277,19 @@ class FrontEnd:
     # module 2
 
     def module2(
-        self, graph: PoseGraph, estimate: TeamEstimate | None
+        self, graph: PoseGraph, estimate: TeamEstimate | None, only: PairTracker | None = None
     ) -> list[tuple[PairTracker, Callable[[], Checked]]]:
         """Begin the consistency checks to be computed now: pair, computation.
 
         Args:
             estimate: see `module1`.
+            only: of this pair; of all where it is None.
         """
         out = []
         own = graph.chains.get(self.own.robot)
         for robot, pair in self.pairs.items():
+            if only not in (None, pair):
+                continue
             data = graph.chains.get(robot)
             if own is None or data is None or data.chain != pair.peer:
                 continue

@@ -25,6 +25,9 @@ BESIDE = (0.0, 3.0, 0.0)
 MIRRORED = (0.0, -3.0, 0.0)
 """What else the ranges allow; closures that say so agree with each other alone."""
 
+FIT = 5.0
+"""Chi-squared of windows at their best."""
+
 _NOTHING = np.zeros((0, 3))
 EMPTY_WINDOW = Window(
     _NOTHING[:, 0], _NOTHING[:, 0], _NOTHING, _NOTHING, _NOTHING[0:0, :2], _NOTHING[0:0, :2]
@@ -67,13 +70,21 @@ def asked_at(
 
 
 def estimate_of(
-    *poses: Sequence[float] | Array, covariance: Array | None = None
+    *poses: Sequence[float] | Array, covariance: Array | None = None, worse: float = 0.0
 ) -> RelativePoseEstimate:
-    """Module 1 cannot exclude these poses, which it knows to 5 cm and 0.05 rad."""
+    """Module 1 cannot exclude these poses, which it knows to 5 cm and 0.05 rad.
+
+    Args:
+        worse: chi-squared of all but the first, less that of the first.
+    """
     spread = 0.05**2 * np.eye(3) if covariance is None else covariance
     verdict = (Verdict.UNOBSERVABLE, Verdict.UNIQUE, Verdict.AMBIGUOUS)[min(len(poses), 2)]
     return RelativePoseEstimate(
-        verdict, tuple(Hypothesis(np.array(pose, float), spread, 1.0) for pose in poses)
+        verdict,
+        tuple(
+            Hypothesis(np.array(pose, float), spread, FIT + worse * (place > 0))
+            for place, pose in enumerate(poses)
+        ),
     )
 
 
@@ -89,11 +100,15 @@ class OwnedPair:
         self.tracker = tracker(self.peer.chain, agreement, epsilon)
 
     def answer(
-        self, n: int, *poses: Sequence[float], segments: tuple[int, int] = (0, 0)
+        self,
+        n: int,
+        *poses: Sequence[float],
+        segments: tuple[int, int] = (0, 0),
+        worse: float = 0.0,
     ) -> WindowRequest:
         """Module 1 on one window: its poses at keyframe n; without any the window said nothing."""
         request = asked_at(n, segments)
-        self.tracker.on_estimate(request, estimate_of(*poses))
+        self.tracker.on_estimate(request, estimate_of(*poses, worse=worse))
         return request
 
     def confirm(self) -> None:

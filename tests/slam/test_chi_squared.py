@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
-from scipy.stats import chi2
+from scipy.integrate import quad
+from scipy.stats import chi2, invgamma
 
-from drslamd.slam.chi_squared import cdf3, quantile3
+from drslamd.slam.chi_squared import LEVEL_FREEDOM, cdf3, evidence, quantile3
 
 
 @pytest.mark.parametrize("x", [1e-6, 0.1, 1.0, 2.366, 6.2514, 7.8147, 14.16, 40.0, 200.0])
@@ -27,3 +29,27 @@ def test_nothing_is_shorter_than_nothing(x: float) -> None:
 def test_the_ends_of_the_scale_are_numbers_too() -> None:
     assert quantile3(0.0) == pytest.approx(0.0, abs=1e-9)
     assert 70 < quantile3(1 - 1e-16) < 100
+
+
+@pytest.mark.parametrize(("best", "worse"), [(3.0, 4.0), (20.0, 4.0), (20.0, 40.0), (8.0, -4.0)])
+@pytest.mark.parametrize("freedom", [6, 25])
+def test_evidence_is_what_any_level_of_noise_leaves_of_a_difference(
+    best: float, worse: float, freedom: int
+) -> None:
+    """Gauss's likelihood of both, integrated over a variance that is likely the configured one."""
+    prior = invgamma(LEVEL_FREEDOM / 2, scale=LEVEL_FREEDOM / 2)
+
+    def marginal(chi_squared: float) -> float:
+        def likelihood(variance: float) -> float:
+            gauss = variance ** (-freedom / 2) * np.exp(-chi_squared / 2 / variance)
+            return float(gauss * prior.pdf(variance))
+
+        return float(quad(likelihood, 0, np.inf, epsabs=0, limit=200)[0])
+
+    expected = 2 * np.log(marginal(best) / marginal(best + worse))
+    assert evidence(worse, best, freedom) == pytest.approx(expected, rel=1e-5)
+
+
+def test_what_does_not_fit_at_all_is_excluded_and_what_fits_much_better_is_no_error() -> None:
+    assert evidence(float("inf"), 3.0, 10) == float("inf")
+    assert np.isfinite(evidence(-9.9, 10.0, 10))

@@ -98,13 +98,15 @@ class IncrementalClique:
                 degree[fewest] = GONE
         return 0
 
-    def runner_up(self, least: int = 1) -> int:
+    def runner_up(self, least: int = 1, allowed: int | None = None) -> int:
         """The largest clique found among the vertices outside the best one (bits).
 
         Args:
             least: vertices that it must have to be of interest.
+            allowed: vertices that may be in it (bits); all where it is None.
         """
         rest = ((1 << self._count) - 1) & ~self.clique
+        rest &= rest if allowed is None else allowed
         best, least = 0, least - 1
         for start in bits(rest):
             neighbours = int.from_bytes(self._rows[start].tobytes(), "little")

@@ -7,14 +7,14 @@ The owner is the robot with the lower id, or the other one when the lower one me
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from drslamd.conventions import Chain, Segment
-from drslamd.slam import se2
+from drslamd.slam.consistency.candidates import candidates, decided
 from drslamd.slam.consistency.pcm import Candidate, PairConsistency
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import ClosureMeasurement
@@ -22,7 +22,6 @@ from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.relative_pose.estimate import RelativePoseEstimate
 from drslamd.slam.relative_pose.mounting_search import MOVED_M, MountingSearch, is_learned
-from drslamd.slam.relative_pose.pair_end import at_keyframes
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 from drslamd.slam.relative_pose.range_sampler import RangeSampler
 from drslamd.slam.relative_pose.window_request import WindowRequest
@@ -39,8 +38,6 @@ TELL_EVERY = 100
 UNCORRECTED = (Correction(), Correction())
 ANOTHER_WAY, OVER_A_WAY = 0.03, np.array(Correction(scale=1.0, yaw=10.0, turn=1.0))
 """Corrections that differ by more lead to ways that do not agree; yaw rates act over ten metres."""
-SHRINK = 1e-4
-"""Of correlations, before rounding: far above a rounding of 6e-8, far below what anyone knows."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +48,13 @@ class Agreement:
         least: so many closures must agree.
         outnumber: and be so many times the largest set that contradicts them; 0 asks for nothing.
         confirms: and must windows exclude that wheels run backwards?
+        decides: evidence with which a window decides for its best pose, see `Checked.rivals`.
     """
 
     least: int
     outnumber: int
     confirms: bool
+    decides: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -69,15 +68,35 @@ class WindowAnswer:
 
 @dataclass
 class Checked:
-    """Module 2 has run: the consistent set, and whose hypothesis each of its vertices is."""
+    """Module 2 has run: the consistent set, and whose hypothesis each of its vertices is.
+
+    Attributes:
+        decided: evidence of each window for its best hypothesis against its others, by number.
+    """
 
     segments: tuple[Segment, Segment]
     consistency: PairConsistency
     measurements: list[ClosureMeasurement]
+    decided: dict[int, float]
 
     def kept(self) -> tuple[ClosureMeasurement, ...]:
         """Closures of the consistent set."""
         return tuple(self.measurements[v] for v in self.consistency.kept_vertices())
+
+    def rivals(self, decides: float) -> int:
+        """Size of the largest set that contradicts what is kept.
+
+        Once the newest window has decided for what is kept, sets count only as far as windows had
+        decided for them: it holds what those held that had not, and more.
+
+        Args:
+            decides: evidence with which a window does.
+        """
+        best = {m.number: v for v, m in reversed([*enumerate(self.measurements)])}
+        sure = [v for number, v in best.items() if self.decided.get(number, 0.0) >= decides]
+        newest = best[max(best)]
+        is_decided = newest in sure and newest in self.consistency.kept_vertices()
+        return self.consistency.rivals(sure if is_decided else None)
 
     def renew_sums(self, own: ChainData, peer: ChainData) -> None:
         """Keyframes that came late may lie between those of the candidates."""
@@ -149,6 +168,11 @@ class PairTracker:
             self._number += 1
 
     @property
+    def is_told(self) -> bool:
+        """Does the team know of the pair?"""
+        return bool(self._told)
+
+    @property
     def is_refused(self) -> bool:
         """Is a robot of the pair wired so that nothing of the pair can be believed?"""
         found = self.search.found
@@ -174,6 +198,7 @@ class PairTracker:
             self._pending.clear()
             self._checked, self.connected, self.kept = None, False, ()
             self._is_obsolete = self._is_busy
+        self._judge()
 
     # module 2
 
@@ -195,6 +220,7 @@ class PairTracker:
             self._corrections = known
             self._begin_anew()
         work: list[tuple[Candidate, ClosureMeasurement]] = []
+        sure: dict[int, float] = {}
         while self._pending:
             number, request, estimate = self._pending.popleft()
             segments = (
@@ -204,69 +230,25 @@ class PairTracker:
             if segments != self._segments:
                 # odometry broke: what was kept stays in the graph, a new set begins
                 self._segments, work = segments, []
+                sure.clear()
                 self._begin_anew()
-            work += self._candidates(number, request, estimate, own, peer)
+            work += candidates(number, request, estimate, own, peer, self._corrections)
+            sure[number] = decided(estimate, len(request.window) - 3)
         if not work or self._segments is None:
             return None
         checked = self._checked
         if checked is None:
             consistency = PairConsistency(noise, peer.model.noise, self._epsilon)
-            checked = Checked(self._segments, consistency, [])
+            checked = Checked(self._segments, consistency, [], {})
         else:
             checked.renew_sums(own, peer)
         self._is_busy, self._checked = True, None
-        return partial(extended, checked, work)
+        return partial(extended, checked, work, sure)
 
     def _begin_anew(self) -> None:
         """What is kept now stays in the graph, a new set begins."""
         self._kept_before = self.accepted() if self.connected else self._kept_before
         self._checked, self.connected, self.kept = None, False, ()
-
-    def _candidates(
-        self,
-        number: int,
-        request: WindowRequest,
-        estimate: RelativePoseEstimate,
-        own: ChainData,
-        peer: ChainData,
-    ) -> list[tuple[Candidate, ClosureMeasurement]]:
-        """Every hypothesis of one window, at its two keyframes."""
-        a, a_there = own.keyframes.find(np.array([float(request.a.n)]))
-        b, b_there = peer.keyframes.find(np.array([float(request.b.n)]))
-        if not (a_there[0] and b_there[0]):
-            return []
-        a_pose, b_pose = (
-            correction.path(data.keyframes.poses[: row[0] + 1])[-1]
-            for correction, data, row in zip(self._corrections, (own, peer), (a, b), strict=True)
-        )
-        scales, turns = zip(*((c.scale, c.turn) for c in self._corrections), strict=True)
-        out = []
-        for hypothesis in estimate.hypotheses:
-            pose, covariance = at_keyframes(
-                hypothesis.a_T_b, hypothesis.covariance, request.a, request.b
-            )
-            x, y, theta = pose.tolist()
-            measurement = ClosureMeasurement(
-                number=number,
-                kept=True,
-                a_n=request.a.n,
-                peer=self.peer,
-                b_n=request.b.n,
-                a_T_b=(x, y, theta),
-                covariance=se2.packed(sendable(covariance)),
-                corrected=(scales[0], turns[0], scales[1], turns[1]),
-            )
-            candidate = Candidate(
-                closure=number,
-                a_T_b=pose,
-                covariance=covariance,
-                a_pose=a_pose,
-                b_pose=b_pose,
-                a_sums=own.sums[a[0]],
-                b_sums=peer.sums[b[0]],
-            )
-            out.append((candidate, measurement))
-        return out
 
     def on_check(self, checked: Checked) -> None:
         """Module 2 has answered: is the pair connected now?"""
@@ -275,13 +257,21 @@ class PairTracker:
             self._is_obsolete = False
             return
         self._checked, self.kept = checked, checked.kept()
+        self._judge()
+
+    def _judge(self) -> None:
+        """Is the pair connected now?"""
+        checked = self._checked
+        if checked is None:
+            return
         enough = len(self.kept) >= self.agreement.least
         if self.connected and enough:
             return
         # the rivals are searched last: that takes a while
-        rivals = self.agreement.outnumber and checked.consistency.rivals()
-        outnumbers = len(self.kept) >= self.agreement.outnumber * rivals
-        is_sure = self.search.is_confirmed or not self.agreement.confirms
+        agreement = self.agreement
+        rivals = agreement.outnumber and checked.rivals(agreement.decides)
+        outnumbers = len(self.kept) >= agreement.outnumber * rivals
+        is_sure = self.search.is_confirmed or not agreement.confirms
         self.connected = enough and outnumbers and is_sure and not self.search.disagrees
 
     def accepted(self) -> set[int]:
@@ -332,19 +322,18 @@ def _differ(one: tuple[Correction, Correction], other: tuple[Correction, Correct
     return bool(np.abs(apart).max() > ANOTHER_WAY)
 
 
-def sendable(covariance: Array) -> Array:
-    """A covariance that is still one when its six numbers are rounded to 32 bits.
-
-    Directions that a window hardly fixes beside others that it fixes well would make it singular.
-    """
-    return np.asarray(covariance * (1 - SHRINK) + np.diag(np.diag(covariance)) * SHRINK)
-
-
-def extended(checked: Checked, work: list[tuple[Candidate, ClosureMeasurement]]) -> Checked:
-    """Equation (3) for each new hypothesis."""
+def extended(
+    checked: Checked,
+    work: list[tuple[Candidate, ClosureMeasurement]],
+    sure: Mapping[int, float],
+) -> Checked:
+    """Equation (3) for each new hypothesis; `sure` as in `Checked.decided`."""
     for candidate, measurement in work:
         forgotten = checked.consistency.forgotten
         checked.consistency.add(candidate)
         del checked.measurements[: checked.consistency.forgotten - forgotten]
         checked.measurements.append(measurement)
+    oldest = checked.measurements[0].number if checked.measurements else 0
+    known = {**checked.decided, **sure}
+    checked.decided = {number: value for number, value in known.items() if number >= oldest}
     return checked

@@ -12,6 +12,7 @@ both odometries is a difference of running sums, so a new closure costs one vect
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -163,9 +164,14 @@ class PairConsistency:
     def kept_vertices(self) -> list[int]:
         return bits(self.graph.clique)
 
-    def rivals(self) -> int:
-        """Size of the largest consistent set among the candidates that were not kept."""
-        return self.graph.runner_up().bit_count()
+    def rivals(self, among: Iterable[int] | None = None) -> int:
+        """Size of the largest consistent set among the candidates that were not kept.
+
+        Args:
+            among: vertices that count; all where it is None.
+        """
+        allowed = None if among is None else sum(1 << vertex for vertex in among)
+        return self.graph.runner_up(allowed=allowed).bit_count()
 
     def _forget(self) -> None:
         keep = MAX_VERTICES - FORGET

@@ -161,3 +161,14 @@ def test_new_vertices_find_their_neighbours_after_forgetting() -> None:
     clique.drop_oldest(4)
     clique.add(0b11)
     assert bits(clique.clique) == [0, 1, 2]
+
+
+def test_the_runner_up_may_be_asked_for_among_some_only() -> None:
+    """Cliques of four, three and two vertices."""
+    graph = nx.disjoint_union_all(
+        [nx.complete_graph(4), nx.complete_graph(3), nx.complete_graph(2)]
+    )
+    clique = incremental(graph)
+    assert bits(clique.runner_up()) == [4, 5, 6]
+    assert bits(clique.runner_up(allowed=0b111000011)) == [7, 8]
+    assert bits(clique.runner_up(allowed=0b000001111)) == []

@@ -6,18 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pair_scenes import BESIDE, MIRRORED, OwnedPair, asked_at, estimate_of
+from pair_scenes import BESIDE, FIT, MIRRORED, OwnedPair, asked_at, estimate_of
 from slam_scenes import NOISE, config, inverted, product, same_pose
 
 from drslamd.conventions import Chain
-from drslamd.slam import se2
+from drslamd.slam.chi_squared import LEVEL_FREEDOM
+from drslamd.slam.closure_method import AGREEMENT
 from drslamd.slam.consistency import pair as pair_module
-from drslamd.slam.consistency.pair import PENDING, Agreement, sendable
+from drslamd.slam.consistency.pair import PENDING, Agreement
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import Keyframe
+from drslamd.slam.relative_pose.what_if import CASES
 from drslamd.slam.settings import closure_method
 
 TWO = Agreement(least=2, outnumber=2, confirms=False)
+DECISIVE = (LEVEL_FREEDOM + FIT) * np.expm1(AGREEMENT.decides / (LEVEL_FREEDOM - 3))
+"""Chi-squared by which another hypothesis must be worse, in the empty windows of these scenes."""
 
 
 def chosen(algorithm: str) -> Agreement:
@@ -59,6 +63,56 @@ def test_a_pair_is_connected_by_enough_closures_that_outnumber_all_others(
     pair = rivalled(chosen(algorithm), agreeing, contradicting)
     assert len(pair.kept()) == agreeing
     assert pair.tracker.connected is is_connected
+
+
+@pytest.mark.parametrize(
+    ("worse", "is_known", "is_connected"),
+    [
+        (DECISIVE + 0.1, True, True),
+        (DECISIVE - 0.1, True, False),
+        (DECISIVE + 0.1, False, False),
+    ],
+)
+def test_a_window_that_decides_overrules_earlier_ones_that_had_not(
+    worse: float, is_known: bool, is_connected: bool
+) -> None:
+    """Nine windows that allow two poses, then one that excludes the other, if it is the newest."""
+    pair = OwnedPair(chosen("drslamd"))
+    pair.confirm()
+    for k in range(1, 10):
+        pair.answer(10 * k, BESIDE, MIRRORED)
+        pair.check()
+    assert not pair.tracker.connected
+    pair.answer(100, BESIDE, MIRRORED, worse=worse)
+    if not is_known:
+        pair.answer(110, BESIDE, MIRRORED)
+    pair.check()
+    assert pair.tracker.connected is is_connected
+
+
+def test_a_window_that_decides_for_what_is_not_kept_overrules_nothing() -> None:
+    pair = OwnedPair(chosen("drslamd"))
+    pair.confirm()
+    for k in range(1, 8):
+        pair.answer(10 * k, BESIDE, MIRRORED)
+        pair.check()
+    pair.answer(80, BESIDE)
+    pair.answer(90, MIRRORED, (9.0, 9.0, 0.0), worse=DECISIVE + 0.1)
+    pair.check()
+    assert pair.kept() == [0, 1, 2, 3, 4, 5, 6, 7]
+    assert not pair.tracker.connected
+
+
+def test_a_pair_is_connected_as_soon_as_it_is_confirmed_and_told_once() -> None:
+    pair = OwnedPair(chosen("drslamd"))
+    pair.see(BESIDE, 5)
+    assert not pair.tracker.connected
+    pair.confirm()
+    pair.tracker.on_costs(asked_at(50), np.zeros(len(CASES)), 0.0)
+    assert pair.tracker.connected
+    assert not pair.tracker.is_told
+    pair.told()
+    assert pair.tracker.is_told
 
 
 @pytest.mark.parametrize(("agreeing", "is_connected"), [(2, False), (3, True)])
@@ -273,23 +327,3 @@ def test_answers_of_the_old_piece_that_still_wait_are_dropped_with_it() -> None:
     pair.answer(20, BESIDE, segments=(1, 0))
     pair.check()
     assert pair.kept() == [1]
-
-
-def test_a_covariance_stays_one_when_it_is_rounded_to_be_sent() -> None:
-    """One direction 10 m uncertain, the others 0.1 mm, all correlated."""
-    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
-    bad = turn @ np.diag([100.0, 1e-8, 1e-8]) @ turn.T
-    assert least_when_rounded(se2.packed(bad)) <= 0
-    pair = OwnedPair(Agreement(1, 0, confirms=False))
-    pair.tracker.on_estimate(asked_at(20), estimate_of(BESIDE, covariance=bad))
-    pair.check()
-    (said,) = pair.measurements()
-    assert least_when_rounded(said.covariance) > 0
-    assert said.covariance == pytest.approx(se2.packed(bad), rel=1.1e-4)
-    assert np.diag(sendable(bad)) == pytest.approx(np.diag(bad))
-
-
-def least_when_rounded(covariance: tuple[float, ...]) -> float:
-    """Smallest eigenvalue of six numbers that travel with 32 bits."""
-    rounded = np.array(covariance, dtype=np.float32).astype(float)
-    return float(np.linalg.eigvalsh(se2.unpacked(tuple(rounded)))[0])

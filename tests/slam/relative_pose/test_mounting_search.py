@@ -5,14 +5,18 @@ Chi-squared of every case is made up; thresholds are those of the module.
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import numpy as np
 import pytest
 from slam_scenes import Array
 
+from drslamd.slam.chi_squared import LEVEL_FREEDOM
 from drslamd.slam.odometry.mounting import COARSE_SCALES, CURVES, MIRRORED, SCALES, SIDES, TRACKS
 from drslamd.slam.relative_pose.estimate import Verdict
 from drslamd.slam.relative_pose.mounting_search import (
     APART_US,
+    BACKWARDS,
     BETTER,
     CLEAR,
     EXCLUDED,
@@ -22,14 +26,17 @@ from drslamd.slam.relative_pose.mounting_search import (
     MANY,
     MOST,
     MOST_ASKED,
+    QUICKLY_US,
     RECENT,
     SHARED,
+    SURELY,
     UNLIKE,
     WRONG,
     MountingSearch,
     is_as_configured,
     is_curve,
     is_learned,
+    is_surely_as_configured,
     winner,
 )
 from drslamd.slam.relative_pose.range_fit import POOR_FIT
@@ -365,8 +372,92 @@ def test_where_windows_agree_some_cases_may_spare_the_others(poor: int, is_short
 @pytest.mark.parametrize(("apart_us", "is_due"), [(APART_US - 1, False), (APART_US, True)])
 def test_windows_that_are_asked_are_some_seconds_apart(apart_us: int, is_due: bool) -> None:
     search = MountingSearch()
-    search.begin(1_000)
+    for _ in range(MANY):
+        search.on_verdict(Verdict.POOR_FIT)
+    search.begin(1_000, False)
+    assert search.is_due(1_000 + apart_us, False) is is_due
+
+
+@pytest.mark.parametrize(
+    ("apart_us", "is_due"), [(QUICKLY_US - 1, False), (QUICKLY_US, True), (APART_US, True)]
+)
+def test_a_pair_that_waits_for_nothing_else_is_asked_about_every_window(
+    apart_us: int, is_due: bool
+) -> None:
+    search = MountingSearch()
+    search.begin(1_000, True)
     assert search.is_due(1_000 + apart_us, True) is is_due
+    assert search.is_due(1_000 + apart_us, False) is False
+    search.is_confirmed = True
+    assert not search.is_due(1_000 + apart_us, True)
+
+
+# one window that is sure
+
+FREE = 30
+"""Degrees of freedom of a window of 33 measurements."""
+ENOUGH = (LEVEL_FREEDOM + GOOD) * np.expm1(SURELY / (LEVEL_FREEDOM + FREE))
+"""Chi-squared by which wheels that run backwards must be worse."""
+
+
+@pytest.mark.parametrize("place", BACKWARDS)
+@pytest.mark.parametrize(("worse", "is_sure"), [(ENOUGH + LITTLE, True), (ENOUGH - LITTLE, False)])
+def test_one_window_may_exclude_wheels_that_run_backwards(
+    place: int, worse: float, is_sure: bool
+) -> None:
+    known = {AS_IT_IS: GOOD, CASES[place]: GOOD + worse}
+    assert is_surely_as_configured(costs(known), FREE) is is_sure
+
+
+@pytest.mark.parametrize("level", [(FITS - 0.001, True), (FITS + 0.001, False)])
+def test_a_window_that_does_not_fit_well_is_never_sure(level: tuple[float, bool]) -> None:
+    assert is_surely_as_configured(costs({AS_IT_IS: level[0] * FREE}), FREE) is level[1]
+
+
+@pytest.mark.parametrize("case", [TRACK, SCALE, Case(a=CURVES[0])])
+@pytest.mark.parametrize(("by", "is_sure"), [(2 - LITTLE, True), (2 + LITTLE, False)])
+def test_nor_is_one_that_another_mistake_explains_better(
+    case: Case, by: float, is_sure: bool
+) -> None:
+    assert is_surely_as_configured(costs({AS_IT_IS: GOOD, case: GOOD - by}), FREE) is is_sure
+
+
+@pytest.mark.parametrize("is_told", [True, False])
+def test_who_is_sure_of_one_window_is_confirmed_where_both_robots_drove(is_told: bool) -> None:
+    search = MountingSearch()
+    search.begin(0, True)
+    search.begin(QUICKLY_US, True)
+    assert not search.on_costs(costs({AS_IT_IS: GOOD}), FREE + 3, is_told)
+    assert search.is_confirmed is is_told
+
+
+class Asked:
+    """A window that is asked: what each case costs, and which were asked."""
+
+    window = range(FREE + 3)
+    way_m = 5.0
+
+    def __init__(self, known: dict[Case, float]) -> None:
+        self.known, self.asked = known, list[Case]()
+
+    def costs(self, cases: Any, noise: Any, delta: float, first: Any = ()) -> Array:
+        self.asked += cases
+        return np.array([self.known.get(case, FAR) for case in cases])
+
+
+@pytest.mark.parametrize(("mirrored", "asked"), [(GOOD + 1, 6), (FAR, 6 + len(CASES))])
+def test_a_quick_question_is_whole_only_where_wheels_that_run_backwards_are_excluded(
+    mirrored: float, asked: int
+) -> None:
+    search, question = MountingSearch(), Asked({AS_IT_IS: GOOD, MIRROR: mirrored, TRACK: 1.0})
+    search.begin(0, True)
+    search.begin(QUICKLY_US, True)
+    found, way_m = search.question(cast(Any, question), cast(Any, None), 0.1)()
+    assert (len(question.asked), way_m) == (asked, 5.0)
+    search.on_costs(found, FREE + 3, True)
+    assert not search.is_confirmed
+    # what was asked quickly decides nothing else
+    assert not any(search.on_costs(costs({LEFT: FIT}), FREE, True) for _ in range(FEWEST_ASKED))
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,69 @@
+"""The three modules as a robot runs them: what is due becomes a computation, what came of it news.
+
+By the clock each looks once in a while. Until the team knows of a pair nothing waits for the clock:
+what module 1 found goes to module 2 at once, a pair that is connected to the team and to module 3.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+from drslamd.events import Effect
+from drslamd.gossip.team import Team
+from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, WHAT_IF, Job, Jobs
+from drslamd.slam.back_end import BackEnd
+from drslamd.slam.consistency.pair import PairTracker
+from drslamd.slam.front_end import FrontEnd
+from drslamd.slam.peer_in_range import PeerInRange
+from drslamd.standing import Standing
+
+
+class Modules:
+    """Of one robot."""
+
+    def __init__(self, front: FrontEnd, back: BackEnd, team: Team, jobs: Jobs) -> None:
+        self._front, self._back, self._team, self._jobs = front, back, team, jobs
+
+    def relative_poses(self, neighbours: list[PeerInRange], utime: int) -> list[Effect]:
+        """Module 1: a window of ranges and both odometries, for all pairs that we own."""
+        if self._jobs.is_resting(RELATIVE_POSE, utime):
+            return []
+        graph, estimate = self._back.graph, self._back.estimate
+        found = self._front.module1(neighbours, graph, estimate, utime)
+        free = [window for window in found if not self._jobs.is_busy(RELATIVE_POSE, window.pair)]
+        if not free:
+            return []
+        pairs, requests, windows = zip(*free, strict=True)
+        run = partial(self._front.solve, windows)
+        return [self._jobs.begin(Job(RELATIVE_POSE, pairs, requests), run)]
+
+    def what_if(self, neighbours: list[PeerInRange], utime: int) -> list[Effect]:
+        """Is a pair mounted as configured? Where windows disagree: which mistake explains it?"""
+        if not self._jobs.is_free(WHAT_IF, utime):
+            return []
+        asked = self._front.what_if(neighbours, self._back.graph, utime)
+        return [self._jobs.begin(Job(WHAT_IF, (w.pair,), (w.request,)), w.run) for w in asked]
+
+    def consistency(self, utime: int, only: PairTracker | None = None) -> list[Effect]:
+        """Module 2: which of a pair's closures belong together.
+
+        Args:
+            only: of this pair; of all where it is None.
+        """
+        return [
+            self._jobs.begin(Job(CONSISTENCY, (pair,)), run)
+            for pair, run in self._front.module2(self._back.graph, self._back.estimate, only)
+        ]
+
+    def optimize(self, utime: int) -> list[Effect]:
+        """Module 3: the team's pose graph."""
+        if not self._jobs.is_free(OPTIMIZER, utime):
+            return []
+        run = self._back.begin(self._team.present(utime), set(self._team.living(utime)), utime)
+        return [self._jobs.begin(Job(OPTIMIZER), run)] if run else []
+
+    def place(self, standing: Standing, neighbours: list[PeerInRange], utime: int) -> list[Effect]:
+        """After a hole in our odometry: where do ranges place us? And where is what stands?"""
+        carrier, is_free = self._team.robot_of_uwb, self._jobs.is_free
+        asked = standing.asked(neighbours, carrier, is_free, utime)
+        return [self._jobs.begin(Job(name, told=told), run) for name, run, told in asked]
