@@ -69,6 +69,10 @@ _REFUSED_KINDS: Final = {
 }
 
 
+NEWER_KINDS: Final = {"55 0B": "55 0B (NODE_FRAME7 of newer firmware)"}
+"""Marks of frames whose layout nobody has published."""
+
+
 class RangeRefusal(Enum):
     """Why one entry of a good frame gives no sample of its own."""
 
@@ -162,7 +166,8 @@ class LinkTrackInput:
     def _on_frame(self, data: bytes, utime: int) -> list[RangeSample]:
         frame = decode(data)
         if isinstance(frame, Refusal):
-            return self._refuse(frame, data[:2].hex(" ").upper(), utime)
+            mark = data[:2].hex(" ").upper()
+            return self._refuse(frame, NEWER_KINDS.get(mark, mark), utime)
         if frame.kind in _REFUSED_KINDS:
             return self._refuse(_REFUSED_KINDS[frame.kind], frame.kind.name, utime)
         if frame.kind in _RANGING:
