@@ -106,8 +106,9 @@ class LinkTrackWatch:
         wrong_mode: what was last printed that a module prints only in the LP modes.
     """
 
-    def __init__(self, uwb_id: int) -> None:
+    def __init__(self, uwb_id: int, line: str = "") -> None:
         self._uwb_id = uwb_id
+        self._where = f" on {line}" if line else ""
         self._last_byte: int | None = None
         self._trying_since = 0
         self._trouble: _Trouble | None = None
@@ -218,8 +219,9 @@ class LinkTrackWatch:
         if utime - self._trying_since < NO_FRAME_US:
             return None
         return (
-            f"bytes but no ranging frame from the UWB module for {seconds} s: is uwb.baud right "
-            "(921600 unless it was changed), is its output NODE_FRAME3 or NODE_FRAME5?"
+            f"bytes but no ranging frame from the UWB module{self._where} for {seconds} s: is "
+            "uwb.baud right (921600 unless it was changed), is its output NODE_FRAME3 or "
+            "NODE_FRAME5?"
         )
 
 

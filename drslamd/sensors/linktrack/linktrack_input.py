@@ -89,6 +89,7 @@ class LinkTrackInput:
     Args:
         uwb_id: the 8-bit id of its module in DR_MODE0, the 32-bit one in DR_MODE1.
         max_range_m: longest distance that is believed.
+        line: what it is read from, for sentences.
 
     Attributes:
         frames: intact frames; accepted are those with ranges, ignored those that carry none.
@@ -100,12 +101,12 @@ class LinkTrackInput:
         module_faults: what the last ERROR_FRAME0 said, of the bits that concern the DR modes.
     """
 
-    def __init__(self, uwb_id: int, max_range_m: float) -> None:
+    def __init__(self, uwb_id: int, max_range_m: float, line: str = "") -> None:
         self._uwb_id = uwb_id
         self._max_range_m = max_range_m
         self._scanner = FrameScanner(LINKTRACK)
         self._clock = DeviceClock(TIME_BITS, MILLISECOND_US)
-        self._watch = LinkTrackWatch(uwb_id)
+        self._watch = LinkTrackWatch(uwb_id, line)
         self._lead_ms: int | None = None
         self._lead_is_steady = False
         self.frames: Tally[Refusal] = Tally()

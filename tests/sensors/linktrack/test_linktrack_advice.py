@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import time
 
 import pytest
 from frames import (
@@ -20,6 +21,7 @@ from frames import (
     tag_frame0,
     with_length,
 )
+from lab.play.emulators import as_heard_at
 
 from drslamd.sensors.linktrack.linktrack_frames import ModuleFault
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
@@ -75,6 +77,25 @@ def test_bytes_without_frames_lead_to_the_baud_rate_within_5_seconds(
     advice = uwb.advice(T0 + round(after_s * SECOND_US))
     assert (advice is not None) == asked
     assert not asked or "uwb.baud" in str(advice)
+
+
+@pytest.mark.row("D7")
+@pytest.mark.parametrize(
+    "baud", [9_600, 57_600, 115_200, 230_400, 460_800, 1_000_000, 2_000_000, 3_000_000]
+)
+def test_at_any_wrong_rate_port_and_rate_are_named_and_nothing_is_believed(baud: int) -> None:
+    uwb = LinkTrackInput(5, 120.0, f"/dev/ttyUSB0 at {baud} baud")
+    began, samples = time.process_time(), 0
+    heard = [as_heard_at(frame, 921_600, baud) for frame in ranging_stream(50)]
+    took = -(time.process_time() - began)
+    for k in range(300):
+        samples += len(uwb.feed(heard[k % 50], T0 + k * 20 * MS))
+    took += time.process_time() - began
+    said = str(uwb.advice(T0 + 5_980 * MS))
+    assert "on /dev/ttyUSB0 at " + str(baud) in said
+    assert "is uwb.baud right" in said
+    assert samples == 0
+    assert took < 0.05 * 6
 
 
 def test_after_a_pause_the_five_seconds_start_anew() -> None:
