@@ -71,6 +71,11 @@ class UwbSection(Section):
     antenna_z_m: Metres = 0.0
     """Antenna in the body frame: x forward, y to the left, z above the floor (any common level)."""
 
+    @property
+    def line(self) -> str:
+        """Where the module is, and how it is read."""
+        return f"{self.port} at {self.baud} baud"
+
 
 class OdometrySection(Section):
     """Noise of dead reckoning per path length (defaults: recorded wheeled robots)."""

@@ -89,17 +89,15 @@ class Robot:
         """
         Args:
             key: of `seal.team_key`.
-            epoch: of this start, above all earlier ones.
-            epochs: last known epoch of each peer, from before this start.
+            epoch: of this start, above all earlier ones. epochs: last known ones of the peers.
             kept: what the last start learned of our sensors; taped: what a person measured.
             dbc_text: content of `wheels.dbc_file`, if there is one. tuning: of the estimator.
         """
         self.config = config
         self.own = Chain(config.robot.id, epoch)
-        self.uwb = LinkTrackInput(config.uwb_id, config.uwb.max_range_m)
+        self.uwb = LinkTrackInput(config.uwb_id, config.uwb.max_range_m, config.uwb.line)
         self.wheels = WheelInput(config.wheels, dbc_text)
-        seal = Seal(key, config.robot.id, epoch, epochs)
-        self.team = Team(seal, config.gossip.max_bytes_per_s)
+        self.team = Team(Seal(key, config.robot.id, epoch, epochs), config.gossip.max_bytes_per_s)
         uses_kept = closure_method(config.relative_pose).uses_calibration
         self.calibration = CalibrationStore(kept, uses_kept, taped)
         self.front = FrontEnd(config, self.own, self.calibration.used, tuning)
@@ -116,6 +114,7 @@ class Robot:
         self.modules = Modules(self.front, self.back, self.team, self.jobs)
         self.timers = Timers(self._periods())
         self.memory = Memory(self.own, self.team.seal, self.calibration)
+        self._speaking = {self._repeat, self._send_status, self._send_odometry, self._extend_log}
         self._handlers: dict[type[Any], Callable[[Any], list[Effect]]] = {
             SerialData: self._on_serial,
             CanFrame: self._on_can,
@@ -144,7 +143,7 @@ class Robot:
             self.modules.consistency: round(SECOND_US / config.consistency.rate_hz),
             self.modules.optimize: round(SECOND_US / config.optimizer.rate_hz),
             self._check_health: SECOND_US,
-            self._save: SAVE_US,
+            lambda utime: [*self.memory.save()]: SAVE_US,
         }
         return {**periods, self._poll_wheels: POLL_US} if self.wheels.must_be_asked else periods
 
@@ -317,7 +316,8 @@ class Robot:
 
     def _on_tick(self, event: Tick) -> list[Effect]:
         due = self.timers.take_due(event.utime)
-        due = [self._check_health] if self.memory.is_listening(event.utime) else due
+        if self.memory.is_listening(event.utime):
+            due = [action for action in due if action not in self._speaking]
         return [effect for action in due for effect in action(event.utime)]
 
     def _on_slept(self, event: Slept) -> list[Effect]:
@@ -326,9 +326,6 @@ class Robot:
         self.front.interrupt()
         self.team.begin_clocks_again(event.utime)
         return self._check_health(event.utime)
-
-    def _save(self, utime: int) -> list[Effect]:
-        return list(self.memory.save())
 
     def _on_stop(self, event: Stop) -> list[Effect]:
         state = self.whereabouts(event.utime).state

@@ -201,7 +201,7 @@ def why_not_localised(robot: Stages, utime: int) -> str | None:
     if not near:
         return (
             f"not localised: no ranges to robots {_listed(living)}; are their modules on, in the "
-            "same DR mode, and is uwb.id right on every robot?"
+            "same DR mode and of one firmware, and is uwb.id right on every robot?"
         )
     if not len(robot.front.reckoning.track):
         return "not localised: no odometry yet"

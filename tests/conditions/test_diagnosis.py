@@ -211,8 +211,8 @@ def test_without_ranges_the_modules_are_asked_for() -> None:
     scene.meet(4)
     scene.meet(5, hears_us=False)
     assert why(scene) == (
-        "not localised: no ranges to robots 4, 7; are their modules on, in the same DR mode, and "
-        "is uwb.id right on every robot?"
+        "not localised: no ranges to robots 4, 7; are their modules on, in the same DR mode and of "
+        "one firmware, and is uwb.id right on every robot?"
     )
 
 

@@ -156,6 +156,7 @@ def test_another_peer_confirms_nothing() -> None:
 
 def test_a_peer_that_takes_its_word_back_has_said_nothing() -> None:
     team, seal = a_team(), a_seal(3)
+    team.send(a_status(), T0)
     for k, epoch in enumerate((12, 10, 12)):
         status = a_status((Heard(1, epoch, 0),))
         team.receive(ChannelMessage(T0 + 2 * k * SECOND, *sealed(seal, status, T0)))

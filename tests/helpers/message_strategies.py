@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from hypothesis import strategies as st
 
@@ -16,7 +18,9 @@ from drslamd.gossip.message_types import (
     PoseState,
     Status,
 )
+from drslamd.slam.graph.chapters import PER_ENTRY
 from drslamd.slam.graph.measurements import (
+    Chapter,
     ClosureMeasurement,
     GraphEntry,
     Keyframe,
@@ -125,6 +129,36 @@ entries = st.builds(
     ranges=st.lists(ranges, max_size=6).map(tuple),
     closures=st.lists(closures, max_size=6).map(tuple),
 )
+
+
+@st.composite
+def chapters(draw: st.DrawFn) -> GraphEntry:
+    """An entry that is part of a chapter."""
+    seq = draw(samples)
+    first = max(0, seq - draw(st.integers(0, 64)))
+    layer = draw(st.integers(0, 2))
+    parts = (0, 0, 0)
+    if layer == 0 and seq - first >= 3 and draw(st.booleans()):
+        parts = (draw(st.integers(0, 1)), draw(st.integers(0, 1)), 1)
+    places = st.integers(first * PER_ENTRY, (seq + 1) * PER_ENTRY - 1)
+
+    def placed(items: st.SearchStrategy[Any]) -> tuple[Any, ...]:
+        """By their peer, then by their place."""
+        found = draw(st.dictionaries(places, items, max_size=3))
+        return tuple(sorted(found.items(), key=lambda entry: (entry[1].peer, entry[0])))
+
+    said = Chapter(
+        layer,
+        first,
+        parts,
+        tuple(draw(st.lists(st.tuples(st.integers(first, seq), models), max_size=2))),
+        tuple(draw(st.lists(keyframes, max_size=4))),
+        placed(ranges),
+        placed(closures),
+    )
+    return GraphEntry(seq, chapter=said)
+
+
 poses = st.builds(
     Pose,
     states,
@@ -163,4 +197,6 @@ def publics(draw: st.DrawFn) -> PublicPoses:
     )
 
 
-any_message: st.SearchStrategy[Message] = st.one_of(statuses, batches, entries, poses, publics())
+any_message: st.SearchStrategy[Message] = st.one_of(
+    statuses, batches, entries, chapters(), poses, publics()
+)

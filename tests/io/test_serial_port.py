@@ -110,6 +110,38 @@ def test_a_pulled_cable_is_told_once_and_the_port_comes_back(tmp_path: Path) -> 
     ]
 
 
+@pytest.mark.row("D6")
+def test_a_device_that_comes_back_under_another_number_is_found_by_its_lasting_name(
+    tmp_path: Path,
+) -> None:
+    """ttyUSB0 is pulled and comes back as ttyUSB1; below by-id the name stays."""
+    lasting = tmp_path / "by-id-of-it"
+
+    async def run() -> list[Event]:
+        first, second = PseudoPort(tmp_path / "ttyUSB0"), PseudoPort(tmp_path / "ttyUSB1")
+        lasting.symlink_to(first.name)
+        events: list[Event] = []
+        port = SerialPort("uwb", str(lasting), 921_600, MonotonicClock(), events.append)
+        task = asyncio.ensure_future(port.run())
+        await until(lambda: len(events) > 0)
+        first.write(b"before")
+        await until(lambda: received(events) == b"before")
+        first.pull()
+        lasting.unlink()
+        await until(lambda: PortCondition.LOST in conditions(events), 1.0)
+        lasting.symlink_to(second.name)
+        await until(lambda: conditions(events)[-1] is PortCondition.OPEN, 3.0)
+        second.write(b"after")
+        await until(lambda: received(events) == b"beforeafter", 1.0)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        second.pull()
+        return events
+
+    states = conditions(asyncio.run(asyncio.wait_for(run(), 20)))
+    assert states[0] is states[-1] is PortCondition.OPEN
+
+
 @pytest.mark.row("D8")
 def test_a_port_that_another_program_holds_is_busy_until_it_lets_go(tmp_path: Path) -> None:
     async def run() -> None:

@@ -100,6 +100,7 @@ def test_nothing_but_garbage_is_named_and_believed_never() -> None:
     with_daemon(test)
 
 
+@pytest.mark.row("D7")
 @pytest.mark.parametrize("baud", [115_200, 460_800, 2_000_000])
 def test_the_wrong_baud_rate_is_asked_about(baud: int) -> None:
     async def test(team: RealTeam, robot: RealRobot) -> None:

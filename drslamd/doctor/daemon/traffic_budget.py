@@ -1,4 +1,4 @@
-"""How much of the budget of bytes is used."""
+"""How much of the budget of bytes is used, and who says too much."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NEARLY = 0.8
 
 
 def traffic_budget(patient: Patient) -> Iterator[Finding]:
-    yield from patient.told("budget", "budget")
+    yield from patient.told("budget", "team.flood", "budget")
     used, allowed = patient.rate("network", "bytes_sent"), patient.config.gossip.max_bytes_per_s
     if used > NEARLY * allowed and patient.condition("budget") is None:
         yield warning(

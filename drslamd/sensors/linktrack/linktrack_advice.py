@@ -8,6 +8,7 @@ has something to say is heard.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from enum import Enum
 from typing import Final, NamedTuple
 
@@ -26,6 +27,16 @@ FAULT_SHOWN_US: Final = 60 * SECOND_US
 
 _NMEA: Final = re.compile(rb"\$GP(?:GGA|GSA|RMC),")
 _NMEA_BYTES: Final = len("$GPGGA,")
+
+_HEADS: Final = {
+    b"\x55\xa0": "LinkTrack's firmware of 2018 printed: update it with NAssistant",
+    b"\x57\x00": "a Nooploop TOFSense prints: is uwb.port the right one?",
+    b"\x6a\x00": "a Nooploop IOT module prints: is uwb.port the right one?",
+}
+"""With which frames begin that are none of ours, and whose they are."""
+HEADS_LEAST: Final = 5
+HEADS_APART: Final = 1_000
+"""On average in bytes: no frame is longer. Random bytes hold one in 65,536."""
 
 _OUTPUT: Final = "with NAssistant set it to DR_MODE0 and NODE_FRAME3, or DR_MODE1 and NODE_FRAME5"
 
@@ -95,29 +106,41 @@ class LinkTrackWatch:
         wrong_mode: what was last printed that a module prints only in the LP modes.
     """
 
-    def __init__(self, uwb_id: int) -> None:
+    def __init__(self, uwb_id: int, line: str = "") -> None:
         self._uwb_id = uwb_id
+        self._where = f" on {line}" if line else ""
         self._last_byte: int | None = None
         self._trying_since = 0
         self._trouble: _Trouble | None = None
         self._fault: tuple[ModuleFault, int] | None = None
         self._odd: _Odd | None = None
         self._text = b""
+        self._last = b""
+        self._strange: Counter[bytes] = Counter()
+        self._strange_bytes = 0
         self.wrong_mode: str | None = None
 
     def on_bytes(self, data: bytes, utime: int) -> None:
         if not data:
             return
         if self._last_byte is None or utime - self._last_byte > SILENCE_US:
-            self._trying_since = utime
+            self._try_anew(utime)
         self._last_byte = utime
+        self._strange_bytes += len(data)
+        for head in _HEADS:
+            self._strange[head] += (self._last + data).count(head)
+        self._last = data[-1:]
         self._text += data
         for _ in _NMEA.finditer(self._text):
             self.on_refused(Refusal.LP_MODE, "NMEA sentences", utime)
         self._text = self._text[1 - _NMEA_BYTES :]
 
+    def _try_anew(self, utime: int) -> None:
+        self._trying_since, self._strange_bytes = utime, 0
+        self._strange.clear()
+
     def on_good_frame(self, utime: int) -> None:
-        self._trying_since = utime
+        self._try_anew(utime)
         self._trouble = None
         self.wrong_mode = None
 
@@ -145,6 +168,7 @@ class LinkTrackWatch:
             self._refusals,
             self._module_faults,
             self._oddities,
+            self._strange_frames,
             self._no_frames,
         ):
             if sentence := judge(utime):
@@ -179,13 +203,25 @@ class LinkTrackWatch:
             return None
         return odd.oddity.value.format(detail=odd.detail)
 
+    def _strange_frames(self, utime: int) -> str | None:
+        if utime - self._trying_since < NO_FRAME_US or not self._strange:
+            return None
+        ((head, count),) = self._strange.most_common(1)
+        if count < HEADS_LEAST or count * HEADS_APART < self._strange_bytes:
+            return None
+        return (
+            f"no ranging frame from the UWB module, but {head.hex(' ').upper()} again and again, "
+            f"as {_HEADS[head]}"
+        )
+
     def _no_frames(self, utime: int) -> str | None:
         seconds = (utime - self._trying_since) // SECOND_US
         if utime - self._trying_since < NO_FRAME_US:
             return None
         return (
-            f"bytes but no ranging frame from the UWB module for {seconds} s: is uwb.baud right "
-            "(921600 unless it was changed), is its output NODE_FRAME3 or NODE_FRAME5?"
+            f"bytes but no ranging frame from the UWB module{self._where} for {seconds} s: is "
+            "uwb.baud right (921600 unless it was changed), is its output NODE_FRAME3 or "
+            "NODE_FRAME5?"
         )
 
 

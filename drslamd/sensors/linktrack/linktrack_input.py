@@ -70,6 +70,10 @@ _REFUSED_KINDS: Final = {
 }
 
 
+NEWER_KINDS: Final = {"55 0B": "55 0B (NODE_FRAME7 of newer firmware)"}
+"""Marks of frames whose layout nobody has published."""
+
+
 class RangeRefusal(Enum):
     """Why one entry of a good frame gives no sample of its own."""
 
@@ -86,6 +90,7 @@ class LinkTrackInput:
     Args:
         uwb_id: the 8-bit id of its module in DR_MODE0, the 32-bit one in DR_MODE1.
         max_range_m: longest distance that is believed.
+        line: what it is read from, for sentences.
 
     Attributes:
         frames: intact frames; accepted are those with ranges, ignored those that carry none.
@@ -97,12 +102,12 @@ class LinkTrackInput:
         module_faults: what the last ERROR_FRAME0 said, of the bits that concern the DR modes.
     """
 
-    def __init__(self, uwb_id: int, max_range_m: float) -> None:
+    def __init__(self, uwb_id: int, max_range_m: float, line: str = "") -> None:
         self._uwb_id = uwb_id
         self._max_range_m = max_range_m
         self._scanner = FrameScanner(LINKTRACK)
         self._clock = DeviceClock(TIME_BITS, MILLISECOND_US)
-        self._watch = LinkTrackWatch(uwb_id)
+        self._watch = LinkTrackWatch(uwb_id, line)
         self._lead_ms: int | None = None
         self._lead_is_steady = False
         self.frames: Tally[Refusal] = Tally()
@@ -163,7 +168,8 @@ class LinkTrackInput:
     def _on_frame(self, data: bytes, utime: int) -> list[RangeSample]:
         frame = decode_intact(data)
         if isinstance(frame, Refusal):
-            return self._refuse(frame, data[:2].hex(" ").upper(), utime)
+            mark = data[:2].hex(" ").upper()
+            return self._refuse(frame, NEWER_KINDS.get(mark, mark), utime)
         if frame.kind in _REFUSED_KINDS:
             return self._refuse(_REFUSED_KINDS[frame.kind], frame.kind.name, utime)
         if frame.kind in _RANGING:

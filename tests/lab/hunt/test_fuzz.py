@@ -16,6 +16,7 @@ from drslamd.events import ChannelMessage
 from drslamd.gossip.codecs import CODECS
 from drslamd.gossip.seal import Seal, team_key
 from drslamd.gossip.team import Team
+from drslamd.slam.graph.measurements import GraphEntry
 
 
 def quiet(_: float) -> None:
@@ -63,10 +64,17 @@ def test_noise_on_the_lines_is_not_believed() -> None:
 def test_lies_are_well_formed() -> None:
     """All that a team could refuse them for is what they say of the past."""
     teller, team = Liar(3, team_key(None)), Team(Seal(team_key(None), 1, 1, {}))
+    entries_heard = []
     for k in range(800):
-        channel, payload = teller.lie(1_000_000 + k)
-        team.receive(ChannelMessage(1_000_000 + k, channel, payload))
+        utime = 1_000_000 + 10_000 * k
+        channel, payload = teller.lie(utime)
+        received = team.receive(ChannelMessage(utime, channel, payload))
+        if received is not None and isinstance(received.message, GraphEntry):
+            entries_heard.append(received.message)
     assert team.accepted > 750
+    chapters = [e.chapter for e in entries_heard if e.chapter is not None]
+    assert len(chapters) > 50
+    assert any(any(chapter.parts) for chapter in chapters)
     assert "content out of range" not in team.refused
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import time
 
 import pytest
 from frames import (
@@ -20,6 +21,7 @@ from frames import (
     tag_frame0,
     with_length,
 )
+from lab.play.emulators import as_heard_at
 
 from drslamd.sensors.linktrack.linktrack_frames import ModuleFault
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
@@ -77,6 +79,25 @@ def test_bytes_without_frames_lead_to_the_baud_rate_within_5_seconds(
     assert not asked or "uwb.baud" in str(advice)
 
 
+@pytest.mark.row("D7")
+@pytest.mark.parametrize(
+    "baud", [9_600, 57_600, 115_200, 230_400, 460_800, 1_000_000, 2_000_000, 3_000_000]
+)
+def test_at_any_wrong_rate_port_and_rate_are_named_and_nothing_is_believed(baud: int) -> None:
+    uwb = LinkTrackInput(5, 120.0, f"/dev/ttyUSB0 at {baud} baud")
+    began, samples = time.process_time(), 0
+    heard = [as_heard_at(frame, 921_600, baud) for frame in ranging_stream(50)]
+    took = -(time.process_time() - began)
+    for k in range(300):
+        samples += len(uwb.feed(heard[k % 50], T0 + k * 20 * MS))
+    took += time.process_time() - began
+    said = str(uwb.advice(T0 + 5_980 * MS))
+    assert "on /dev/ttyUSB0 at " + str(baud) in said
+    assert "is uwb.baud right" in said
+    assert samples == 0
+    assert took < 0.05 * 6
+
+
 def test_after_a_pause_the_five_seconds_start_anew() -> None:
     uwb = healthy()
     uwb.feed(b"noise", T0 + 60 * SECOND_US)
@@ -114,6 +135,51 @@ def test_lp_mode_is_recognised_by_what_it_prints(frame: bytes, shown: str) -> No
     assert uwb.wrong_mode == shown
 
 
+def strange(head: bytes, frames: int, size: int, chunk: int) -> str | None:
+    """After seven seconds of so many frames of another kind, read in such pieces."""
+    uwb = an_input()
+    line = (head + bytes(size - 2)) * frames
+    pieces = [line[k : k + chunk] for k in range(0, len(line), chunk)]
+    for k, piece in enumerate(pieces):
+        uwb.feed(piece, T0 + k * 7 * SECOND_US // len(pieces))
+    return uwb.advice(T0 + 7 * SECOND_US)
+
+
+@pytest.mark.parametrize("chunk", [1, 17, 64])
+@pytest.mark.parametrize(
+    ("head", "whose"),
+    [
+        (b"\x55\xa0", "firmware of 2018"),
+        (b"\x57\x00", "TOFSense"),
+        (b"\x6a\x00", "IOT module"),
+    ],
+)
+def test_frames_of_other_products_and_old_firmware_are_named(
+    head: bytes, whose: str, chunk: int
+) -> None:
+    said = strange(head, 20, 64, chunk)
+    assert said is not None
+    assert whose in said
+    assert head.hex(" ").upper() in said
+
+
+@pytest.mark.parametrize(
+    ("frames", "size", "named"),
+    [(5, 64, True), (4, 64, False), (5, 1_000, True), (5, 1_001, False)],
+)
+def test_a_head_now_and_then_is_chance(frames: int, size: int, named: bool) -> None:
+    assert ("firmware of 2018" in str(strange(b"\x55\xa0", frames, size, 10))) == named
+
+
+def test_a_good_frame_wipes_out_what_was_strange_before_it() -> None:
+    uwb = healthy()
+    for k in range(40):
+        uwb.feed(
+            b"\x57\x00" + bytes(30) + node_frame3(5, local_ms=1180 + 200 * k), T0 + 200 * k * MS
+        )
+    assert "TOFSense" not in str(uwb.advice(T0 + 8 * SECOND_US))
+
+
 def test_a_good_frame_ends_the_suspicion_of_lp_mode() -> None:
     uwb = healthy()
     uwb.feed(tag_frame0(), T0 + MS)
@@ -125,7 +191,8 @@ def test_a_good_frame_ends_the_suspicion_of_lp_mode() -> None:
 @pytest.mark.parametrize(
     ("frame", "sentence"),
     [
-        (with_length(b"\x55\x0b", bytes(20)), "prints frames of kind 55 0B"),
+        (with_length(b"\x55\x0b", bytes(20)), "kind 55 0B (NODE_FRAME7 of newer firmware), which"),
+        (with_length(b"\x55\x0c", bytes(20)), "prints frames of kind 55 0C, which"),
         (aoa_node_frame0([]), "prints frames of kind AOA_NODE_FRAME0"),
         (with_length(b"\x55\x02", bytes([0, 5, 0, 0, 0, 0, 1, 0, 9, 9, 0])), "damaged 55 02"),
         (node_frame3(5, millivolts=2900), "a supply of 2.9 V"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -18,13 +19,17 @@ from drslamd.gossip.message_types import (
     Status,
 )
 from drslamd.gossip.seal import Seal
+from drslamd.slam.graph.chapters import PER_ENTRY
 from drslamd.slam.graph.measurements import (
+    Chapter,
     ClosureMeasurement,
     GraphEntry,
     Keyframe,
     RangeMeasurement,
 )
 from drslamd.slam.graph.public_poses import PublicPoses
+from drslamd.slam.odometry.noise import OdometryNoise
+from drslamd.slam.robot_model import RobotModel
 
 ROBOTS = 6
 """Ids that lies name."""
@@ -50,6 +55,7 @@ class Liar:
             self._pose,
             self._entry,
             self._entry,
+            self._chapter,
             self._public,
         )
 
@@ -121,6 +127,33 @@ class Liar:
             tuple(self._range() for _ in range(self._int(0, 3))),
             tuple(self._closure() for _ in range(self._int(0, 3))),
         )
+
+    def _chapter(self) -> GraphEntry:
+        """What it says that it said before."""
+        self._seq += 1
+        return GraphEntry(self._seq - 1, chapter=self.chapter(self._seq - 1))
+
+    def chapter(self, seq: int) -> Chapter:
+        """Entry `seq` of a log, which says again what no other entry said."""
+        first = max(0, seq - int(self._rng.integers(65)))
+        is_last = seq - first >= 2 and self._rng.random() < 0.5
+        parts = (int(self._rng.integers(0, seq - first)), 0, 1) if is_last else (0, 0, 0)
+        models = ((first, RobotModel(OdometryNoise(0.5, 0.5, 0.5, 0.5))),)
+        return Chapter(
+            0 if is_last else int(self._rng.integers(3)),
+            first,
+            parts,
+            models[: self._int(0, 1)],
+            tuple(self._keyframe() for _ in range(self._int(0, 5))),
+            self._placed(self._range, first, seq),
+            self._placed(self._closure, first, seq),
+        )
+
+    def _placed(self, make: Callable[[], Any], first: int, seq: int) -> tuple[Any, ...]:
+        """Up to four of them at places of these entries, by their peer."""
+        places = self._rng.integers(first * PER_ENTRY, (seq + 1) * PER_ENTRY, self._int(0, 4))
+        found = {int(place): make() for place in places}
+        return tuple(sorted(found.items(), key=lambda entry: (entry[1].peer, entry[0])))
 
     def _keyframe(self) -> Keyframe:
         places = [self._int(-(2**20), 2**20) for _ in range(3)]

@@ -186,8 +186,8 @@ def as_heard_at(data: bytes, sent_baud: int, heard_baud: int) -> bytes:
     line = [1, 1]
     for byte in data:
         line += [0, *((byte >> k) & 1 for k in range(8)), 1]
-    line += [1] * 12
     step = sent_baud / heard_baud
+    line += [1] * int(12 * max(1.0, step))
     out, at = bytearray(), 0.0
     while at < len(line):
         if line[int(at)]:
