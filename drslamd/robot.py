@@ -13,7 +13,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 from drslamd.broadcast import Broadcast
@@ -254,12 +253,7 @@ class Robot:
             return []
         peers = self.neighbours(utime)
         found = self.front.module1(peers, self.back.graph, self.back.estimate, utime)
-        free = [window for window in found if not self.jobs.is_busy(RELATIVE_POSE, window.pair)]
-        if not free:
-            return []
-        pairs, requests, windows = zip(*free, strict=True)
-        run = partial(self.front.solve, windows)
-        return [self.jobs.begin(Job(RELATIVE_POSE, pairs, requests), run)]
+        return list(self.jobs.begin_windows(found, self.front.solve))
 
     def _what_if(self, utime: int) -> list[Effect]:
         """Where windows disagree again and again: which mistake in the mountings explains them?"""
@@ -270,10 +264,8 @@ class Robot:
 
     def _consistency(self, utime: int) -> list[Effect]:
         """Module 2: which of a pair's closures belong together."""
-        return [
-            self.jobs.begin(Job(CONSISTENCY, (pair,)), run)
-            for pair, run in self.front.module2(self.back.graph, self.back.estimate)
-        ]
+        checks = self.front.module2(self.back.graph, self.back.estimate)
+        return [self.jobs.begin(Job(CONSISTENCY, (pair,)), run) for pair, run in checks]
 
     def _optimize(self, utime: int) -> list[Effect]:
         """Module 3: the team's pose graph."""
