@@ -49,9 +49,9 @@ from drslamd.io.worker import Finished, Worker
 from drslamd.machine.folders import near_path, socket_path, state_dir
 from drslamd.parts import (
     dbc_text,
+    make_ports,
     make_recorder,
     make_transport,
-    make_wheels,
     taped_calibration,
     team_secret,
 )
@@ -95,8 +95,9 @@ class Daemon:
         self._may_restart_at, self._restart_apart = 0, RESTARTS_APART_US
         is_news = lambda data: is_news_of_a_member(self.robot.team.seal, data)  # noqa: E731
         self._transport = make_transport(config, self._clock, self.handle, is_news)
-        self._wheels = make_wheels(config, self._clock, self.handle)
-        self._uwb = SerialPort("uwb", config.uwb.port, config.uwb.baud, self._clock, self.handle)
+        self._near = NearSocket(near_path(socket_path(config)), self._clock)
+        is_read = lambda: self._near.has_readers  # noqa: E731
+        self._uwb, self._wheels = make_ports(config, self._clock, self.handle, is_read)
         self._pace = Pace()
         questions: dict[str, Callable[[], Any]] = {
             "status": self._picture,
@@ -105,7 +106,6 @@ class Daemon:
             "closures": lambda: report.closures(self.robot),
         }
         self._status = StatusSocket(socket_path(config), questions)
-        self._near = NearSocket(near_path(socket_path(config)), self._clock)
         self._notifier = Notifier()
         self._worker, self._disk = Worker(headway.marks), Worker()
         readers = (self._uwb, self._wheels, self._transport)
@@ -285,7 +285,7 @@ class Daemon:
         while True:
             await asyncio.sleep(self._watchdog.every_s)
             self._watchdog.look()
-            self._notifier.status(self._one_line())
+            self._notifier.status(self._one_line)
 
     def _is_ticking(self) -> bool:
         return self._clock.now() - self.robot.next_tick < SECOND_US

@@ -6,12 +6,16 @@ takes more than a fifth of a core. What it then says comes later and is the same
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 from drslamd.events import JobDone, Solve
+from drslamd.slam.closure_method import PairWindow
 from drslamd.slam.consistency.pair import PairTracker
+from drslamd.slam.front_end import WindowJob
+from drslamd.slam.relative_pose.estimate import RelativePoseEstimate
 from drslamd.slam.relative_pose.window_request import WindowRequest
 
 RELATIVE_POSE = "relative_pose"
@@ -76,6 +80,18 @@ class Jobs:
         self._begun += 1
         self._under_way[self._begun] = job
         return Solve(self._begun, job.module, run)
+
+    def begin_windows(
+        self,
+        found: Sequence[WindowJob],
+        solve: Callable[[Sequence[PairWindow]], list[RelativePoseEstimate]],
+    ) -> list[Solve]:
+        """Let module 1 solve windows at once, but none of a pair whose last one it still has."""
+        free = [window for window in found if not self.is_busy(RELATIVE_POSE, window.pair)]
+        if not free:
+            return []
+        pairs, requests, given = zip(*free, strict=True)
+        return [self.begin(Job(RELATIVE_POSE, pairs, requests), partial(solve, given))]
 
     def finish(self, event: JobDone) -> Job:
         """Which job has ended; its module rests now."""

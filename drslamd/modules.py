@@ -6,8 +6,6 @@ what module 1 found goes to module 2 at once, a pair that is connected to the te
 
 from __future__ import annotations
 
-from functools import partial
-
 from drslamd.events import Effect
 from drslamd.gossip.team import Team
 from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, WHAT_IF, Job, Jobs
@@ -30,12 +28,7 @@ class Modules:
             return []
         graph, estimate = self._back.graph, self._back.estimate
         found = self._front.module1(neighbours, graph, estimate, utime)
-        free = [window for window in found if not self._jobs.is_busy(RELATIVE_POSE, window.pair)]
-        if not free:
-            return []
-        pairs, requests, windows = zip(*free, strict=True)
-        run = partial(self._front.solve, windows)
-        return [self._jobs.begin(Job(RELATIVE_POSE, pairs, requests), run)]
+        return list(self._jobs.begin_windows(found, self._front.solve))
 
     def what_if(self, neighbours: list[PeerInRange], utime: int) -> list[Effect]:
         """Is a pair mounted as configured? Where windows disagree: which mistake explains it?"""

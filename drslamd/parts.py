@@ -16,6 +16,7 @@ from drslamd.io.can_bus import CanBus, require_python_can
 from drslamd.io.clock import Clock
 from drslamd.io.liblcm import Liblcm, require_lcm
 from drslamd.io.multicast import Multicast
+from drslamd.io.ports.reading_round import ReadingRound
 from drslamd.io.recording.log_files import LogFiles
 from drslamd.io.recording.provenance import clocks, provenance
 from drslamd.io.recording.recorder import NoRecorder, Recorder
@@ -24,6 +25,7 @@ from drslamd.io.state_store import read_key
 from drslamd.io.transport import Transport
 from drslamd.recording.encoder import Encoder
 from drslamd.sensors.wheels.dbc_file import decoded
+from drslamd.sensors.wheels.wheel_input import is_stamped
 from drslamd.setup.calibration_file import MAX_BYTES, Taped, UnusableCalibration, read
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
 
@@ -86,14 +88,36 @@ def make_transport(
     return Multicast(section, clock, handle, is_news)
 
 
-def make_wheels(config: Config, clock: Clock, handle: Handle) -> SerialPort | CanBus:
+def make_ports(
+    config: Config, clock: Clock, handle: Handle, is_read: Callable[[], bool]
+) -> tuple[SerialPort, SerialPort | CanBus]:
+    """Those of the UWB module and of the wheels, read in rounds where nobody waits.
+
+    Args:
+        is_read: does somebody take poses on the local socket, each as soon as it is there?
+
+    Raises:
+        ConfigError: a chosen package is not installed.
     """
+    rounds = ReadingRound(lambda: is_read() or config.near.lcm_hz > 0)
+    uwb = SerialPort("uwb", config.uwb.port, config.uwb.baud, clock, handle, rounds)
+    return uwb, make_wheels(config, clock, handle, rounds)
+
+
+def make_wheels(
+    config: Config, clock: Clock, handle: Handle, rounds: ReadingRound | None = None
+) -> SerialPort | CanBus:
+    """
+    Args:
+        rounds: for a base that stamps what it sends.
+
     Raises:
         ConfigError: the chosen package is not installed.
     """
     section = config.wheels
     if isinstance(section, SerialWheelSection):
-        return SerialPort("wheels", section.port, section.baud, clock, handle)
+        stamped = rounds if is_stamped(section) else None
+        return SerialPort("wheels", section.port, section.baud, clock, handle, stamped)
     require_python_can()
     return CanBus(section.can, clock, handle)
 

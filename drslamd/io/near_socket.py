@@ -60,6 +60,11 @@ class NearSocket:
         asyncio.get_running_loop().add_reader(listener.fileno(), self._accept)
         return ""
 
+    @property
+    def has_readers(self) -> bool:
+        """Does anybody wait for what is new?"""
+        return bool(self._readers)
+
     def close(self) -> None:
         for reader in list(self._readers):
             self._drop(reader)

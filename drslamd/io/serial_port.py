@@ -14,6 +14,8 @@ import serial
 from drslamd.events import Event, Port, PortCondition, PortState, SerialData
 from drslamd.io.backoff import Backoff
 from drslamd.io.clock import Clock
+from drslamd.io.ports.readiness import has_bytes
+from drslamd.io.ports.reading_round import ReadingRound
 
 READ_BYTES = 65_536
 
@@ -63,8 +65,19 @@ class SerialPort:
     """
 
     def __init__(
-        self, port: Port, path: str, baud: int, clock: Clock, deliver: Callable[[Event], None]
+        self,
+        port: Port,
+        path: str,
+        baud: int,
+        clock: Clock,
+        deliver: Callable[[Event], None],
+        rounds: ReadingRound | None = None,
     ) -> None:
+        """
+        Args:
+            rounds: in which it is read; None where bytes bear no time of their own.
+        """
+        self._rounds = rounds
         self._port = port
         self._path = path
         self._baud = baud
@@ -111,36 +124,61 @@ class SerialPort:
         self._line = line
         self._lost.clear()
         self._state(PortCondition.OPEN, self._path)
-        asyncio.get_running_loop().add_reader(line.fileno(), self._read)
+        asyncio.get_running_loop().add_reader(line.fileno(), self._on_bytes)
         return True
 
-    def _read(self) -> None:
+    def _on_bytes(self) -> None:
+        """Something has come."""
+        has_read, rounds = self._read(), self._rounds
+        if has_read and self._line is not None and rounds is not None and rounds.has_time():
+            asyncio.get_running_loop().remove_reader(self._line.fileno())
+            rounds.join(self._on_round)
+
+    def _on_round(self) -> None:
+        """A round has come, and perhaps something to read."""
+        assert self._line is not None
+        assert self._rounds is not None
+        # reading would not tell a silent line from one that was pulled
+        is_silent = not has_bytes(self._line.fileno())
+        if not is_silent and self._read() and self._rounds.has_time():
+            self._rounds.join(self._on_round)
+        elif not self._lost.is_set():
+            asyncio.get_running_loop().add_reader(self._line.fileno(), self._on_bytes)
+
+    def _read(self) -> bool:
+        """Is the port still there, and was there anything?"""
         assert self._line is not None
         self.reads += 1
         try:
             data = os.read(self._line.fileno(), READ_BYTES)
         except BlockingIOError:
-            return
+            return False
         except OSError as error:
             self._lose(error)
-            return
-        if data:
-            self._deliver(SerialData(self._clock.now(), self._port, data))
-        else:
+            return False
+        if not data:
             self._lose(OSError(errno.EIO, os.strerror(errno.EIO)))
+            return False
+        self._deliver(SerialData(self._clock.now(), self._port, data))
+        return not self._lost.is_set()
 
     def _lose(self, error: OSError) -> None:
         # the descriptor stays readable after a hang-up; unhook it before anything else
         if self._line is not None:
-            asyncio.get_running_loop().remove_reader(self._line.fileno())
+            self._unhook(self._line)
         self._state(PortCondition.LOST, f"{self._path}: {error.strerror or error}")
         self._lost.set()
 
     def _close(self) -> None:
         if self._line is not None:
-            asyncio.get_running_loop().remove_reader(self._line.fileno())
+            self._unhook(self._line)
             self._line.close()
             self._line = None
+
+    def _unhook(self, line: serial.Serial) -> None:
+        asyncio.get_running_loop().remove_reader(line.fileno())
+        if self._rounds is not None:
+            self._rounds.leave(self._on_round)
 
     def _state(self, condition: PortCondition, detail: str) -> None:
         if (condition, detail) != self._last_state:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import socket
+from collections.abc import Callable
 
 PATIENCE_S = 0.1
 """A manager that is busy, as when the host boots, holds up the robot no longer."""
@@ -33,9 +34,11 @@ class Notifier:
     def alive(self) -> None:
         self._send("WATCHDOG=1")
 
-    def status(self, text: str) -> None:
-        """One line; a line break would end it and begin another message."""
-        self._send("STATUS=" + " ".join(text.splitlines()))
+    def status(self, text: Callable[[], str]) -> None:
+        """One line, worked out only where somebody hears it; a line break would end it and begin
+        another message."""
+        if self._address:
+            self._send("STATUS=" + " ".join(text().splitlines()))
 
     def stopping(self) -> None:
         self._send("STOPPING=1")

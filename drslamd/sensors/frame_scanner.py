@@ -22,8 +22,8 @@ MAX_BUFFER_BYTES: Final = 4096
 """Longest frame that any format may announce, and the most that a scanner ever holds. At 1450
 bytes a second (LinkTrack, one peer, 50 Hz) a false header of this length hides 2.8 s."""
 
-STALL_US: Final = 50_000
-"""A sender puts a frame out in one burst of a few milliseconds."""
+STALL_US: Final = 90_000
+"""A sender puts a frame out in one burst of a few milliseconds, and ports are read every 50."""
 
 NOT_A_FRAME: Final = -1
 NEED_MORE: Final = 0

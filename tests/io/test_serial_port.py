@@ -12,18 +12,26 @@ from lab.play.real_team import PseudoPort
 
 from drslamd.events import Event, PortCondition, PortState, SerialData
 from drslamd.io.clock import MonotonicClock
+from drslamd.io.ports.reading_round import PERIOD_S, ReadingRound
 from drslamd.io.serial_port import SerialPort, opened
 
 Script = Callable[[PseudoPort, SerialPort, "list[Event]"], Awaitable[None]]
 
 
-def with_port(folder: Path, script: Script) -> list[Event]:
-    """Run a script against an open port; every event that the port delivered."""
+def with_port(
+    folder: Path, script: Script, is_urgent: Callable[[], bool] | None = None
+) -> list[Event]:
+    """Run a script against an open port; every event that the port delivered.
+
+    Args:
+        is_urgent: of the rounds in which it is read, where it is.
+    """
 
     async def run() -> list[Event]:
         cable = PseudoPort(folder / "tty")
         events: list[Event] = []
-        port = SerialPort("uwb", str(cable.name), 921_600, MonotonicClock(), events.append)
+        rounds = ReadingRound(is_urgent) if is_urgent else None
+        port = SerialPort("uwb", str(cable.name), 921_600, MonotonicClock(), events.append, rounds)
         task = asyncio.ensure_future(port.run())
         await until(lambda: len(events) > 0)
         await script(cable, port, events)
@@ -72,6 +80,57 @@ def test_bytes_are_stamped_when_they_arrive(tmp_path: Path) -> None:
             assert 0 <= events[-1].utime - before < 200_000
 
     with_port(tmp_path, script)
+
+
+async def spoken(cable: PseudoPort, events: list[Event]) -> list[bytes]:
+    """What came of twenty bytes, one every five milliseconds, after a silence: read by read."""
+    await asyncio.sleep(3 * PERIOD_S)
+    count = len(events)
+    for k in range(20):
+        cable.write(bytes([k]))
+        await asyncio.sleep(0.005)
+    await until(lambda: len(received(events)) % 20 == 0 and len(events) > count)
+    return [e.data for e in events[count:] if isinstance(e, SerialData)]
+
+
+def test_in_rounds_a_port_is_read_a_few_times_a_second_and_at_once_after_a_silence(
+    tmp_path: Path,
+) -> None:
+    async def script(cable: PseudoPort, _: SerialPort, events: list[Event]) -> None:
+        for _again in range(2):
+            first, *rest = await spoken(cable, events)
+            assert len(first) < 5
+            assert len(rest) <= 8
+
+    with_port(tmp_path, script, lambda: False)
+
+
+def test_while_somebody_waits_every_byte_is_read_as_it_comes(tmp_path: Path) -> None:
+    waits = [True]
+
+    async def script(cable: PseudoPort, _: SerialPort, events: list[Event]) -> None:
+        at_once = await spoken(cable, events)
+        waits[0] = False
+        in_rounds = await spoken(cable, events)
+        waits[0] = True
+        again = await spoken(cable, events)
+        assert len(at_once) > 2 * len(in_rounds) < len(again)
+
+    with_port(tmp_path, script, lambda: waits[0])
+
+
+def test_a_cable_that_is_pulled_between_two_rounds_is_told_and_comes_back(tmp_path: Path) -> None:
+    async def script(cable: PseudoPort, _: SerialPort, events: list[Event]) -> None:
+        cable.write(b"x")
+        await until(lambda: received(events) == b"x")
+        cable.pull()
+        await until(lambda: PortCondition.LOST in conditions(events))
+        cable.plug()
+        await until(lambda: conditions(events)[-1] is PortCondition.OPEN)
+        cable.write(b"y")
+        await until(lambda: received(events) == b"xy")
+
+    with_port(tmp_path, script, lambda: False)
 
 
 def test_what_is_written_reaches_the_device(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ def test_every_message_arrives_in_its_own_datagram(manager: Manager) -> None:
     notifier = Notifier()
     notifier.ready()
     notifier.alive()
-    notifier.status("not localised, 0 peers")
+    notifier.status(lambda: "not localised, 0 peers")
     notifier.stopping()
     manager.wait_for("STOPPING")
     assert [message for _, message in manager.heard] == [
@@ -37,7 +37,7 @@ def test_every_message_arrives_in_its_own_datagram(manager: Manager) -> None:
 
 
 def test_a_status_stays_one_line_whatever_a_driver_says(manager: Manager) -> None:
-    Notifier().status("wheels: broken\nMAINPID=1\r\nREADY=0 \udcff")
+    Notifier().status(lambda: "wheels: broken\nMAINPID=1\r\nREADY=0 \udcff")
     assert manager.wait_for("STATUS") == "STATUS=wheels: broken MAINPID=1 READY=0 ?"
     manager.close()
 
@@ -55,6 +55,7 @@ def test_an_abstract_address_is_understood(monkeypatch: pytest.MonkeyPatch) -> N
 def test_without_a_manager_nothing_happens(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
     Notifier().ready()
+    Notifier().status(lambda: pytest.fail("nobody would hear it"))
     monkeypatch.setenv("NOTIFY_SOCKET", "/nonexistent/notify")
     Notifier().ready()
 
@@ -63,7 +64,7 @@ def test_a_manager_that_does_not_listen_holds_up_nobody(manager: Manager) -> Non
     notifier = Notifier()
     began = time.monotonic()
     for _ in range(5):
-        notifier.status("x" * 150_000)  # fills the socket's buffer
+        notifier.status(lambda: "x" * 150_000)  # fills the socket's buffer
     assert time.monotonic() - began < 1.0
     manager.close()
 

@@ -8,11 +8,11 @@ hang on the same disk, while this one drives on and says it (`slow_disk`).
 
 from __future__ import annotations
 
-import select
 import time
 from collections.abc import Callable, Sequence
 from typing import Final, Protocol
 
+from drslamd.io.ports.readiness import has_bytes
 from drslamd.io.systemd import Notifier
 from drslamd.io.worker import Worker
 
@@ -85,15 +85,6 @@ class Watchdog:
         stuck = [self._solver.stuck_s(), *(reader.stuck_s(now) for reader in self._readers)]
         if self._is_ticking() and max(stuck) <= self.stuck_s:
             self._notifier.alive()
-
-
-def has_bytes(descriptor: int) -> bool:
-    """Could somebody read from it now?"""
-    if descriptor < 0:
-        return False
-    poll = select.poll()
-    poll.register(descriptor, select.POLLIN)
-    return any(event & select.POLLIN for _, event in poll.poll(0))
 
 
 def slow_disk(disk: Worker) -> str:

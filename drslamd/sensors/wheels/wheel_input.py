@@ -90,6 +90,11 @@ SOURCES: Final[dict[type[WheelSection], Callable[[Any, str], Source]]] = {
 }
 
 
+def is_stamped(section: WheelSection) -> bool:
+    """Does the base send its own time with what it says?"""
+    return isinstance(section, (KobukiSection, AsciiSection))
+
+
 _TOO_FAST: Final = (
     "the wheels seem to move faster than wheels.max_speed_mps: are it and counts_per_metre (or "
     "unit) right?"

@@ -103,16 +103,17 @@ class WindowTrack:
         poses = end.track.at_time(np.arange(first, last + 1))
         return WindowTrack(poses, at - first, reference - first, end.data.model.half_track_m)
 
-    def can_be(self, repair: Repair) -> bool:
-        return not repair.cross or self.half_track_m > 0
-
-    def repaired(self, repair: Repair) -> Array:
-        """(n, 3) poses at the measurements, seen from that at the reference time."""
+    def repaired(self, repair: Repair) -> Array | None:
+        """(n, 3) poses at the measurements, seen from that at the reference time; None where the
+        wheels cannot be mounted so, or nothing is known of the way."""
+        if repair.cross and not self.half_track_m > 0:
+            return None
         path = repair.path(self.poses, self.half_track_m)
         at = np.append(self.at, self.reference)
         places = np.arange(len(path))
         poses = np.stack([np.interp(at, places, column) for column in path.T], axis=-1)
-        return se2.between(poses[-1], poses[:-1])
+        seen = se2.between(poses[-1], poses[:-1])
+        return seen if np.isfinite(seen).all() else None
 
 
 @dataclass(frozen=True)
@@ -154,19 +155,15 @@ class Question:
         delta: float,
     ) -> None:
         """Fill in what some of the cases cost, all of them at once."""
-        windows = {place: self._as_if(cases[place]) for place in places}
-        possible = {place: window for place, window in windows.items() if window is not None}
+        a = {repair: self.a.repaired(repair) for repair in {cases[place].a for place in places}}
+        b = {repair: self.b.repaired(repair) for repair in {cases[place].b for place in places}}
+        possible = {}
+        for place in places:
+            a_poses, b_poses = a[cases[place].a], b[cases[place].b]
+            if a_poses is not None and b_poses is not None:
+                possible[place] = replace(self.window, a_poses=a_poses, b_poses=b_poses)
         noises = [noise] * len(possible)
         found[list(possible)] = solver.least_chi2(list(possible.values()), noises, delta)
-
-    def _as_if(self, case: Case) -> Window | None:
-        """The window under one case; None where it cannot be."""
-        if not (self.a.can_be(case.a) and self.b.can_be(case.b)):
-            return None
-        a, b = self.a.repaired(case.a), self.b.repaired(case.b)
-        if not (np.isfinite(a).all() and np.isfinite(b).all()):
-            return None
-        return replace(self.window, a_poses=a, b_poses=b)
 
 
 def ask(request: WindowRequest, a: PairEnd, b: PairEnd) -> Question:

@@ -8,8 +8,9 @@ from collections.abc import Iterator
 
 import pytest
 
+from drslamd.io.ports.readiness import has_bytes
 from drslamd.io.systemd import Notifier
-from drslamd.io.watch.watchdog import DISK_STUCK_S, STUCK_S, Watchdog, has_bytes, slow_disk
+from drslamd.io.watch.watchdog import DISK_STUCK_S, STUCK_S, Watchdog, slow_disk
 from drslamd.io.worker import Worker
 
 

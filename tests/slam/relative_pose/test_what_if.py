@@ -214,7 +214,9 @@ def test_as_configured_a_window_is_what_it_was() -> None:
     pair = seen()
     question, window = pair.question, pair.request.window
     for stretch, poses in ((question.a, window.a_poses), (question.b, window.b_poses)):
-        assert np.allclose(stretch.repaired(AS_CONFIGURED), poses, atol=1e-9)
+        repaired = stretch.repaired(AS_CONFIGURED)
+        assert repaired is not None
+        assert np.allclose(repaired, poses, atol=1e-9)
         assert len(stretch.at) == len(window.t)
     assert question.window is window
     assert question.b.half_track_m == HALF_M
@@ -226,7 +228,8 @@ def test_the_whole_track_is_repaired_and_not_only_its_places_in_the_window(scale
     repair = Repair(TRACKS[0].fault, turn=scale)
     question = seen().question
     poses = question.a.poses
-    path = repair.path(poses, HALF_M)
+    path, repaired = repair.path(poses, HALF_M), question.a.repaired(repair)
+    assert repaired is not None
     at, reference = question.a.at, question.a.reference
     for k in (0, len(at) // 2, len(at) - 1):
         there = [np.interp(at[k], np.arange(len(path)), column) for column in path.T]
@@ -234,7 +237,7 @@ def test_the_whole_track_is_repaired_and_not_only_its_places_in_the_window(scale
         cos, sin = math.cos(origin[2]), math.sin(origin[2])
         dx, dy = there[0] - origin[0], there[1] - origin[1]
         expected = [cos * dx + sin * dy, cos * dy - sin * dx, there[2] - origin[2]]
-        assert question.a.repaired(repair)[k] == pytest.approx(expected, abs=1e-9)
+        assert repaired[k] == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_question_counts_the_way_of_who_drove_less() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from itertools import cycle
+from typing import TypeVar
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -26,6 +27,13 @@ CERES_MS = {50: 0.72, 100: 1.19, 200: 2.55}
 GRID = "grid + least_squares"
 POOL = 20
 """Windows that every program goes through in turns."""
+NINE = 9
+ONE_SEED = {50: 12.0, 100: 20.0, 200: 28.0}
+"""So many times as fast as the grid."""
+VERDICT = 10.0
+"""Likewise, of a window among nine."""
+AT_ONCE = 0.45
+Given = TypeVar("Given")
 STARTS = 17
 """Of the search that stands for the truth."""
 SAME_COST = 1.001
@@ -34,26 +42,39 @@ SAME_COST = 1.001
 def rows(quick: bool) -> Iterator[Row]:
     """All figures of module 1."""
     one: dict[int, float] = {}
+    farthest = 0.0
     for tau in TAUS:
         rng = np.random.default_rng(tau)
         pool = [windows.window(rng, tau)[0] for _ in range(POOL)]
-        programs = {"one": over(pool, one_seed), "full": over(pool, full), GRID: over(pool, grid)}
-        times = timing.in_turns(programs, 60 if quick else 400, 4 if quick else 30)
+        nines = [[pool[(k + j) % POOL] for j in range(NINE)] for k in range(POOL)]
+        programs = {
+            "one": over(pool, one_seed),
+            GRID: over(pool, grid),
+            "apart": over(nines, apart),
+            "together": over(nines, together),
+        }
+        times = timing.in_turns(programs, 60 if quick else 400, 6 if quick else 40)
         one[tau] = times["one"].median
         quoted = (Peer("paper", PAPER_MS[tau], False), Peer("C++ Ceres", CERES_MS[tau], False))
         peers = (Peer(GRID, times[GRID].median, True), *quoted)
-        yield Row(1, f"one seed, tau {tau}", one[tau], "ms", 0.5, times["one"].p99, peers)
-        found = times["full"]
+        p99 = times["one"].p99
+        yield Row(1, f"one seed, tau {tau}", one[tau], "ms", None, p99, peers, times=ONE_SEED[tau])
+        alone, nine = (times[name].median / NINE for name in ("apart", "together"))
         work = f"all seeds, covariance, verdict, tau {tau}"
-        yield Row(1, work, found.median, "ms", 1.0, found.p99, peers)
+        yield Row(1, work, alone, "ms", None, None, peers)
+        yield Row(1, f"{work}, of nine at once", nine, "ms", None, None, peers, times=VERDICT)
+        work = f"nine windows at once over nine one by one, tau {tau}"
+        yield Row(1, work, nine / alone, "ratio", AT_ONCE)
+        farthest = max(farthest, *(difference(apart(some), together(some)) for some in nines))
+    yield Row(1, "nine at once, the pose farthest from one by one, m", farthest, "gap", 1e-14)
     yield Row(1, "one seed, t(200) / t(50)", one[200] / one[50], "ratio", 1.3)
     count = 60 if quick else 400
     yield Row(1, "global minimum found, tau 100", global_share(count, False), "share", 0.995)
     yield Row(1, "the same, nearly straight", global_share(count, True), "share", 0.95)
 
 
-def over(pool: list[Window], solve: Callable[[Window], object]) -> Callable[[], object]:
-    """A program that takes the next window at every call."""
+def over(pool: list[Given], solve: Callable[[Given], object]) -> Callable[[], object]:
+    """A program that takes what comes next at every call."""
     turns = cycle(pool)
     return lambda: solve(next(turns))
 
@@ -65,14 +86,40 @@ def one_seed(window: Window) -> Array:
 
 def full(window: Window) -> RelativePoseEstimate:
     """What the daemon does with every window: into bins, solved with a verdict."""
+    return solver.solve(thinned(window), windows.NOISE, DELTA)
+
+
+def apart(some: list[Window]) -> list[RelativePoseEstimate]:
+    """The same of several windows, one by one."""
+    return [full(window) for window in some]
+
+
+def together(some: list[Window]) -> list[RelativePoseEstimate]:
+    """The same at once, as the daemon does with those of all its pairs."""
+    thin = [thinned(window) for window in some]
+    return solver.solve_all(thin, [windows.NOISE] * len(thin), DELTA)
+
+
+def thinned(window: Window) -> Window:
+    """In bins."""
     width = max(1.0 / windows.HZ, np.ptp(window.t) / POINTS)
     t, ranges, _ = binned(window.t, window.ranges, float(width))
     poses = [
         np.stack([np.interp(t, window.t, values) for values in track.T], axis=-1)
         for track in (window.a_poses, window.b_poses)
     ]
-    thin = Window(t, ranges, poses[0], poses[1], window.a_antenna, window.b_antenna)
-    return solver.solve(thin, windows.NOISE, DELTA)
+    return Window(t, ranges, poses[0], poses[1], window.a_antenna, window.b_antenna)
+
+
+def difference(some: list[RelativePoseEstimate], others: list[RelativePoseEstimate]) -> float:
+    """The farthest that two answers lie apart, m; infinite where a verdict is another one."""
+    farthest = 0.0
+    for one, other in zip(some, others, strict=True):
+        if one.verdict is not other.verdict or len(one.hypotheses) != len(other.hypotheses):
+            return float("inf")
+        for found, again in zip(one.hypotheses, other.hypotheses, strict=True):
+            farthest = max(farthest, float(np.abs(found.a_T_b - again.a_T_b)[:2].max()))
+    return farthest
 
 
 def refined(window: Window, seeds: int) -> Array:

@@ -35,7 +35,8 @@ class Row:
         value: a median where it is a time.
         unit: "ms", "s", "rounds", "MB", "ratio", "gap", or "share" and "closures", of which more
             is better.
-        goal: to reach, None where the row only informs.
+        goal: to reach, None where the row only informs or `times` is the goal.
+        times: so many times as fast as the first peer of this run it is to be, on any machine.
         curve: the curve of `--picture` that the row is a point of, and its place on the axis.
     """
 
@@ -47,6 +48,7 @@ class Row:
     p99: float | None = None
     peers: tuple[Peer, ...] = ()
     curve: tuple[str, float] | None = None
+    times: float | None = None
 
     @property
     def name(self) -> str:
@@ -55,6 +57,8 @@ class Row:
 
     @property
     def is_met(self) -> bool | None:
+        if self.times is not None:
+            return next(iter(self.ratios().values()), 0.0) >= self.times
         if self.goal is None:
             return None
         return self.value >= self.goal if self.unit in MORE else self.value <= self.goal
@@ -73,7 +77,10 @@ def markdown(rows: list[Row]) -> str:
     for row in rows:
         here = "; ".join(_beside(row.value, p) for p in row.peers if p.here)
         there = "; ".join(f"{p.name} {_number(p.value)}" for p in row.peers if not p.here)
-        goal = "" if row.goal is None else f"{_number(row.goal)} {'✓' if row.is_met else 'MISSED'}"
+        wanted = _number(row.goal) if row.goal is not None else ""
+        if row.times is not None:
+            wanted = f"{_number(row.times)} x"
+        goal = f"{wanted} {'✓' if row.is_met else 'MISSED'}" if wanted else ""
         p99 = "" if row.p99 is None else _number(row.p99)
         value = f"{_number(row.value)} {row.unit}"
         lines.append(
