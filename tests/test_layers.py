@@ -82,6 +82,7 @@ OPTIMIZER_ORDER = [
     "factors",
     "contract",
     "banded",
+    "kept",
     "rbcd",
     "closures",
 ]

@@ -86,6 +86,8 @@ class TeamEstimate:
         converged: is it good enough to be used?
         settled: is it the same from wherever it was begun?
         lifted: state of the relaxation, with `rbcd`.
+        is_as_modelled: was it explained with odometry as it is configured?
+        kept: what the solver keeps of it for the next one.
     """
 
     frame: Segment
@@ -108,6 +110,8 @@ class TeamEstimate:
     converged: bool = True
     settled: bool = True
     lifted: Lifted | None = None
+    is_as_modelled: bool = True
+    kept: object = field(default=None, repr=False)
 
     @property
     def is_final(self) -> bool:

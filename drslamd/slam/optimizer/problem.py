@@ -83,6 +83,11 @@ class OdometryFactors(BetweenFactors):
     by_yaw: Array
     by_turn: Array
 
+    def chosen(self, which: NDArray[np.bool_]) -> OdometryFactors:
+        columns = (self.i, self.j, self.measured, self.covariance)
+        of_robots = (self.robot, self.by_yaw, self.by_turn)
+        return OdometryFactors(*(column[which] for column in (*columns, *of_robots)))
+
 
 @dataclass(frozen=True)
 class CarriedEnds:
