@@ -14,7 +14,7 @@ from drslamd.conventions import GRID_HZ, ROTATION_STEP_RAD, TRANSLATION_STEP_M, 
 from drslamd.slam import se2
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.graph import team_frame
-from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
+from drslamd.slam.graph.estimate import Learned, TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import (
     ClosureMeasurement,
     GraphEntry,
@@ -56,6 +56,7 @@ class MetTeam:
         self._rng = np.random.default_rng(seed)
         self.robots, self._whole_from = robots, seconds - WHOLE_S
         self.truth = self._driven(seconds + more)
+        self._scale = self._rng.normal(0, 0.02, robots)
         self._odometry = self._measured()
         self._bias = self._rng.normal(0, 0.05, (robots, robots))
         self.chains = [Chain(robot, 1) for robot in range(robots)]
@@ -98,7 +99,9 @@ class MetTeam:
                 closures.append(self._closure(second, robot, other, n, there))
         return GraphEntry(second, None, (frame,), tuple(ranges), tuple(closures))
 
-    def _closure(self, second: int, robot: int, other: int, n: int, there: int) -> ClosureMeasurement:
+    def _closure(
+        self, second: int, robot: int, other: int, n: int, there: int
+    ) -> ClosureMeasurement:
         here = self.truth[second]
         a_T_b = se2.between(here[robot], here[other]) + self._rng.normal(0, 0.1, 3)
         number, covariance = self.robots * second + other, (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)
@@ -116,7 +119,13 @@ class MetTeam:
             seconds = (view.keyframes.n - APART * robot) // GRID_HZ
             poses = se2.between(first[None], self.truth[seconds, robot])
             trajectories[robot] = Trajectory(view.chain, view.keyframes.n, poses)
-        self.back.estimate = TeamEstimate(frame=gauge, trajectories=trajectories)
+        scale = {k: Learned(float(s / (1 + s))) for k, s in enumerate(self._scale)}
+        bias = {
+            (a, b): Learned(float(self._bias[a, b]))
+            for a in range(self.robots)
+            for b in range(a + 1, self.robots)
+        }
+        self.back.estimate = TeamEstimate(gauge, trajectories, scale=scale, bias_m=bias)
 
     def _driven(self, seconds: int) -> Array:
         """(seconds, robots, 3) about a square, turned back by its walls."""
@@ -141,7 +150,7 @@ class MetTeam:
         step = se2.between(self.truth[:-1].reshape(-1, 3), self.truth[1:].reshape(-1, 3))
         step = step.reshape(shape)
         step[..., 2] = se2.wrap(step[..., 2])
-        step[..., :2] *= 1 + rng.normal(0, 0.03, (1, self.robots, 1))
+        step[..., :2] *= 1 + self._scale[None, :, None]
         step += rng.normal(size=shape) * np.sqrt(SPEED_MPS) * [0.01, 0.01, np.radians(0.5)]
         out = np.zeros_like(self.truth)
         for k in range(len(step)):

@@ -89,7 +89,8 @@ class BandedOptimizer:
     ) -> Job:
         """See `Optimizer.job`; public poses are not needed."""
         team = build_problem(graph, group, previous, self)
-        return partial(_solve, team, group, self.solve, previous.kept if previous else None)
+        kept = previous.kept if previous else None
+        return partial(solved, team, group, solve=self.solve, kept=kept)
 
 
 @dataclass(frozen=True)
@@ -162,9 +163,7 @@ def _knows(previous: TeamEstimate | None, group: Group, keyframes: Mapping[Chain
     )
 
 
-def _is_near(
-    previous: TeamEstimate | None, group: Group, keyframes: Mapping[Chain, Index]
-) -> bool:
+def _is_near(previous: TeamEstimate | None, group: Group, keyframes: Mapping[Chain, Index]) -> bool:
     """Is there a good solution of most of these keyframes (k,), with a model that was right?"""
     if previous is None or previous.frame != group.frame or not previous.is_as_modelled:
         return False
@@ -223,11 +222,24 @@ def _doubted(
     return Doubted(np.array(turns), np.array([robot in antennas for robot in robots]))
 
 
-def _solve(team: TeamProblem, group: Group, solve: Solver, kept: object) -> TeamEstimate:
-    """Solve, with the uncertainty of everybody's latest pose, and sort the answer by robot."""
+def solved(
+    team: TeamProblem,
+    group: Group,
+    tolerance: float | None = None,
+    solve: Solver = anew,
+    kept: object = None,
+) -> TeamEstimate:
+    """Solve, with the uncertainty of everybody's latest pose, and sort the answer by robot.
+
+    Args:
+        tolerance: by what is known where it is left out.
+        kept: what came of the solution before.
+    """
     mine = {chain.robot: team.places.of_robot(chain.robot) for chain in team.chains}
     last = tuple(int(at[-1]) for at in mine.values())
-    solution, kept = solve(team, last, SETTLED if team.is_known else TOLERANCE, kept)
+    if tolerance is None:
+        tolerance = SETTLED if team.is_known else TOLERANCE
+    solution, kept = solve(team, last, tolerance, kept)
     learned, spread, doubted = solution.calibration, solution.spread, solution.doubted
     assert spread is not None
     turn = _named(list(mine), learned.turn, spread.turn)

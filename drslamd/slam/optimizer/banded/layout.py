@@ -75,9 +75,7 @@ class BandLayout:
         return BandLayout.placed(problem, poses, band=3 * count, outside=0, width=3 * count)
 
     @staticmethod
-    def placed(
-        problem: Problem, poses: Index, band: int, outside: int, width: int
-    ) -> BandLayout:
+    def placed(problem: Problem, poses: Index, band: int, outside: int, width: int) -> BandLayout:
         """
         Args:
             poses: (k, 3), `NOWHERE` for those that are no unknowns.

@@ -10,12 +10,11 @@ take a lot off the cost (Rao's score test):
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
 from drslamd.slam.optimizer.banded import linearised
-from drslamd.slam.optimizer.banded.band_factor import BandFactor
+from drslamd.slam.optimizer.banded.band_factor import BandFactor, Solver
 from drslamd.slam.optimizer.banded.layout import NOWHERE
 from drslamd.slam.optimizer.banded.linearised import Linearised
 from drslamd.slam.optimizer.banded.newton_descent import descend
@@ -45,13 +44,6 @@ class Scores:
     def ask(self) -> bool:
         """Does any mounting ask to be let go?"""
         return bool((np.append(self.track, self.antenna) > ASKED_FOR).any())
-
-
-class Solver(Protocol):
-    """What solves the system of a problem."""
-
-    def solved(self, right: Array) -> Array | None:
-        """For right-hand sides (n + b, c); None where there is no solution."""
 
 
 def scores(equations: Equations, point: Point, factor: Solver) -> Scores:
@@ -113,9 +105,7 @@ def pulls(equations: Equations, point: Point) -> Array:
     return pull
 
 
-def _parts(
-    equations: Equations, point: Point
-) -> tuple[tuple[Linearised, Index, Index], ...]:
+def _parts(equations: Equations, point: Point) -> tuple[tuple[Linearised, Index, Index], ...]:
     """Factors, their unknowns, and the columns (m, k) of their mountings."""
     problem, layout = equations.problem, equations.layout
     robots = len(problem.priors.scale)

@@ -161,8 +161,12 @@ class Equations:
             layout: where it is not one of the whole problem.
         """
         self.problem = problem
-        self.layout = layout or (like.layout if like else BandLayout.of(problem))
-        self._where: _Where = like._where if like else _Where.of(problem, self.layout)
+        self.layout: BandLayout = layout or (like.layout if like else BandLayout.of(problem))
+        self._like = like
+
+    @cached_property
+    def _where(self) -> _Where:
+        return self._like._where if self._like else _Where.of(self.problem, self.layout)
 
     def cost(self, point: Point, threshold: Array) -> float:
         """Of all factors and priors.
@@ -188,7 +192,7 @@ class Equations:
         gradient = np.zeros(self.layout.band + self.layout.border)
         for where, factors in self._factors(point, LEAST_CURVATURE):
             where.add_gradient(gradient, factors)
-        self._add_pull_of_priors(gradient, point)
+        self.add_pull_of_priors(gradient, point)
         return gradient
 
     def at(self, point: Point, least: float = LEAST_CURVATURE) -> tuple[System, Array]:
@@ -204,15 +208,8 @@ class Equations:
             where.add_gradient(gradient, factors)
         self.add_heavy_priors(system, point.calibration, least)
         self.add_gaussian_priors(system)
-        self._add_pull_of_priors(gradient, point)
+        self.add_pull_of_priors(gradient, point)
         return system, gradient
-
-    def factors_at(self, point: Point) -> System:
-        """What the factors alone add to that matrix."""
-        system = System.empty(self.layout)
-        for where, factors in self._factors(point, LEAST_CURVATURE):
-            where.add_matrix(system, factors)
-        return system
 
     def claimed(self, point: Point, claims: Array) -> System:
         """What is known at the solution: a system whose inverse is the covariance to be claimed.
@@ -303,7 +300,8 @@ class Equations:
         system.add_prior(layout.near_bias, priors.near_bias**-2.0)
         system.add_prior(layout.poses[self.problem.gauge], GAUGE_SIGMA**-2)
 
-    def _add_pull_of_priors(self, gradient: Array, point: Point) -> None:
+    def add_pull_of_priors(self, gradient: Array, point: Point) -> None:
+        """Half the derivative of what all priors cost."""
         layout, problem, calibration = self.layout, self.problem, point.calibration
         priors, gauge = problem.priors, problem.gauge
         team = float(calibration.team_bias[0])

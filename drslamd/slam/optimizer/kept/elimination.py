@@ -1,6 +1,6 @@
 """Gaussian elimination of a band with a border in dense blocks, as far as is wanted.
 
-Block by block, with K the unknowns of a block, R those below them that they reach and B the border:
+Elimination by block, with K the unknowns of a block, R those below them that they reach and B the border:
 
     A_KK = L L'    G = A_RK L'^-1    V = L^-1 A_KB
     A_RR -= G G'   A_RB -= G V       A_BB -= V' V
@@ -27,7 +27,7 @@ LEAST_COLUMNS, MOST_COLUMNS = 48, 192
 
 
 @dataclass(frozen=True)
-class Block:
+class Elimination:
     """Unknowns that were eliminated together.
 
     Attributes:
@@ -65,7 +65,7 @@ class Rest:
     border: Array
     corner: Array
 
-    def without(self, own: Index, below: Index, numbers: Index) -> tuple[Block, Rest] | None:
+    def without(self, own: Index, below: Index, numbers: Index) -> tuple[Elimination, Rest] | None:
         """Some of its unknowns eliminated; None where it is not positive definite.
 
         Args:
@@ -83,10 +83,10 @@ class Rest:
             self.border[below] - gain @ aside,
             self.corner - aside.T @ aside,
         )
-        return Block(numbers[own], numbers[below], *parts), left
+        return Elimination(numbers[own], numbers[below], *parts), left
 
 
-def eliminated(system: System, count: int) -> tuple[list[Block], Rest] | None:
+def eliminated(system: System, count: int) -> tuple[list[Elimination], Rest] | None:
     """The first `count` unknowns of the band, in its order; None where they cannot be.
 
     What is left are the other unknowns of the band, then the border.
@@ -94,7 +94,7 @@ def eliminated(system: System, count: int) -> tuple[list[Block], Rest] | None:
     band, border = system.band, system.border
     n, b = border.shape
     ends = _ends(band)
-    blocks: list[Block] = []
+    blocks: list[Elimination] = []
     asides = np.empty((count, b))
     carried, carried_border, at = np.zeros((0, 0)), np.zeros((0, b)), 0
     while at < count:
@@ -103,13 +103,15 @@ def eliminated(system: System, count: int) -> tuple[list[Block], Rest] | None:
         columns = min(columns, count - at)
         end = max(int(ends[at + columns - 1]), at + len(carried))
         window, beside = _window(band, border, at, columns, end, carried, carried_border)
-        parts = _eliminated(window[:columns, :columns], window[columns:, :columns], beside[:columns])
+        parts = _eliminated(
+            window[:columns, :columns], window[columns:, :columns], beside[:columns]
+        )
         if parts is None:
             return None
         inverse, gain, aside = parts
         asides[at : at + columns] = aside
         own, below = slice(at, at + columns), slice(at + columns, end)
-        blocks.append(Block(own, below, inverse, gain, asides[own]))
+        blocks.append(Elimination(own, below, inverse, gain, asides[own]))
         carried = window[columns:, columns:] - gain @ gain.T
         carried_border = beside[columns:] - gain @ aside
         at += columns

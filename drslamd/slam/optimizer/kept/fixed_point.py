@@ -17,6 +17,7 @@ import numpy as np
 from drslamd.slam import headway
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.kept.exact_gradient import exact_gradient
 from drslamd.slam.optimizer.kept.kept_factor import Current
 from drslamd.slam.se2 import Array
 
@@ -44,7 +45,7 @@ def approach(
     gradients: list[Array] = []
     for count in range(most):
         headway.mark()
-        gradient = equations.gradient(point)
+        gradient = exact_gradient(equations, point)
         step = matrix.solved(-gradient)
         size = float(np.abs(step[layout.poses]).max())
         if not size < FARTHEST:

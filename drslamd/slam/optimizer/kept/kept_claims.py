@@ -15,7 +15,7 @@ from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.se2 import Array, Index
 
 
-def covariances(
+def kept_covariances(
     problem: Problem, point: Point, claimed: Current, wanted: Index
 ) -> tuple[Array, Calibration] | None:
     """See `claims.covariances`; None where it is for that to say.

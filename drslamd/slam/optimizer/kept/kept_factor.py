@@ -21,7 +21,7 @@ from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout, border_pos
 from drslamd.slam.optimizer.banded.normal_equations import Equations, System
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
-from drslamd.slam.optimizer.kept.elimination import Block, Rest, eliminated
+from drslamd.slam.optimizer.kept.elimination import Elimination, Rest, eliminated
 from drslamd.slam.optimizer.problem import Doubted, Problem, RangeErrors
 from drslamd.slam.se2 import Array, Index
 
@@ -161,7 +161,7 @@ class Believed:
     """A problem at a point, and how much is believed of it: what a system is made of.
 
     Attributes:
-        claims: (pairs,) for `Equations.claimed`; None for the system that leads downwards.
+        claims: (pairs,) for `Equations.claimed`; None for `Equations.weighed`.
     """
 
     problem: Problem
@@ -187,10 +187,8 @@ class Believed:
         sight = RangeErrors(*(column[ranges] for column in self.point.sight))
         point = replace(self.point, link=self.point.link[odometry], sight=sight)
         equations = Equations(some, layout=layout)
-        if self.claims is None:
-            system = equations.factors_at(point)
-        else:
-            system = equations.factors_weighed(point, self.claims)
+        claims = np.ones(problem.pairs) if self.claims is None else self.claims
+        system = equations.factors_weighed(point, claims)
         if priors:
             equations.add_gaussian_priors(system)
         return system
@@ -220,7 +218,7 @@ class KeptFactor:
     """
 
     head: Head
-    blocks: tuple[Block, ...]
+    blocks: tuple[Elimination, ...]
     rest: Rest
 
     def on_top(self, believed: Believed, places: Places) -> Current | None:

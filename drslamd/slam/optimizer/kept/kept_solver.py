@@ -130,7 +130,7 @@ def _solved(
     claimed = _matrix(known, believed, pairs, with_blocks=False)
     if claimed is None:
         return None
-    found = kept_claims.covariances(problem, point, claimed, np.array(last, dtype=int))
+    found = kept_claims.kept_covariances(problem, point, claimed, np.array(last, dtype=int))
     downwards = _grown(current, Believed(problem, point))
     held = _grown(claimed, believed)
     if found is None or downwards is None or held is None:
@@ -142,7 +142,7 @@ def _solved(
 def _matrix(
     kept: KeptFactor | None, believed: Believed, pairs: list[Pair], with_blocks: bool = True
 ) -> Current | None:
-    """A kept factor, or a new one, with the tail of a problem on top; None where it does not fit."""
+    """A kept factor, or a new one, with the tail of a problem on top; None if it does not fit."""
     problem = believed.problem
     if kept is None:
         kept = kept_factor.build(believed, pairs, kept_factor.tail_of(problem), with_blocks)
@@ -185,6 +185,6 @@ def _said(
         odometry_level=np.ones(len(level)),
         feared_level=level,
         late_level=level,
-        contradicted=quick_check.contradicted(problem, point),
+        contradicted=quick_check.lately_wrong(problem, point),
         doubted=claims.still_doubted(problem.doubted, point.calibration, spread),
     )

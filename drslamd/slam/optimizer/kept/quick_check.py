@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.slam.optimizer.banded import mountings
+from drslamd.slam.optimizer.banded.band_factor import Solver
 from drslamd.slam.optimizer.banded.explanation import SUSPICIOUS
 from drslamd.slam.optimizer.banded.misfit import (
     CLIPPED,
@@ -22,9 +23,9 @@ from drslamd.slam.optimizer.banded.misfit import (
     guessed_misfit,
     outliers,
 )
-from drslamd.slam.optimizer.banded.mountings import Solver
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.kept.exact_gradient import mounting_pulls
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array, Index
 
@@ -41,7 +42,7 @@ def misfit_as_modelled(
     problem = equations.problem
     if has_runs(problem, point):
         return None
-    pull = mountings.pulls(equations, point)
+    pull = mounting_pulls(problem, point)
     if mountings.scored(problem, pull, variances).ask():
         return None
     misfit = guessed_misfit(equations, point, matrix)
@@ -60,7 +61,7 @@ def has_runs(problem: Problem, point: Point) -> bool:
     return bool((np.mean(last**2, axis=1) > MOST_SCATTER).any())
 
 
-def contradicted(problem: Problem, point: Point) -> NDArray[np.bool_]:
+def lately_wrong(problem: Problem, point: Point) -> NDArray[np.bool_]:
     """(pairs,) of whose ranges of late many do not fit, where no run does not (`misfit`)."""
     pair, n = problem.ranges.pair, problem.n[problem.ranges.i]
     newest = np.zeros(problem.pairs)
