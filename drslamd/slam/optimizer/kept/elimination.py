@@ -1,6 +1,6 @@
 """Gaussian elimination of a band with a border in dense blocks, as far as is wanted.
 
-Elimination by block, with K the unknowns of a block, R those below them that they reach and B the border:
+Set by set, with K the unknowns of a set, R those below them that they reach, B the border:
 
     A_KK = L L'    G = A_RK L'^-1    V = L^-1 A_KB
     A_RR -= G G'   A_RB -= G V       A_BB -= V' V

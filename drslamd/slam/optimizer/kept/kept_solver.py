@@ -21,12 +21,11 @@ from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.kept import kept_claims, kept_factor, quick_check
 from drslamd.slam.optimizer.kept.fixed_point import approach
+from drslamd.slam.optimizer.kept.head import LONG_TAIL, Pair, tail_of
 from drslamd.slam.optimizer.kept.kept_factor import (
-    LONG_TAIL,
     Believed,
     Current,
     KeptFactor,
-    Pair,
 )
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
@@ -145,7 +144,7 @@ def _matrix(
     """A kept factor, or a new one, with the tail of a problem on top; None if it does not fit."""
     problem = believed.problem
     if kept is None:
-        kept = kept_factor.build(believed, pairs, kept_factor.tail_of(problem), with_blocks)
+        kept = kept_factor.build(believed, pairs, tail_of(problem), with_blocks)
     places = kept.head.places(problem, pairs) if kept else None
     if kept is None or places is None or places.is_late(problem):
         return None

@@ -14,7 +14,8 @@ from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.kept.fixed_point import approach
-from drslamd.slam.optimizer.kept.kept_factor import Believed, Current, build, tail_of
+from drslamd.slam.optimizer.kept.head import tail_of
+from drslamd.slam.optimizer.kept.kept_factor import Believed, Current, build
 
 
 @pytest.fixture(scope="module")

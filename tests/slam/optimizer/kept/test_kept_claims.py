@@ -10,8 +10,9 @@ from kept_scenes import a_team_problem, shaken
 from drslamd.slam.calibration.range_scatter import LEAST_SCATTER
 from drslamd.slam.optimizer.banded import claims
 from drslamd.slam.optimizer.banded.normal_equations import Equations
+from drslamd.slam.optimizer.kept.head import tail_of
 from drslamd.slam.optimizer.kept.kept_claims import kept_covariances
-from drslamd.slam.optimizer.kept.kept_factor import Believed, build, tail_of
+from drslamd.slam.optimizer.kept.kept_factor import Believed, build
 from drslamd.slam.optimizer.sensor_priors import Calibration
 
 

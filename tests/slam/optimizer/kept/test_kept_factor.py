@@ -14,17 +14,9 @@ from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem
 from drslamd.slam.optimizer.banded.layout import BandLayout
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
-from drslamd.slam.optimizer.kept.kept_factor import (
-    LONG_TAIL,
-    TAIL,
-    Believed,
-    Current,
-    KeptFactor,
-    build,
-    keys_of,
-    tail_of,
-)
-from drslamd.slam.optimizer.problem import Doubted, Problem
+from drslamd.slam.optimizer.kept.head import LONG_TAIL, TAIL, keys_of, tail_of
+from drslamd.slam.optimizer.kept.kept_factor import Believed, Current, KeptFactor, build
+from drslamd.slam.optimizer.problem import Problem
 
 ROBOTS = 3
 
@@ -111,40 +103,6 @@ def test_the_newest_pose_of_each_robot_is_never_eliminated(team: TeamProblem) ->
     for robot in range(ROBOTS):
         newest = np.flatnonzero(problem.robot == robot)[-1]
         assert keys_of(problem)[newest] in inside
-
-
-def without_pose(problem: Problem, pose: int) -> Problem:
-    """The pose is another one's."""
-    n = problem.n.copy()
-    n[pose] += 1
-    return replace(problem, n=n)
-
-
-def test_a_problem_that_lacks_a_pose_of_the_head_has_no_places(team: TeamProblem) -> None:
-    problem = team.problem
-    kept = build(Believed(problem, shaken(problem)), team.pairs, tail_of(problem), True)
-    assert kept is not None
-    assert kept.head.places(problem, team.pairs) is not None
-    assert kept.head.places(without_pose(problem, 5), team.pairs) is None
-    last = len(problem.n) - 1
-    assert kept.head.places(without_pose(problem, last), team.pairs) is not None
-    assert kept.head.places(problem, team.pairs[:2]) is None
-    doubted = replace(problem, doubted=Doubted(np.arange(3) == 0, np.zeros(3, dtype=bool)))
-    assert kept.head.places(doubted, team.pairs) is None
-
-
-def test_a_pose_that_comes_late_is_known_as_such(team: TeamProblem) -> None:
-    problem = team.problem
-    count = len(problem.n)
-    late = np.arange(count) == count // 2
-    kept = build(Believed(problem, shaken(problem)), team.pairs, tail_of(problem) | late, True)
-    assert kept is not None
-    places = kept.head.places(problem, team.pairs)
-    # what hangs on it had to wait for it
-    assert places is not None
-    assert not places.is_late(problem)
-    moved = replace(problem.odometry, j=np.where(problem.odometry.j == count - 1, 3, count - 1))
-    assert places.is_late(replace(problem, odometry=moved))
 
 
 def test_a_bias_that_is_new_joins_the_border(team: TeamProblem) -> None:
