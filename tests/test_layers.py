@@ -84,6 +84,7 @@ OPTIMIZER_ORDER = [
     "factors",
     "contract",
     "banded",
+    "kept",
     "rbcd",
     "closures",
 ]

@@ -12,6 +12,7 @@ from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.optimizer.banded.banded_optimizer import BandedOptimizer
 from drslamd.slam.optimizer.closures.closure_optimizer import ClosureOptimizer
 from drslamd.slam.optimizer.contract import Optimizer
+from drslamd.slam.optimizer.kept import kept_solver
 from drslamd.slam.optimizer.rbcd.rbcd_optimizer import RbcdOptimizer
 from drslamd.slam.robot_model import RobotModel
 from drslamd.slam.tuning import DEFAULTS, Tuning
@@ -69,4 +70,5 @@ def banded_optimizer(config: Config, tuning: Tuning = DEFAULTS) -> BandedOptimiz
         range_sigma=ranges.range_sigma_m,
         model=tuning.ranges,
         scale_tails=tuning.scale_tails,
+        solve=kept_solver.solve,
     )

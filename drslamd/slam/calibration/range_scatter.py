@@ -74,7 +74,7 @@ def inlier_scatter(
     squares = (errors / sigmas) ** 2
     scatter = np.ones(pairs)
     for _ in range(ROUNDS):
-        weights = (1 + squares / (sigmas_cut * scatter[pair]) ** 2) ** -2
+        weights = 1 / np.square(1 + squares / ((sigmas_cut * scatter) ** 2)[pair])
         total = np.bincount(pair, GAUSSIAN * weights * squares, pairs)
         count = np.bincount(pair, weights, pairs)
         scatter = np.sqrt((PRIOR_RANGES + total) / (PRIOR_RANGES + count))

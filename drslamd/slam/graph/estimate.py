@@ -88,6 +88,8 @@ class TeamEstimate:
         lifted: state of the relaxation, with `rbcd`.
         nodes: by number, the places of modules that no robot carries.
         points: what stands, and of which only the place is known: every node, and parked robots.
+        is_as_modelled: was it explained with odometry as it is configured?
+        kept: what the solver keeps of it for the next one.
     """
 
     frame: Segment
@@ -112,6 +114,8 @@ class TeamEstimate:
     lifted: Lifted | None = None
     nodes: dict[int, Trajectory] = field(default_factory=dict)
     points: frozenset[int] = frozenset()
+    is_as_modelled: bool = True
+    kept: object = field(default=None, repr=False)
 
     @property
     def is_final(self) -> bool:

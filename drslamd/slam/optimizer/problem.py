@@ -83,6 +83,11 @@ class OdometryFactors(BetweenFactors):
     by_yaw: Array
     by_turn: Array
 
+    def chosen(self, which: NDArray[np.bool_]) -> OdometryFactors:
+        columns = (self.i, self.j, self.measured, self.covariance)
+        of_robots = (self.robot, self.by_yaw, self.by_turn)
+        return OdometryFactors(*(column[which] for column in (*columns, *of_robots)))
+
 
 @dataclass(frozen=True)
 class CarriedEnds:
@@ -96,6 +101,11 @@ class CarriedEnds:
 
     rows: Index
     moves: Array
+
+    @cached_property
+    def shifts(self) -> Array:
+        """(c, 2, 2) the same as x + iy."""
+        return np.asarray(self.moves @ [1, 1j])
 
     @staticmethod
     def none() -> CarriedEnds:
@@ -159,15 +169,23 @@ class RangeFactors:
     def arms(self, calibration: Calibration) -> tuple[Array, Array]:
         """From the poses to the antennas, x + iy (m,) in the frames of i and j: yaw rate and scale
         taken out, each antenna where it really is."""
-        ends, carried = np.stack([self.q_i, self.q_j]), self.carried
+        (arm_i, arm_j), carried = (end.copy() for end in self._points), self.carried
         if len(carried.rows):
             constants = np.stack([calibration.yaw, calibration.scale], axis=-1)
             of_end = constants[self.robots[carried.rows]]
-            moved = (of_end[..., None] * carried.moves).sum(axis=2)
-            ends[:, carried.rows] -= np.swapaxes(moved, 0, 1)
-        beside = calibration.antenna @ [1, 1j]
-        arm_i, arm_j = ends @ [1, 1j] + (beside[self.robots] * np.exp(1j * self.turned)).T
+            moved = (of_end * carried.shifts).sum(axis=2)
+            arm_i[carried.rows] -= moved[:, 0]
+            arm_j[carried.rows] -= moved[:, 1]
+        if calibration.antenna.any():
+            beside = calibration.antenna @ [1, 1j]
+            for end, arm in enumerate((arm_i, arm_j)):
+                arm += beside[self.robots[:, end]] * np.exp(1j * self.turned[:, end])
         return arm_i, arm_j
+
+    @cached_property
+    def _points(self) -> tuple[Array, Array]:
+        """(m,) q_i and q_j as x + iy."""
+        return self.q_i @ [1, 1j], self.q_j @ [1, 1j]
 
 
 @dataclass(frozen=True)
@@ -250,9 +268,9 @@ def range_errors(
     poses: Array, ranges: RangeFactors, calibration: Calibration, model: RangeModel
 ) -> RangeErrors:
     """Of all ranges."""
+    turn = np.exp(1j * poses[:, 2])
     arm_i, arm_j = (
-        np.exp(1j * poses[k, 2]) * arm
-        for k, arm in zip((ranges.i, ranges.j), ranges.arms(calibration), strict=True)
+        turn[k] * arm for k, arm in zip((ranges.i, ranges.j), ranges.arms(calibration), strict=True)
     )
     place = poses[:, 0] + 1j * poses[:, 1]
     sight = place[ranges.j] + arm_j - place[ranges.i] - arm_i

@@ -23,6 +23,7 @@ from lab.benchmark import (
     module1,
     module2,
     module3,
+    one_more_second,
     pipeline,
     rows,
     sdp,
@@ -39,6 +40,7 @@ PARTS = {
     "sdp": sdp,
     "2": module2,
     "3": module3,
+    "one-more-second": one_more_second,
     "all": pipeline,
     "daemon": daemon,
     "traffic": traffic,
@@ -50,6 +52,7 @@ examples:
   tools/benchmark --quick --json now.json      under two minutes, fewer repetitions
   tools/benchmark --quick --check before.json  and say what became worse
   tools/benchmark --module 3                   one module
+  tools/benchmark --module one-more-second     what a second of a large team costs
 
 Times are CPU time on one core. Peers "in this run" take turns with drslamd on the same inputs;
 "elsewhere" are figures of another machine, from papers or measured once. Only ratios compare.

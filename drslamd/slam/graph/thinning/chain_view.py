@@ -16,7 +16,7 @@ from drslamd.conventions import GRID_HZ
 from drslamd.slam import se2
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.tables import KeyframeTable
-from drslamd.slam.graph.thinning.time_cells import Stretch, stretches
+from drslamd.slam.graph.thinning.time_cells import Kind, Stretch, stretches, with_edge
 from drslamd.slam.graph.timed_rows import NEVER
 from drslamd.slam.odometry.noise import seen_from, step_sums
 from drslamd.slam.se2 import Array, Index
@@ -249,7 +249,7 @@ class ChainThinning:
     """Views of one chain; parts in which nothing has changed are not made again."""
 
     def __init__(self) -> None:
-        self._made: dict[int, _Made] = {}
+        self._made: dict[Kind, _Made] = {}
         self._old = OldParts([])
 
     def view(self, data: ChainData, step: int, recent: int) -> ChainView:
@@ -259,7 +259,7 @@ class ChainThinning:
             step, recent: see `time_cells.stretches`.
         """
         parts = []
-        for stretch in reversed(stretches(step, recent)):
+        for stretch in reversed(with_edge(stretches(step, recent))):
             rows = data.keyframes.between(stretch.first, stretch.end)
             if rows.start < rows.stop:
                 parts.append(self._part(data, stretch, rows))
@@ -273,7 +273,7 @@ class ChainThinning:
         after = data.keyframes.rows[which.stop : which.stop + 1]
         # (a row in front of a part may change its segments)
         edge = [rows[0, 1], *after.ravel().tolist()]
-        made = self._made.get(stretch.level)
+        made = self._made.get(stretch.kind)
         is_same = (
             made is not None
             and made.part.stretch == stretch
@@ -282,6 +282,6 @@ class ChainThinning:
         )
         if made is None or not is_same:
             made = _Made(thinned(stretch, rows, after), 0, edge)
-            self._made[stretch.level] = made
+            self._made[stretch.kind] = made
         made.changes = data.changes
         return made.part

@@ -17,8 +17,9 @@ from drslamd.slam import se2
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import ClosureMeasurement
 from drslamd.slam.graph.pair_data import PairData
-from drslamd.slam.graph.tables import ClosureTable, RangeTable
+from drslamd.slam.graph.tables import CLOSURE_COLUMNS, RANGE_COLUMNS, ClosureTable, RangeTable
 from drslamd.slam.graph.thinning.chain_view import Carried, ChainPart, ChainView
+from drslamd.slam.graph.thinning.time_cells import Kind
 from drslamd.slam.graph.timed_rows import NEVER
 from drslamd.slam.odometry.noise import OdometryNoise, by_yaw_rate, link_covariance
 from drslamd.slam.robot_model import RobotModel
@@ -47,6 +48,14 @@ class PairPart:
     ranges: RangeTable
     moves: Array
     closures: ClosureTable
+
+
+NOTHING = PairPart(
+    RangeTable(np.zeros((0, RANGE_COLUMNS))),
+    np.zeros((0, 2, 2, 2)),
+    ClosureTable(np.zeros((0, CLOSURE_COLUMNS))),
+)
+"""Of a stretch in which the two did not meet."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,7 +224,7 @@ class PairThinning:
     """Views of one pair; parts in which nothing has changed are not made again."""
 
     def __init__(self) -> None:
-        self._made: dict[int, _Made] = {}
+        self._made: dict[Kind, _Made] = {}
 
     def view(self, pair: PairData, b_data: ChainData, a: ChainView, b: ChainView) -> PairView:
         """The pair as it is now.
@@ -226,11 +235,15 @@ class PairThinning:
         changes = pair.said_ranges.changes, pair.said_closures.changes, b_data.changes
         parts = []
         for own in a.parts:
-            made = self._made.get(own.stretch.level)
+            kind = own.stretch.kind
+            made = self._made.get(kind)
             if made is None or not _is_same(made, own, pair, b_data, a, b):
-                made = self._made[own.stretch.level] = _make(own, pair, a, b)
+                made = self._made[kind] = _make(own, pair, a, b)
             made.changes = changes
-            parts.append(made.part)
+            if made.part is not NOTHING:
+                parts.append(made.part)
+        if not parts:
+            parts.append(NOTHING)
         return PairView(
             a=pair.a,
             b=pair.b,
@@ -262,5 +275,18 @@ def _make(own: ChainPart, pair: PairData, a: ChainView, b: ChainView) -> _Made:
     closures = ClosureTable(pair.said_closures.between(first, end)).kept()
     named = np.concatenate([ranges.b_n, closures.b_n]).astype(np.int64)
     low, high = int(named.min(initial=NEVER)), int(named.max(initial=-1))
-    part = PairPart(*thinned_ranges(ranges, a, b), thinned_closures(closures, a, b))
+    if not len(named):
+        part = NOTHING
+    elif first >= a.recent_n and low >= b.recent_n:
+        part = _whole(ranges, closures, a, b)
+    else:
+        part = PairPart(*thinned_ranges(ranges, a, b), thinned_closures(closures, a, b))
     return _Made(part, (a.model, b.model), own, low, high, b.old_parts(low, high), (0, 0, 0))
+
+
+def _whole(ranges: RangeTable, closures: ClosureTable, a: ChainView, b: ChainView) -> PairPart:
+    """Where all keyframes stay, all counts whose both ends are held."""
+    ranges = ranges.chosen(_Ends.of(a, b, ranges.a_n, ranges.b_n).there)
+    if len(closures):
+        closures = closures.chosen(_Ends.of(a, b, closures.a_n, closures.b_n).there)
+    return PairPart(ranges, np.zeros((len(ranges), 2, 2, 2)), closures)

@@ -29,12 +29,24 @@ LAG_STEPS = 2
 by then, unless some were lost several times."""
 
 
+EDGE = 2 * STEP
+"""Samples behind the oldest that all stay: what is measured there may end in a peer's time that is
+thinned, because cells lie on the clock of each. Newer measurements end where all stay."""
+Kind = tuple[int, bool]
+"""The level of a stretch, and whether it is the newest of all."""
+
+
 class Stretch(NamedTuple):
     """Samples first .. end - 1 of a chain, in cells of 4^level seconds; at level 0 all stay."""
 
     level: int
     first: int
     end: int
+
+    @property
+    def kind(self) -> Kind:
+        """Each chain has one of each at most."""
+        return self.level, self.end == NEVER
 
 
 def recent_s(robots: int, most: int = RECENT_S) -> int:
@@ -80,3 +92,12 @@ def stretches(step: int, recent: int) -> list[Stretch]:
             out.append(Stretch(level, first, end))
         level, end = level + 1, first
     return out
+
+
+def with_edge(found: list[Stretch]) -> list[Stretch]:
+    """The same, with the edge of what stays whole in a stretch of its own: it rarely changes."""
+    level, first, end = found[0]
+    if not first:
+        return found
+    edge = Stretch(level, first, first + EDGE)
+    return [Stretch(level, edge.end, end), edge, *found[1:]]

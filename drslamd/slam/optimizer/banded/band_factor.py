@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -13,6 +14,13 @@ from drslamd.slam.se2 import Array, Index
 
 ROOM = 64
 """Poses that `selected_inverse` does before it moves its window: moving costs as much as some."""
+
+
+class Solver(Protocol):
+    """What solves a system of band and border, or one near it."""
+
+    def solved(self, right: Array) -> Array | None:
+        """For right-hand sides (n + b,) or (n + b, c); None where there is no solution."""
 
 
 @dataclass(frozen=True)

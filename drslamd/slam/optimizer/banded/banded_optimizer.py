@@ -7,7 +7,7 @@ iterate, so a lost message delays the answer and does not change it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import compress
@@ -26,6 +26,7 @@ from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.banded.banded_solver import SETTLED
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE
+from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.factors import Numbering
@@ -35,6 +36,9 @@ from drslamd.slam.range_model import LINKTRACK, RangeModel
 from drslamd.slam.se2 import Array, Index
 
 Name = TypeVar("Name")
+Solver = Callable[["TeamProblem", tuple[int, ...], float, object], tuple[Solution, object]]
+"""Solves a team's problem: poses whose joint covariance is wanted, the tolerance, and what came of
+the solution before; and what comes of this one."""
 
 YAW_PRIOR_FLOOR = 1e-4
 """rad/m; a prior of zero width would make the system singular."""
@@ -49,6 +53,17 @@ HINT = 10.0**2
 they came from; but where those are missing nothing else holds the group together."""
 
 
+MANY_NEW = 5
+"""So many keyframes of each robot may be new to a problem that is said to be near its solution."""
+
+
+def anew(
+    team: TeamProblem, last: tuple[int, ...], tolerance: float, kept: object = None
+) -> tuple[Solution, object]:
+    """Solve with nothing kept: slower, and what other solvers are held against."""
+    return banded_solver.solve(team.problem, team.start, last, tolerance=tolerance), None
+
+
 @dataclass(frozen=True)
 class BandedOptimizer:
     """Ranges and condensed odometry of the whole group, one banded solve.
@@ -57,12 +72,14 @@ class BandedOptimizer:
         bias_sigma: how far off the ranges of a pair may be, m.
         range_sigma: around that, as configured, m.
         scale_tails: see `SCALE_TAILS`.
+        solve: the solver.
     """
 
     bias_sigma: float
     range_sigma: float
     model: RangeModel = LINKTRACK
     scale_tails: float = SCALE_TAILS
+    solve: Solver = anew
 
     def job(
         self,
@@ -73,7 +90,8 @@ class BandedOptimizer:
     ) -> Job:
         """See `Optimizer.job`; public poses are not needed."""
         team = build_problem(graph, group, previous, self)
-        return partial(_solve, team, group)
+        kept = previous.kept if previous else None
+        return partial(solved, team, group, solve=self.solve, kept=kept)
 
 
 @dataclass(frozen=True)
@@ -86,6 +104,7 @@ class TeamProblem:
         places: of the keyframes.
         is_known: is there a solution of the same keyframes? Then it is solved to the end, which
             costs some steps more and would be in vain while others come.
+        is_near: is there one of nearly all of them, with a model that was right?
     """
 
     problem: Problem
@@ -94,6 +113,7 @@ class TeamProblem:
     pairs: list[tuple[int, int]]
     places: Numbering
     is_known: bool
+    is_near: bool = False
 
 
 def build_problem(
@@ -130,8 +150,8 @@ def build_problem(
     )
     start = _start(previous, known, pairs, robots)
     solved = {chain.chain: places.n[places.of_robot(chain.chain.robot)] for chain in chains}
-    is_known = _knows(previous, group, solved)
-    return TeamProblem(problem, start, list(solved), pairs, places, is_known)
+    is_known, is_near = _knows(previous, group, solved), _is_near(previous, group, solved)
+    return TeamProblem(problem, start, list(solved), pairs, places, is_known, is_near)
 
 
 def _knows(previous: TeamEstimate | None, group: Group, keyframes: Mapping[Chain, Index]) -> bool:
@@ -142,6 +162,17 @@ def _knows(previous: TeamEstimate | None, group: Group, keyframes: Mapping[Chain
     return known.keys() == keyframes.keys() and all(
         np.array_equal(known[chain], n) for chain, n in keyframes.items()
     )
+
+
+def _is_near(previous: TeamEstimate | None, group: Group, keyframes: Mapping[Chain, Index]) -> bool:
+    """Is there a good solution of most of these keyframes (k,), with a model that was right?"""
+    if previous is None or previous.frame != group.frame or not previous.is_as_modelled:
+        return False
+    known = {t.chain: t.n for t in previous.trajectories.values()}
+    if not previous.converged or known.keys() != keyframes.keys():
+        return False
+    new = sum(len(np.setdiff1d(n, known[chain])) for chain, n in keyframes.items())
+    return new <= MANY_NEW * len(known)
 
 
 def _start(
@@ -192,13 +223,24 @@ def _doubted(
     return Doubted(np.array(turns), np.array([robot in antennas for robot in robots]))
 
 
-def _solve(team: TeamProblem, group: Group) -> TeamEstimate:
-    """Solve, with the uncertainty of everybody's latest pose, and sort the answer by robot."""
+def solved(
+    team: TeamProblem,
+    group: Group,
+    tolerance: float | None = None,
+    solve: Solver = anew,
+    kept: object = None,
+) -> TeamEstimate:
+    """Solve, with the uncertainty of everybody's latest pose, and sort the answer by robot.
+
+    Args:
+        tolerance: by what is known where it is left out.
+        kept: what came of the solution before.
+    """
     mine = {chain.robot: team.places.of_robot(chain.robot) for chain in team.chains}
     last = tuple(int(at[-1]) for at in mine.values())
-    solution = banded_solver.solve(
-        team.problem, team.start, last, tolerance=SETTLED if team.is_known else TOLERANCE
-    )
+    if tolerance is None:
+        tolerance = SETTLED if team.is_known else TOLERANCE
+    solution, kept = solve(team, last, tolerance, kept)
     learned, spread, doubted = solution.calibration, solution.spread, solution.doubted
     assert spread is not None
     paths = {
@@ -237,6 +279,8 @@ def _solve(team: TeamProblem, group: Group) -> TeamEstimate:
         # (a good one stays good, should the last digits not come to rest)
         converged=solution.converged or team.is_known,
         settled=team.is_known,
+        is_as_modelled=solution.is_explained and bool((solution.odometry_level <= 1).all()),
+        kept=kept,
     )
 
 

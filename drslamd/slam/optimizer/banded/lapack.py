@@ -1,4 +1,4 @@
-"""Two routines of LAPACK that let other threads run meanwhile.
+"""Routines of LAPACK that let other threads run meanwhile.
 
 scipy's own wrappers hold the interpreter: in a team of fifty one of their calls takes a tenth of a
 second, in which no sensor would be read. What they call is offered to Cython as well
@@ -48,6 +48,32 @@ def triangular_banded(lower: Array, columns: Array, transposed: bool = False) ->
     return solved
 
 
+def inverse_triangular(lower: Array) -> Array:
+    """(n, n) L^-1 of a lower triangular L (dtrtri); what stands above its diagonal is not read."""
+    inverse = np.tril(lower)
+    if not inverse.size:
+        return inverse
+    n, info = len(inverse), ctypes.c_int(0)
+    # rows of numpy are columns of LAPACK, so that it sees L', an upper triangle
+    _dtrtri(b"U", b"N", _int(n), _data(inverse), _int(n), ctypes.byref(info))
+    _check("dtrtri", info)
+    return inverse
+
+
+def cholesky_solved(lower: Array, columns: Array) -> Array:
+    """(L L')^-1 times columns (n, c), of a lower triangular L (n, n) (dpotrs)."""
+    solved = np.array(columns, dtype=np.float64, order="F")
+    n, count = solved.shape
+    if not solved.size:
+        return solved
+    factor = np.ascontiguousarray(lower, dtype=np.float64)
+    info = ctypes.c_int(0)
+    of_x = (_data(solved), _int(n), ctypes.byref(info))
+    _dpotrs(b"U", _int(n), _int(count), _data(factor), _int(n), *of_x)
+    _check("dpotrs", info)
+    return solved
+
+
 def _int(value: int) -> object:
     return ctypes.byref(ctypes.c_int(value))
 
@@ -75,3 +101,5 @@ def _routine(name: str, arguments: int) -> Callable[..., None]:
 
 _dpbtrf = _routine("dpbtrf", 6)
 _dtbtrs = _routine("dtbtrs", 11)
+_dtrtri = _routine("dtrtri", 6)
+_dpotrs = _routine("dpotrs", 8)

@@ -59,16 +59,38 @@ class BandLayout:
         place[apart] = count - len(apart) + np.arange(len(apart))
         both = inside[i] & inside[j]
         reach = int(np.abs(place[i] - place[j])[both].max(initial=0))
-        doubted = problem.doubted
+        return BandLayout.placed(
+            problem,
+            poses=3 * place[:, None] + np.arange(3),
+            band=3 * (count - len(apart)),
+            outside=3 * len(apart),
+            width=3 * reach + 3,
+        )
+
+    @staticmethod
+    def flat(problem: Problem) -> BandLayout:
+        """All poses in their order, then the constants; for vectors, a matrix would be full."""
+        count = len(problem.initial)
+        poses = np.arange(3 * count).reshape(-1, 3)
+        return BandLayout.placed(problem, poses, band=3 * count, outside=0, width=3 * count)
+
+    @staticmethod
+    def placed(problem: Problem, poses: Index, band: int, outside: int, width: int) -> BandLayout:
+        """
+        Args:
+            poses: (k, 3), `NOWHERE` for those that are no unknowns.
+            outside: how many of their unknowns are in the border; the constants follow.
+        """
+        robots, doubted = len(problem.priors.scale), problem.doubted
         turns, antennas = int(doubted.track.sum()), 2 * int(doubted.antenna.sum())
         sizes = [problem.pairs, robots, robots, 1, 1, turns, antennas]
-        numbers = 3 * count + np.arange(sum(sizes))
+        numbers = band + outside + np.arange(sum(sizes))
         *shared, turn, antenna = np.split(numbers, np.cumsum(sizes)[:-1])
         bias, scale, yaw, near_bias, team_bias = shared
         all_turns, all_antennas = np.full(robots, NOWHERE), np.full((robots, 2), NOWHERE)
         all_turns[doubted.track], all_antennas[doubted.antenna] = turn, antenna.reshape(-1, 2)
         return BandLayout(
-            poses=3 * place[:, None] + np.arange(3),
+            poses=poses,
             bias=bias,
             scale=scale,
             yaw=yaw,
@@ -76,9 +98,9 @@ class BandLayout:
             team_bias=team_bias,
             turn=all_turns,
             antenna=all_antennas,
-            band=3 * (count - len(apart)),
-            border=3 * len(apart) + sum(sizes),
-            width=3 * reach + 3,
+            band=band,
+            border=outside + sum(sizes),
+            width=width,
         )
 
     def odometry_unknowns(self, odometry: OdometryFactors) -> Index:
@@ -98,6 +120,24 @@ class BandLayout:
         carried = ranges.chosen(ranges.is_carried)
         constants = np.stack([self.yaw, self.scale], axis=-1)[carried.robots].reshape(-1, 4)
         return np.hstack([self.range_unknowns(carried), constants])
+
+    @property
+    def constants(self) -> Index:
+        """All unknowns that are no poses, in the order of their numbers."""
+        parts = (self.bias, self.scale, self.yaw, self.near_bias, self.team_bias)
+        numbers = np.concatenate([*parts, self.turn, self.antenna.ravel()])
+        return np.asarray(numbers[numbers != NOWHERE])
+
+    def vector(self, poses: Array, calibration: Calibration) -> Array:
+        """Over all unknowns, of poses (k, 3) and calibration: the inverse of `calibration`."""
+        out = np.zeros(self.band + self.border)
+        out[self.poses] = poses
+        names = ("bias", "scale", "yaw", "near_bias", "team_bias", "turn", "antenna")
+        for name in names:
+            numbers = getattr(self, name)
+            known = numbers != NOWHERE
+            out[numbers[known]] = getattr(calibration, name)[known]
+        return out
 
     def calibration(self, unknowns: Array) -> Calibration:
         """The part of a vector over all unknowns that belongs to the sensors."""

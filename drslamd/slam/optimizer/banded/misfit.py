@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.slam.optimizer.banded import linearised
-from drslamd.slam.optimizer.banded.band_factor import BandFactor
+from drslamd.slam.optimizer.banded.band_factor import BandFactor, Solver
 from drslamd.slam.optimizer.banded.layout import NOWHERE
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
@@ -92,7 +92,7 @@ def misfit(equations: Equations, point: Point, factor: BandFactor) -> Misfit:
     return Misfit(squares, 3 - np.einsum("kij,kji->k", information, covariance))
 
 
-def guessed_misfit(equations: Equations, point: Point, factor: BandFactor) -> Misfit:
+def guessed_misfit(equations: Equations, point: Point, factor: Solver) -> Misfit:
     """Several times faster, and good for sums over many links (Hutchinson's estimate).
 
     The signs are the same for everybody who has the same problem.

@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drslamd.slam.optimizer.banded import linearised
-from drslamd.slam.optimizer.banded.band_factor import BandFactor
+from drslamd.slam.optimizer.banded.band_factor import BandFactor, Solver
 from drslamd.slam.optimizer.banded.layout import NOWHERE
 from drslamd.slam.optimizer.banded.linearised import Linearised
 from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
-from drslamd.slam.optimizer.problem import Doubted
+from drslamd.slam.optimizer.problem import Doubted, Problem
 from drslamd.slam.se2 import Array, Index
 
 ASKED_FOR = 30.0
@@ -28,6 +28,8 @@ ASKED_FOR = 30.0
 bearing; a track or an antenna that is far off scores 65 to 400."""
 WITHOUT_DATA = 0.1
 """Sigma, a fraction or m, that a score takes for granted; what moves no error scores nothing."""
+FIRST = 8
+"""Of the columns of a factor's Jacobian, that of its first mounting."""
 ROUNDS = 4
 """Of letting go: one that is far off hides others."""
 
@@ -44,69 +46,81 @@ class Scores:
         return bool((np.append(self.track, self.antenna) > ASKED_FOR).any())
 
 
-def scores(equations: Equations, point: Point, factor: BandFactor) -> Scores:
+def scores(equations: Equations, point: Point, factor: Solver) -> Scores:
     """What the cost would lose with each mounting let go, at the solution without; 0 of those that
     are unknowns already.
 
     Args:
         factor: of the system at that point.
     """
+    problem = equations.problem
+    left = variances(equations, point, factor)
+    if left is None:
+        robots = len(problem.priors.scale)
+        return Scores(np.zeros(robots), np.zeros(robots))
+    return scored(problem, pulls(equations, point), left)
+
+
+def scored(problem: Problem, pull: Array, left: Array) -> Scores:
+    """
+    Args:
+        pull: (3 R,) f, see `pulls`; left: (3 R, 3 R) V, see `variances`.
+    """
+    robots, doubted = len(problem.priors.scale), problem.doubted
+    track = pull[:robots] ** 2 / np.diag(left)[:robots]
+    pairs = robots + np.arange(2 * robots).reshape(-1, 2)
+    blocks = left[pairs[:, :, None], pairs[:, None, :]]
+    moved = np.linalg.solve(blocks, pull[pairs][..., None])[..., 0]
+    antenna = (pull[pairs] * moved).sum(axis=1)
+    return Scores(np.where(doubted.track, 0.0, track), np.where(doubted.antenna, 0.0, antenna))
+
+
+def variances(equations: Equations, point: Point, factor: Solver) -> Array | None:
+    """(3 R, 3 R) V of the turns of R robots, then of their antennas; None where it is unknown."""
+    layout, robots = equations.layout, len(equations.problem.priors.scale)
+    columns = 3 * robots
+    coupling, own = np.zeros((layout.band + layout.border, columns)), np.zeros((columns, columns))
+    for factors, unknowns, which in _parts(equations, point):
+        mine = factors.jacobian[:, :, FIRST : FIRST + which.shape[1]]
+        weighed = np.swapaxes(mine, 1, 2) @ factors.information
+        is_unknown = (unknowns != NOWHERE)[:, None, :]
+        shared = np.where(is_unknown, weighed @ factors.jacobian, 0.0)
+        at = np.where(is_unknown, unknowns[:, None, :], 0) * columns + which[:, :, None]
+        coupling += np.bincount(at.ravel(), shared.ravel(), coupling.size).reshape(coupling.shape)
+        both = which[:, :, None] * columns + which[:, None, :]
+        own += np.bincount(both.ravel(), (weighed @ mine).ravel(), own.size).reshape(own.shape)
+    solved = factor.solved(coupling)
+    if solved is None:
+        return None
+    return np.asarray(own - coupling.T @ solved + WITHOUT_DATA**-2 * np.eye(columns))
+
+
+def pulls(equations: Equations, point: Point) -> Array:
+    """(3 R,) f, likewise."""
+    pull = np.zeros(3 * len(equations.problem.priors.scale))
+    for factors, _, which in _parts(equations, point):
+        mine = factors.jacobian[:, :, FIRST : FIRST + which.shape[1]]
+        each = (factors.pull[:, None, :] @ mine)[:, 0]
+        pull += np.bincount(which.ravel(), each.ravel(), len(pull))
+    return pull
+
+
+def _parts(equations: Equations, point: Point) -> tuple[tuple[Linearised, Index, Index], ...]:
+    """Factors, their unknowns, and the columns (m, k) of their mountings."""
     problem, layout = equations.problem, equations.layout
     robots = len(problem.priors.scale)
-    ones = np.ones(problem.pairs)
-    ranges = linearised.weighed_ranges(problem, point, ones)
+    ranges = linearised.weighed_ranges(problem, point, np.ones(problem.pairs))
     odometry = linearised.odometry_at(problem, point)
     # by robot: turns are columns 0 .. R - 1, antennas the 2 R behind them
     antennas = (robots + 2 * problem.ranges.robots[:, :, None] + np.arange(2)).reshape(-1, 4)
     is_carried = problem.ranges.is_carried
     plain = layout.range_unknowns(problem.ranges.chosen(~is_carried))
     carried = linearised.carried_part(problem, point, ranges)
-    parts = (
-        (odometry, layout.odometry_unknowns(problem.odometry), problem.odometry.robot[:, None], 8),
-        (ranges.chosen(~is_carried), plain, antennas[~is_carried], 8),
-        (carried, layout.carried_unknowns(problem.ranges), antennas[is_carried], 8),
+    return (
+        (odometry, layout.odometry_unknowns(problem.odometry), problem.odometry.robot[:, None]),
+        (ranges.chosen(~is_carried), plain, antennas[~is_carried]),
+        (carried, layout.carried_unknowns(problem.ranges), antennas[is_carried]),
     )
-    size, columns = layout.band + layout.border, 3 * robots
-    coupling, own, pull = np.zeros((size, columns)), np.zeros((columns, columns)), np.zeros(columns)
-    for factors, unknowns, which, first in parts:
-        _add(coupling, own, pull, factors, unknowns, which, first)
-    solved = factor.solved(coupling)
-    if solved is None:
-        return Scores(np.zeros(robots), np.zeros(robots))
-    left = own - coupling.T @ solved + WITHOUT_DATA**-2 * np.eye(columns)
-    track = pull[:robots] ** 2 / np.diag(left)[:robots]
-    pairs = robots + np.arange(2 * robots).reshape(-1, 2)
-    blocks = left[pairs[:, :, None], pairs[:, None, :]]
-    moved = np.linalg.solve(blocks, pull[pairs][..., None])[..., 0]
-    antenna = (pull[pairs] * moved).sum(axis=1)
-    doubted = problem.doubted
-    return Scores(np.where(doubted.track, 0.0, track), np.where(doubted.antenna, 0.0, antenna))
-
-
-def _add(
-    coupling: Array,
-    own: Array,
-    pull: Array,
-    factors: Linearised,
-    unknowns: Index,
-    which: Index,
-    first: int,
-) -> None:
-    """Add J' W J_m, J_m' W J_m and J_m' f of some factors.
-
-    Args:
-        which: (m, k) columns of their mountings; in their Jacobian these are `first` and following.
-    """
-    mine = factors.jacobian[:, :, first : first + which.shape[1]]
-    weighed = np.swapaxes(mine, 1, 2) @ factors.information
-    is_unknown = (unknowns != NOWHERE)[:, None, :]
-    shared = np.where(is_unknown, weighed @ factors.jacobian, 0.0)
-    at = np.where(is_unknown, unknowns[:, None, :], 0) * coupling.shape[1] + which[:, :, None]
-    coupling += np.bincount(at.ravel(), shared.ravel(), coupling.size).reshape(coupling.shape)
-    both = which[:, :, None] * len(own) + which[:, None, :]
-    own += np.bincount(both.ravel(), (weighed @ mine).ravel(), own.size).reshape(own.shape)
-    each = (factors.pull[:, None, :] @ mine)[:, 0]
-    pull += np.bincount(which.ravel(), each.ravel(), len(pull))
 
 
 def let_go(doubted: Doubted, found: Scores) -> Doubted:

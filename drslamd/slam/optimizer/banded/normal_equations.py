@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -65,34 +66,48 @@ class _Assembly:
         Args:
             unknowns: (m, c) on which each factor depends.
         """
-        n, b = layout.band, layout.border
+        self._layout = layout
         # the mountings come last, and most often none of them is an unknown
         self._columns = int(np.flatnonzero((unknowns != NOWHERE).any(axis=0)).max(initial=-1)) + 1
-        unknowns = unknowns[:, : self._columns]
+        self._unknowns = unknowns[:, : self._columns]
+
+    @cached_property
+    def _places(self) -> tuple[tuple[Index, Index], ...]:
+        """Of the entries of all blocks: which are in band, border and corner, and where."""
+        n, b, unknowns = self._layout.band, self._layout.border, self._unknowns
         shape = (*unknowns.shape, unknowns.shape[1])
         row = np.broadcast_to(unknowns[:, :, None], shape).ravel()
         column = np.broadcast_to(unknowns[:, None, :], shape).ravel()
-        self._known = np.flatnonzero(unknowns.ravel() != NOWHERE)
-        self._unknowns = unknowns.ravel()[self._known]
-        self._in_band = np.flatnonzero((row >= column) & (row < n) & (column != NOWHERE))
-        self._in_border = np.flatnonzero((row < n) & (row != NOWHERE) & (column >= n))
-        self._in_corner = np.flatnonzero((row >= n) & (column >= n))
-        self._band = ((row - column) * n + column)[self._in_band]
-        self._border = (row * b + column - n)[self._in_border]
-        self._corner = ((row - n) * b + column - n)[self._in_corner]
+        in_band = np.flatnonzero((row >= column) & (row < n) & (column != NOWHERE))
+        in_border = np.flatnonzero((row < n) & (row != NOWHERE) & (column >= n))
+        in_corner = np.flatnonzero((row >= n) & (column >= n))
+        return (
+            (in_band, ((row - column) * n + column)[in_band]),
+            (in_border, (row * b + column - n)[in_border]),
+            (in_corner, ((row - n) * b + column - n)[in_corner]),
+        )
+
+    @cached_property
+    def _entries(self) -> tuple[Index, Index]:
+        """The same of their right-hand sides."""
+        unknowns = self._unknowns.ravel()
+        known = np.flatnonzero(unknowns != NOWHERE)
+        return known, unknowns[known]
 
     def add_matrix(self, system: System, factors: Linearised) -> None:
         """Add J' W J."""
         jacobian = factors.jacobian[:, :, : self._columns]
         blocks = (np.swapaxes(jacobian, 1, 2) @ (factors.information @ jacobian)).ravel()
-        system.band += _sums(self._band, blocks[self._in_band], system.band)
-        system.border += _sums(self._border, blocks[self._in_border], system.border)
-        system.corner += _sums(self._corner, blocks[self._in_corner], system.corner)
+        parts = (system.band, system.border, system.corner)
+        for part, (which, at) in zip(parts, self._places, strict=True):
+            if len(at):
+                part += _sums(at, blocks[which], part)
 
     def add_gradient(self, gradient: Array, factors: Linearised) -> None:
         """Add J' f."""
+        known, at = self._entries
         each = (factors.pull[:, None, :] @ factors.jacobian[:, :, : self._columns]).ravel()
-        gradient += _sums(self._unknowns, each[self._known], gradient)
+        gradient += _sums(at, each[known], gradient)
 
 
 def _sums(at: Index, values: Array, like: Array) -> Array:
@@ -137,14 +152,21 @@ class _Where:
 class Equations:
     """The normal equations of one problem, at any point."""
 
-    def __init__(self, problem: Problem, like: Equations | None = None) -> None:
+    def __init__(
+        self, problem: Problem, like: Equations | None = None, layout: BandLayout | None = None
+    ) -> None:
         """
         Args:
             like: of a problem with the same factors and unknowns, whatever it believes of them.
+            layout: where it is not one of the whole problem.
         """
         self.problem = problem
-        self.layout: BandLayout = like.layout if like else BandLayout.of(problem)
-        self._where: _Where = like._where if like else _Where.of(problem, self.layout)
+        self.layout: BandLayout = layout or (like.layout if like else BandLayout.of(problem))
+        self._like = like
+
+    @cached_property
+    def _where(self) -> _Where:
+        return self._like._where if self._like else _Where.of(self.problem, self.layout)
 
     def cost(self, point: Point, threshold: Array) -> float:
         """Of all factors and priors.
@@ -170,7 +192,7 @@ class Equations:
         gradient = np.zeros(self.layout.band + self.layout.border)
         for where, factors in self._factors(point, LEAST_CURVATURE):
             where.add_gradient(gradient, factors)
-        self._add_pull_of_priors(gradient, point)
+        self.add_pull_of_priors(gradient, point)
         return gradient
 
     def at(self, point: Point, least: float = LEAST_CURVATURE) -> tuple[System, Array]:
@@ -184,9 +206,9 @@ class Equations:
         for where, factors in self._factors(point, least):
             where.add_matrix(system, factors)
             where.add_gradient(gradient, factors)
-        self._add_heavy_priors(system, point.calibration, least)
-        self._add_gaussian_priors(system)
-        self._add_pull_of_priors(gradient, point)
+        self.add_heavy_priors(system, point.calibration, least)
+        self.add_gaussian_priors(system)
+        self.add_pull_of_priors(gradient, point)
         return system, gradient
 
     def claimed(self, point: Point, claims: Array) -> System:
@@ -198,14 +220,19 @@ class Equations:
         Args:
             claims: see `linearised.weighed_ranges`.
         """
+        system = self.factors_weighed(point, claims)
+        self.add_gaussian_priors(system)
+        self.add_claimed_priors(system, point.calibration)
+        return system
+
+    def add_claimed_priors(self, system: System, calibration: Calibration) -> None:
+        """Those that are wider, or of another shape, than what makes a good estimate."""
         layout, priors = self.layout, self.problem.priors
-        system = self._weighed(point, claims)
         system.add_prior(layout.bias, priors.bias.sigma**-2)
         system.add_prior(layout.team_bias, priors.bias.sigma**-2)
         system.add_prior(layout.scale, priors.scale**-2.0)
-        system.add_prior(layout.yaw, priors.yaw_claim(point.calibration.yaw))
-        self._add_mounting_priors(system, point.calibration, LEAST_CURVATURE)
-        return system
+        system.add_prior(layout.yaw, priors.yaw_claim(calibration.yaw))
+        self._add_mounting_priors(system, calibration, LEAST_CURVATURE)
 
     def bias_belief(self, point: Point) -> Array:
         """(b, b) what the border gains where biases are as believed instead of as claimed."""
@@ -219,11 +246,13 @@ class Equations:
     def weighed(self, point: Point) -> System:
         """What the factors say by their weights: what is left of an outlier's counts still."""
         claims = np.ones(self.problem.pairs)
-        system = self._weighed(point, claims)
-        self._add_heavy_priors(system, point.calibration, LEAST_CURVATURE)
+        system = self.factors_weighed(point, claims)
+        self.add_gaussian_priors(system)
+        self.add_heavy_priors(system, point.calibration, LEAST_CURVATURE)
         return system
 
-    def _weighed(self, point: Point, claims: Array) -> System:
+    def factors_weighed(self, point: Point, claims: Array) -> System:
+        """What the factors alone say by weights and claims."""
         problem = self.problem
         system = System.empty(self.layout)
         self._where.odometry.add_matrix(system, linearised.odometry_at(problem, point))
@@ -232,7 +261,6 @@ class Equations:
         ranges = linearised.weighed_ranges(problem, point, claims)
         for where, factors in self._where.of_ranges(problem, point, ranges):
             where.add_matrix(system, factors)
-        self._add_gaussian_priors(system)
         return system
 
     def _factors(self, point: Point, least: float) -> Iterator[tuple[_Assembly, Linearised]]:
@@ -243,7 +271,8 @@ class Equations:
         ranges = linearised.ranges_at(problem, point, least)
         yield from self._where.of_ranges(problem, point, ranges)
 
-    def _add_heavy_priors(self, system: System, calibration: Calibration, least: float) -> None:
+    def add_heavy_priors(self, system: System, calibration: Calibration, least: float) -> None:
+        """Those with heavy tails, of the constants of sensors."""
         layout, priors = self.layout, self.problem.priors
         self._add_bias_prior(system, calibration, least)
         system.add_prior(layout.scale, priors.scale_curvature(calibration.scale, least))
@@ -265,12 +294,14 @@ class Equations:
         ):
             system.add_blocks(numbers, prior.curvature(values, least))
 
-    def _add_gaussian_priors(self, system: System) -> None:
+    def add_gaussian_priors(self, system: System) -> None:
+        """Those of the gauge and of the near-range bias, which never change."""
         layout, priors = self.layout, self.problem.priors
         system.add_prior(layout.near_bias, priors.near_bias**-2.0)
         system.add_prior(layout.poses[self.problem.gauge], GAUGE_SIGMA**-2)
 
-    def _add_pull_of_priors(self, gradient: Array, point: Point) -> None:
+    def add_pull_of_priors(self, gradient: Array, point: Point) -> None:
+        """Half the derivative of what all priors cost."""
         layout, problem, calibration = self.layout, self.problem, point.calibration
         priors, gauge = problem.priors, problem.gauge
         team = float(calibration.team_bias[0])

@@ -286,7 +286,13 @@ def test_what_is_old_is_made_anew_only_when_time_steps_or_something_comes_late()
     at = [p.stretch.first <= 9_003 < p.stretch.end for p in late.parts]
     assert changed == at
     stepped = thinning.view(data, 121, RECENT_S)
-    assert [p.stretch.level for p in stepped.parts] == [3, 2, 1, 0]
+    assert [p.stretch.kind for p in stepped.parts] == [
+        (3, False),
+        (2, False),
+        (1, False),
+        (0, False),
+        (0, True),
+    ]
     assert stepped.parts[0] is late.parts[0]
 
 

@@ -15,6 +15,7 @@ from drslamd.slam.graph.thinning.time_cells import (
     ages,
     recent_s,
     stretches,
+    with_edge,
 )
 from drslamd.slam.graph.timed_rows import NEVER
 
@@ -135,3 +136,14 @@ def test_who_is_late_by_more_than_the_lag_goes_by_its_own_time(late: int, step: 
 def test_a_robot_without_a_keyframe_has_no_age() -> None:
     assert ages({}, [{0: 0.0}]) == {}
     assert ages({1: at(9)}, [{0: 0.0, 1: 0.0}]) == {1: 9 - LAG_STEPS}
+
+
+def test_the_oldest_half_minute_that_stays_whole_is_a_stretch_of_its_own() -> None:
+    found = stretches(100, RECENT_S)
+    newest, edge, *old = with_edge(found)
+    assert (newest.level, newest.end, edge.level) == (0, NEVER, 0)
+    assert (edge.first, edge.end, newest.first) == (found[0].first, newest.first, edge.first + 320)
+    assert old == found[1:]
+    assert len({s.kind for s in (newest, edge, *old)}) == 2 + len(old)
+    # while nothing is old there is no edge
+    assert with_edge(stretches(3, RECENT_S)) == stretches(3, RECENT_S)

@@ -1,0 +1,8 @@
+"""One more second of a team that is solved already: most of it is as it was.
+
+Entry: `kept_solver.KeptSolver.solve`. `elimination` takes a system apart in dense blocks;
+`kept_factor` keeps what the old part of a team's system came to, and takes the newest seconds up
+anew each time. That is no longer the system of where the team is, but near it, so `fixed_point`
+steps by it down the exact gradient, to the same solution. `quick_check` sees whether all is as
+modelled, and `kept_claims` how sure it is. Whatever does not fit goes to `banded.banded_solver`.
+"""

@@ -1,0 +1,167 @@
+"""Gaussian elimination of a band with a border in dense blocks, as far as is wanted.
+
+Set by set, with K the unknowns of a set, R those below them that they reach, B the border:
+
+    A_KK = L L'    G = A_RK L'^-1    V = L^-1 A_KB
+    A_RR -= G G'   A_RB -= G V       A_BB -= V' V
+
+Dense blocks go through the processor many times faster than diagonals of a band, and each is as
+high as its unknowns reach: recent times, which are the most, reach less far than thinned ones.
+What is left at the end is the system of the unknowns that stay, and can be taken up again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
+
+from drslamd.slam import headway
+from drslamd.slam.optimizer.banded.lapack import inverse_triangular
+from drslamd.slam.optimizer.banded.normal_equations import System
+from drslamd.slam.se2 import Array, Index
+
+LEAST_COLUMNS, MOST_COLUMNS = 48, 192
+"""Of a block: fewer leave the processor idle, more do work that the band would not need."""
+
+
+@dataclass(frozen=True)
+class Elimination:
+    """Unknowns that were eliminated together.
+
+    Attributes:
+        own, below: their numbers (c,), and those (r,) of the unknowns that they reach.
+        inverse: (c, c) L^-1; gain: (r, c) G; aside: (c, b) V, of the border as it was then.
+    """
+
+    own: Index | slice
+    below: Index | slice
+    inverse: Array
+    gain: Array
+    aside: Array
+
+    def forward(self, inner: Array, outer: Array) -> None:
+        """The way of right-hand sides inner (n, ...) and of the border, outer (b, ...), down."""
+        inner[self.own] = own = self.inverse @ inner[self.own]
+        inner[self.below] -= self.gain @ own
+        outer[: self.aside.shape[1]] -= self.aside.T @ own
+
+    def backward(self, inner: Array, outer: Array) -> None:
+        """And back up, with what lies below known."""
+        known = self.gain.T @ inner[self.below] + self.aside @ outer[: self.aside.shape[1]]
+        inner[self.own] = self.inverse.T @ (inner[self.own] - known)
+
+
+@dataclass(frozen=True)
+class Rest:
+    """A symmetric system of f unknowns and of the border.
+
+    Attributes:
+        matrix: (f, f); border: (f, b); corner: (b, b).
+    """
+
+    matrix: Array
+    border: Array
+    corner: Array
+
+    def without(self, own: Index, below: Index, numbers: Index) -> tuple[Elimination, Rest] | None:
+        """Some of its unknowns eliminated; None where it is not positive definite.
+
+        Args:
+            own, below: places of those (c,), and of those (f - c,) that stay.
+            numbers: (f,) of all of them.
+        """
+        parts = _eliminated(
+            self.matrix[np.ix_(own, own)], self.matrix[np.ix_(below, own)], self.border[own]
+        )
+        if parts is None:
+            return None
+        _, gain, aside = parts
+        left = Rest(
+            self.matrix[np.ix_(below, below)] - gain @ gain.T,
+            self.border[below] - gain @ aside,
+            self.corner - aside.T @ aside,
+        )
+        return Elimination(numbers[own], numbers[below], *parts), left
+
+
+def eliminated(system: System, count: int) -> tuple[list[Elimination], Rest] | None:
+    """The first `count` unknowns of the band, in its order; None where they cannot be.
+
+    What is left are the other unknowns of the band, then the border.
+    """
+    band, border = system.band, system.border
+    n, b = border.shape
+    ends = _ends(band)
+    blocks: list[Elimination] = []
+    asides = np.empty((count, b))
+    carried, carried_border, at = np.zeros((0, 0)), np.zeros((0, b)), 0
+    while at < count:
+        headway.mark()
+        columns = int(np.clip(ends[at] - at, LEAST_COLUMNS, MOST_COLUMNS))
+        columns = min(columns, count - at)
+        end = max(int(ends[at + columns - 1]), at + len(carried))
+        window, beside = _window(band, border, at, columns, end, carried, carried_border)
+        parts = _eliminated(
+            window[:columns, :columns], window[columns:, :columns], beside[:columns]
+        )
+        if parts is None:
+            return None
+        inverse, gain, aside = parts
+        asides[at : at + columns] = aside
+        own, below = slice(at, at + columns), slice(at + columns, end)
+        blocks.append(Elimination(own, below, inverse, gain, asides[own]))
+        carried = window[columns:, columns:] - gain @ gain.T
+        carried_border = beside[columns:] - gain @ aside
+        at += columns
+    window, beside = _window(band, border, count, n - count, n, carried, carried_border)
+    matrix = np.tril(window)
+    matrix += np.tril(matrix, -1).T
+    return blocks, Rest(matrix, beside, system.corner - asides.T @ asides)
+
+
+def _eliminated(own: Array, below: Array, border: Array) -> tuple[Array, Array, Array] | None:
+    """L^-1, G and V."""
+    try:
+        inverse = inverse_triangular(np.linalg.cholesky(own))
+    except np.linalg.LinAlgError:
+        return None
+    return inverse, below @ inverse.T, inverse @ border
+
+
+def _ends(band: Array) -> Index:
+    """(n,) the row behind the last one that a column reaches, itself or through those before."""
+    width, n = band.shape
+    reach = width - np.argmax(band[::-1] != 0, axis=0) if n else np.zeros(0, dtype=np.int64)
+    return np.minimum(np.maximum.accumulate(np.arange(n) + reach), n)
+
+
+def _window(
+    band: Array,
+    border: Array,
+    at: int,
+    columns: int,
+    end: int,
+    carried: Array,
+    carried_border: Array,
+) -> tuple[Array, Array]:
+    """Rows at .. end - 1 of the system, what was carried to them included.
+
+    Only the first columns are there in full, below the diagonal; the others are what was carried.
+    """
+    width, size = len(band), end - at
+    dense = np.zeros((width + columns, columns))
+    if columns:
+        # each diagonal of the band is one column of a sheared view
+        step = dense.strides[0], dense.strides[0] + dense.strides[1]
+        as_strided(dense, (width, columns), step)[:] = band[:, at : at + columns]
+    window = np.zeros((size, size))
+    height = min(size, len(dense))
+    window[:height, :columns] = dense[:height]
+    known = min(len(carried), size)
+    window[:known, :known] += carried[:known, :known]
+    beside = np.zeros((size, border.shape[1]))
+    beside[:columns] = border[at : at + columns]
+    beside[:known] += carried_border[:known]
+    return window, beside

@@ -1,0 +1,46 @@
+"""How sure the solution is, from a kept factor of the system that may be claimed (`claims`)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drslamd.slam.optimizer.banded.claims import UNKNOWN
+from drslamd.slam.optimizer.banded.lapack import cholesky_solved, inverse_triangular
+from drslamd.slam.optimizer.banded.layout import NOWHERE
+from drslamd.slam.optimizer.banded.normal_equations import Equations
+from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.kept.kept_factor import Current
+from drslamd.slam.optimizer.problem import Problem
+from drslamd.slam.optimizer.sensor_priors import Calibration
+from drslamd.slam.se2 import Array, Index
+
+
+def kept_covariances(
+    problem: Problem, point: Point, claimed: Current, wanted: Index
+) -> tuple[Array, Calibration] | None:
+    """See `claims.covariances`; None where it is for that to say.
+
+    Args:
+        claimed: of a problem whose odometry is believed as far as it should be.
+        wanted: (k,) poses that are not eliminated.
+    """
+    layout, lower = claimed.layout, claimed.lower
+    at = layout.poses[wanted].ravel()
+    if (at == NOWHERE).any():
+        return None
+    unit = np.zeros((len(lower), len(at)))
+    unit[at, np.arange(len(at))] = 1
+    joint = cholesky_solved(lower, unit)[at]
+    first = len(lower) - len(claimed.places.flat.constants)
+    own = lower[first:, first:]
+    belief = Equations(problem, layout=layout).bias_belief(point)[first:, first:]
+    try:
+        learned = inverse_triangular(np.linalg.cholesky(own @ own.T + belief))
+    except np.linalg.LinAlgError:
+        return None
+    sigmas = np.full(len(lower), np.sqrt(UNKNOWN))
+    sigmas[first:] = np.sqrt((learned**2).sum(axis=0))
+    squares = np.diag(joint)
+    if not (np.isfinite(squares) & (squares > 0) & (squares < UNKNOWN)).all():
+        return None
+    return (joint + joint.T) / 2, layout.calibration(sigmas)

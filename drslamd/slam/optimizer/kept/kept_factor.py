@@ -1,0 +1,253 @@
+"""What the old part of a team's system came to, and the newest seconds on top of it.
+
+The head are all poses but those of the newest seconds. Most of its poses are eliminated once, from
+the factors between them at the point of that time; what is left is the rest: the front, which the
+newest seconds hang on, and the border. Each second the tail and the priors are added to the rest
+as they are now, and tails that grew are eliminated in their turn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drslamd.slam.optimizer.banded.lapack import cholesky_solved
+from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout, border_poses
+from drslamd.slam.optimizer.banded.normal_equations import Equations, System
+from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
+from drslamd.slam.optimizer.kept.elimination import Elimination, Rest, eliminated
+from drslamd.slam.optimizer.kept.head import Flags, Head, Pair, Places, keys_of, tail_of
+from drslamd.slam.optimizer.problem import Problem, RangeErrors
+from drslamd.slam.se2 import Array, Index
+
+
+@dataclass(frozen=True)
+class Believed:
+    """A problem at a point, and how much is believed of it: what a system is made of.
+
+    Attributes:
+        claims: (pairs,) for `Equations.claimed`; None for `Equations.weighed`.
+    """
+
+    problem: Problem
+    point: Point
+    claims: Array | None = None
+
+    def of_factors(self, which: Flags, layout: BandLayout, priors: bool) -> System:
+        """What some factors add.
+
+        Args:
+            which: (all,) of odometry, closures and ranges, in this order.
+            priors: also those that never change?
+        """
+        problem = self.problem
+        cuts = np.cumsum([len(problem.odometry), len(problem.closures)])
+        odometry, closures, ranges = np.split(which, cuts)
+        some = replace(
+            problem,
+            odometry=problem.odometry.chosen(odometry),
+            closures=problem.closures.chosen(closures),
+            ranges=problem.ranges.chosen(ranges),
+        )
+        sight = RangeErrors(*(column[ranges] for column in self.point.sight))
+        point = replace(self.point, link=self.point.link[odometry], sight=sight)
+        equations = Equations(some, layout=layout)
+        claims = np.ones(problem.pairs) if self.claims is None else self.claims
+        system = equations.factors_weighed(point, claims)
+        if priors:
+            equations.add_gaussian_priors(system)
+        return system
+
+    def add_priors(self, system: System, layout: BandLayout) -> None:
+        """Those that depend on where the constants are."""
+        equations = Equations(self.problem, layout=layout)
+        calibration = self.point.calibration
+        if self.claims is None:
+            equations.add_heavy_priors(system, calibration, LEAST_CURVATURE)
+        else:
+            equations.add_claimed_priors(system, calibration)
+
+
+def ends_of(problem: Problem) -> tuple[Index, Index]:
+    """(all,) both poses of the factors of odometry, closures and ranges, in this order."""
+    factors = (problem.odometry, problem.closures, problem.ranges)
+    return np.concatenate([f.i for f in factors]), np.concatenate([f.j for f in factors])
+
+
+@dataclass(frozen=True)
+class KeptFactor:
+    """
+    Attributes:
+        blocks: what was eliminated, in this order; none where solutions are not wanted.
+        rest: of the front and the border.
+    """
+
+    head: Head
+    blocks: tuple[Elimination, ...]
+    rest: Rest
+
+    def on_top(self, believed: Believed, places: Places) -> Current | None:
+        """With the tail of a problem, at its point; None where that is not positive definite."""
+        problem = believed.problem
+        layout, numbers = places.dense(places.tail)
+        i, j = ends_of(problem)
+        is_tail = np.zeros(len(problem.n), dtype=bool)
+        is_tail[places.tail] = True
+        system = believed.of_factors(is_tail[i] | is_tail[j], layout, priors=False)
+        believed.add_priors(system, layout)
+        _add(system.corner, self.rest, 3 * len(places.tail))
+        try:
+            lower = np.linalg.cholesky(system.corner)
+        except np.linalg.LinAlgError:
+            return None
+        return Current(self, places, layout, numbers, lower)
+
+    def grown(self, believed: Believed, places: Places) -> KeptFactor | None:
+        """With all but the newest poses of the tail in the head as well, at that point."""
+        problem = believed.problem
+        more = places.tail[~tail_of(problem)[places.tail]]
+        layout, numbers = places.dense(more)
+        is_head = np.zeros(len(problem.n), dtype=bool)
+        is_head[np.concatenate([places.inside, places.far, more])] = True
+        is_more = np.zeros(len(problem.n), dtype=bool)
+        is_more[more] = True
+        i, j = ends_of(problem)
+        which = is_head[i] & is_head[j] & (is_more[i] | is_more[j])
+        system = believed.of_factors(which, layout, priors=False)
+        _add(system.corner, self.rest, 3 * len(more))
+        apart = np.concatenate([places.front, more])
+        needed = _needed(problem, is_head)[apart]
+        count = len(self.head.keys)
+        numbers = np.concatenate([self.head.front, count + np.arange(len(more))])
+        size = 3 * len(apart)
+        whole = Rest(
+            system.corner[:size, :size], system.corner[:size, size:], system.corner[size:, size:]
+        )
+        parts = whole.without(_three(~needed), _three(needed), _unknowns(numbers))
+        if parts is None:
+            return None
+        block, rest = parts
+        head = replace(
+            places.head,
+            keys=np.concatenate([self.head.keys, keys_of(problem)[more]]),
+            front=numbers[needed],
+        )
+        return KeptFactor(head, (*self.blocks, block) if self.blocks else (), rest)
+
+
+def _add(corner: Array, rest: Rest, tail: int) -> None:
+    """Add a rest to the system of front, tail and border, whose border may be larger."""
+    f, b = rest.border.shape
+    corner[:f, :f] += rest.matrix
+    outer = slice(f + tail, f + tail + b)
+    corner[:f, outer] += rest.border
+    corner[outer, :f] += rest.border.T
+    corner[outer, outer] += rest.corner
+
+
+def _three(which: Flags) -> Index:
+    """Numbers of the unknowns of those poses."""
+    return np.flatnonzero(np.repeat(which, 3))
+
+
+def _unknowns(poses: Index) -> Index:
+    return np.asarray((3 * poses[:, None] + np.arange(3)).ravel())
+
+
+def _newest(problem: Problem) -> Flags:
+    """(k,) the last pose of each robot."""
+    found = np.zeros(len(problem.n), dtype=bool)
+    backwards = problem.robot[::-1]
+    found[len(found) - 1 - np.unique(backwards, return_index=True)[1]] = True
+    return found
+
+
+def _needed(problem: Problem, is_head: Flags) -> Flags:
+    """(k,) poses of the head that others hang on, or will: a robot may stand on its newest."""
+    i, j = ends_of(problem)
+    across = is_head[i] != is_head[j]
+    needed = _newest(problem)
+    needed[i[across]] = needed[j[across]] = True
+    return needed & is_head
+
+
+def build(
+    believed: Believed, pairs: list[Pair], tail: Flags, with_blocks: bool
+) -> KeptFactor | None:
+    """Eliminate the head at the point where it is; None where that is not positive definite.
+
+    Args:
+        tail: (k,) the poses that are not in it.
+    """
+    problem = believed.problem
+    is_head = ~tail
+    i, j = ends_of(problem)
+    which = is_head[i] & is_head[j]
+    needed = _needed(problem, is_head)
+    # in the order of time, what is needed last
+    inside = np.concatenate([np.flatnonzero(is_head & ~needed), np.flatnonzero(needed)])
+    place = np.full(len(problem.n), NOWHERE)
+    place[inside] = np.arange(len(inside))
+    narrow = 8 + 4 * len(problem.priors.scale)
+    far = inside[border_poses(place[i[which]], place[j[which]], narrow)]
+    inside = inside[~np.isin(inside, far)]
+    place = np.full(len(problem.n), NOWHERE)
+    place[inside] = np.arange(len(inside))
+    both = which & (place[i] != NOWHERE) & (place[j] != NOWHERE)
+    reach = int(np.abs(place[i] - place[j])[both].max(initial=0))
+    place[far] = len(inside) + np.arange(len(far))
+    poses = np.where(place[:, None] == NOWHERE, NOWHERE, 3 * place[:, None] + np.arange(3))
+    layout = BandLayout.placed(problem, poses, 3 * len(inside), 3 * len(far), 3 * reach + 3)
+    system = believed.of_factors(which, layout, priors=True)
+    front = int(np.count_nonzero(needed[inside]))
+    parts = eliminated(system, 3 * (len(inside) - front))
+    if parts is None:
+        return None
+    blocks, rest = parts
+    keys = keys_of(problem)
+    head = Head(
+        keys=keys[inside],
+        front=np.arange(len(inside) - front, len(inside)),
+        far=keys[far],
+        pairs=tuple(pairs),
+        paired=len(pairs),
+        doubted=problem.doubted,
+    )
+    return KeptFactor(head, tuple(blocks) if with_blocks else (), rest)
+
+
+@dataclass(frozen=True)
+class Current:
+    """A kept factor with the tail of a problem on top.
+
+    Attributes:
+        layout: of front, tail and border; numbers: in `places.flat`.
+        lower: (m, m) Cholesky's factor of these.
+    """
+
+    kept: KeptFactor
+    places: Places
+    layout: BandLayout
+    numbers: Index
+    lower: Array
+
+    def solved(self, right: Array) -> Array:
+        """For right-hand sides (n,) or (n, c) in the order of `BandLayout.flat`."""
+        columns = right.reshape(len(right), -1)
+        inside = self.places.flat.poses[self.places.inside].ravel()
+        inner, outer = columns[inside], columns[self.places.outer]
+        for block in self.kept.blocks:
+            block.forward(inner, outer)
+        top = columns[self.numbers]
+        front, border = _unknowns(self.kept.head.front), len(self.places.outer)
+        top[: len(front)] = inner[front]
+        top[len(top) - border :] = outer
+        top = cholesky_solved(self.lower, top)
+        inner[front], outer = top[: len(front)], top[len(top) - border :]
+        for block in reversed(self.kept.blocks):
+            block.backward(inner, outer)
+        out = np.empty_like(columns)
+        out[inside], out[self.numbers] = inner, top
+        return out.reshape(right.shape)

@@ -1,0 +1,189 @@
+"""Module 3 of a team that is solved already and has driven on for a second.
+
+What came of the solution before is used as far as it goes; the solution is that of
+`banded_solver.solve`, which is asked whenever something is not as usual: poses that nobody has
+solved yet, a matrix that does not lead there, or a model that is not one of what was measured.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drslamd.slam import se2
+from drslamd.slam.calibration.range_scatter import LEAST_SCATTER
+from drslamd.slam.optimizer.banded import banded_solver, claims, mountings
+from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem
+from drslamd.slam.optimizer.banded.normal_equations import Equations
+from drslamd.slam.optimizer.banded.odometry_levels import raised
+from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.banded.solution import Solution
+from drslamd.slam.optimizer.kept import kept_claims, kept_factor, quick_check
+from drslamd.slam.optimizer.kept.fixed_point import approach
+from drslamd.slam.optimizer.kept.head import LONG_TAIL, Pair, tail_of
+from drslamd.slam.optimizer.kept.kept_factor import (
+    Believed,
+    Current,
+    KeptFactor,
+)
+from drslamd.slam.optimizer.problem import Problem
+from drslamd.slam.optimizer.sensor_priors import Calibration
+from drslamd.slam.se2 import Array
+
+MOVED = 0.05
+"""Of log variance: what is claimed of the head holds as long as what is feared moved less."""
+
+
+@dataclass(frozen=True)
+class Sureness:
+    """How far measurements are believed when something is claimed.
+
+    Attributes:
+        pairs: (pairs,) how many times the sent sigma the ranges of each are as wrong by.
+        names: of these; feared: (robots,) variance of odometry over the configured one.
+    """
+
+    pairs: Array
+    names: list[Pair]
+    feared: Array
+
+    @staticmethod
+    def of(team: TeamProblem, scatter: Array, feared: Array) -> Sureness:
+        ratio = team.problem.model.correlated_ratio(1.0)
+        return Sureness(ratio * np.maximum(scatter, LEAST_SCATTER), team.pairs, feared)
+
+    def believed(self, problem: Problem, point: Point) -> Believed:
+        """A problem so far believed."""
+        return Believed(
+            raised(problem, self.feared[problem.odometry.robot], point), point, self.pairs
+        )
+
+    def has_moved(self, before: Sureness) -> bool:
+        """Is it another one than before, of pairs and robots that were there?"""
+        then = dict(zip(before.names, before.pairs.tolist(), strict=True))
+        now = dict(zip(self.names, self.pairs.tolist(), strict=True))
+        ratios = np.array([now[name] / then[name] for name in now if name in then])
+        robots = self.feared / before.feared
+        return bool(
+            np.abs(np.log(ratios)).mean() > MOVED / 2 or np.abs(np.log(robots)).max() > MOVED
+        )
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What the next solution begins with.
+
+    Attributes:
+        downwards: of the system that leads to the solution; claimed: of what may be claimed there.
+        sure: when that was made.
+        variances: of the mountings, see `mountings.variances`.
+    """
+
+    downwards: KeptFactor
+    claimed: KeptFactor
+    sure: Sureness
+    variances: Array
+
+
+def solve(
+    team: TeamProblem, last: tuple[int, ...], tolerance: float, kept: object = None
+) -> tuple[Solution, object]:
+    """The solution, and what the next one may begin with.
+
+    Args:
+        last: poses whose joint covariance is wanted, each the newest of its robot.
+        tolerance: see `newton_descent.TOLERANCE`.
+        kept: what came of the solution before.
+    """
+    if team.is_near:
+        for before in (kept, None) if isinstance(kept, Kept) else (None,):
+            found = _solved(team, last, tolerance, before)
+            if found is not None:
+                return found
+    return banded_solver.solve(team.problem, team.start, last, tolerance=tolerance), None
+
+
+def _solved(
+    team: TeamProblem, last: tuple[int, ...], tolerance: float, kept: Kept | None
+) -> tuple[Solution, Kept] | None:
+    problem, pairs = team.problem, team.pairs
+    start = Point.of(problem, problem.initial.copy(), team.start)
+    current = _matrix(kept.downwards if kept else None, Believed(problem, start), pairs)
+    if current is None:
+        return None
+    equations = Equations(problem, layout=current.places.flat)
+    point = approach(equations, start, current, tolerance)
+    if point is None:
+        return None
+    variances = kept.variances if kept else mountings.variances(equations, point, current)
+    if variances is None:
+        return None
+    ratio = quick_check.misfit_as_modelled(equations, point, current, variances)
+    if ratio is None:
+        return None
+    scatter = claims.scatter_of(problem, point)
+    sure = Sureness.of(team, scatter, np.maximum(ratio, 1.0))
+    believed = sure.believed(problem, point)
+    known = kept.claimed if kept and not sure.has_moved(kept.sure) else None
+    claimed = _matrix(known, believed, pairs, with_blocks=False)
+    if claimed is None:
+        return None
+    found = kept_claims.kept_covariances(problem, point, claimed, np.array(last, dtype=int))
+    downwards = _grown(current, Believed(problem, point))
+    held = _grown(claimed, believed)
+    if found is None or downwards is None or held is None:
+        return None
+    after = Kept(downwards, held, kept.sure if kept and known else sure, variances)
+    return _said(equations, point, scatter, sure.feared, *found), after
+
+
+def _matrix(
+    kept: KeptFactor | None, believed: Believed, pairs: list[Pair], with_blocks: bool = True
+) -> Current | None:
+    """A kept factor, or a new one, with the tail of a problem on top; None if it does not fit."""
+    problem = believed.problem
+    if kept is None:
+        kept = kept_factor.build(believed, pairs, tail_of(problem), with_blocks)
+    places = kept.head.places(problem, pairs) if kept else None
+    if kept is None or places is None or places.is_late(problem):
+        return None
+    return kept.on_top(believed, places)
+
+
+def _grown(current: Current, believed: Believed) -> KeptFactor | None:
+    """The same for the next second: a tail that is long goes to the head."""
+    tail, robots = len(current.places.tail), len(believed.problem.priors.scale)
+    if tail <= LONG_TAIL * robots:
+        return current.kept
+    return current.kept.grown(believed, current.places)
+
+
+def _said(
+    equations: Equations,
+    point: Point,
+    scatter: Array,
+    feared: Array,
+    joint: Array,
+    spread: Calibration,
+) -> Solution:
+    """What `banded_solver.solve` says where all is as modelled."""
+    problem = equations.problem
+    poses: Array = point.poses.copy()
+    poses[:, 2] = se2.wrap(poses[:, 2])
+    level = np.sqrt(feared)[problem.odometry.robot]
+    return Solution(
+        poses,
+        point.calibration,
+        cost=equations.cost(point, point.threshold),
+        iterations=point.steps,
+        converged=point.converged,
+        scatter=scatter,
+        joint=joint,
+        spread=spread,
+        odometry_level=np.ones(len(level)),
+        feared_level=level,
+        late_level=level,
+        contradicted=quick_check.lately_wrong(problem, point),
+        doubted=claims.still_doubted(problem.doubted, point.calibration, spread),
+    )

@@ -1,0 +1,90 @@
+"""Steps by a matrix of elsewhere, against Newton's own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kept_scenes import a_team_problem
+
+from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem
+from drslamd.slam.optimizer.banded.layout import BandLayout
+from drslamd.slam.optimizer.banded.newton_descent import descend
+from drslamd.slam.optimizer.banded.normal_equations import Equations
+from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.kept.fixed_point import approach
+from drslamd.slam.optimizer.kept.head import tail_of
+from drslamd.slam.optimizer.kept.kept_factor import Believed, Current, build
+
+
+@pytest.fixture(scope="module")
+def team() -> TeamProblem:
+    return a_team_problem()
+
+
+def solution(team: TeamProblem) -> Point:
+    found = descend(Equations(team.problem), team.start, 60, 1e-9)
+    assert found.converged
+    return found
+
+
+def matrix_at(team: TeamProblem, point: Point) -> Current:
+    believed = Believed(team.problem, point)
+    kept = build(believed, team.pairs, tail_of(team.problem), True)
+    assert kept is not None
+    places = kept.head.places(team.problem, team.pairs)
+    assert places is not None
+    found = kept.on_top(believed, places)
+    assert found is not None
+    return found
+
+
+def test_the_end_is_the_solution_whatever_the_matrix(team: TeamProblem) -> None:
+    right = solution(team)
+    problem = team.problem
+    flat = Equations(problem, layout=BandLayout.flat(problem))
+    rng = np.random.default_rng(1)
+    moved = right.poses + rng.normal(0, 0.002, right.poses.shape)
+    start = Point.of(problem, moved, right.calibration)
+    for seed in range(2):
+        beside = replace(
+            right, poses=right.poses + rng.normal(0, 0.001 * (1 + seed), right.poses.shape)
+        )
+        beside = Point.of(problem, beside.poses, beside.calibration)
+        found = approach(flat, start, matrix_at(team, beside), 1e-8, most=40)
+        assert found is not None
+        assert found.converged
+        assert np.abs(found.poses - right.poses).max() < 1e-7
+        assert np.abs(found.calibration.bias - right.calibration.bias).max() < 1e-7
+
+
+def test_mixing_saves_steps(team: TeamProblem, monkeypatch: pytest.MonkeyPatch) -> None:
+    right = solution(team)
+    problem = team.problem
+    flat = Equations(problem, layout=BandLayout.flat(problem))
+    rng = np.random.default_rng(1)
+    start = Point.of(
+        problem, right.poses + rng.normal(0, 0.01, right.poses.shape), right.calibration
+    )
+    matrix = matrix_at(team, start)
+    mixed = approach(flat, start, matrix, 1e-8, most=60)
+    monkeypatch.setattr(
+        "drslamd.slam.optimizer.kept.fixed_point._mixed",
+        lambda places, steps, gradients: places[-1] + steps[-1],
+    )
+    plain = approach(flat, start, matrix, 1e-8, most=60)
+    assert mixed is not None
+    assert plain is None or mixed.steps < plain.steps
+
+
+def test_what_is_far_away_or_slow_is_not_reached(team: TeamProblem) -> None:
+    problem = team.problem
+    right = solution(team)
+    flat = Equations(problem, layout=BandLayout.flat(problem))
+    matrix = matrix_at(team, right)
+    near = Point.of(problem, right.poses + 0.001, right.calibration)
+    assert approach(flat, near, matrix, 1e-6) is not None
+    assert approach(flat, near, matrix, 1e-9, most=2) is None
+    far = Point.of(problem, right.poses + [5.0, 0.0, 0.0], right.calibration)
+    assert approach(flat, far, matrix, 1e-6) is None

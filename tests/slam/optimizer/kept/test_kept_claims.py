@@ -1,0 +1,39 @@
+"""What is claimed from a kept factor, against what is claimed from one that is made anew."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+from kept_scenes import a_team_problem, shaken
+
+from drslamd.slam.calibration.range_scatter import LEAST_SCATTER
+from drslamd.slam.optimizer.banded import claims
+from drslamd.slam.optimizer.banded.normal_equations import Equations
+from drslamd.slam.optimizer.kept.head import tail_of
+from drslamd.slam.optimizer.kept.kept_claims import kept_covariances
+from drslamd.slam.optimizer.kept.kept_factor import Believed, build
+from drslamd.slam.optimizer.sensor_priors import Calibration
+
+
+def test_covariances_and_sigmas_are_those_of_the_whole_system() -> None:
+    team = a_team_problem()
+    problem = team.problem
+    point, scatter = shaken(problem), np.array([0.2, 0.9, 1.4])
+    wanted = np.array([np.flatnonzero(problem.robot == robot)[-1] for robot in range(3)])
+    joint, spread = claims.covariances(Equations(problem), point, scatter, wanted)
+    ratio = problem.model.correlated_ratio(1.0) * np.maximum(scatter, LEAST_SCATTER)
+    believed = Believed(problem, point, ratio)
+    kept = build(believed, team.pairs, tail_of(problem), with_blocks=False)
+    assert kept is not None
+    places = kept.head.places(problem, team.pairs)
+    assert places is not None
+    current = kept.on_top(believed, places)
+    assert current is not None
+    found = kept_covariances(problem, point, current, wanted)
+    assert found is not None
+    assert np.allclose(found[0], joint, rtol=1e-6, atol=1e-12)
+    for f in fields(Calibration):
+        assert np.allclose(getattr(found[1], f.name), getattr(spread, f.name), rtol=1e-6), f.name
+    # of what was eliminated it cannot say it
+    assert kept_covariances(problem, point, current, np.array([0, 1, 2])) is None

@@ -1,0 +1,125 @@
+"""One more second from what was kept, against the same second solved anew."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from lab.benchmark.met_team import MetTeam
+
+from drslamd.conventions import Chain
+from drslamd.slam.graph.estimate import TeamEstimate
+from drslamd.slam.graph.measurements import GraphEntry
+from drslamd.slam.optimizer.banded import banded_optimizer
+from drslamd.slam.optimizer.banded.banded_solver import SETTLED
+from drslamd.slam.optimizer.kept import kept_solver, quick_check
+
+NEAR_M, NEAR_SIGMA = 1e-4, 1.03
+
+Said = list[tuple[Chain, GraphEntry]]
+
+
+@dataclass
+class Second:
+    """What was found, and what is right."""
+
+    found: TeamEstimate
+    right: TeamEstimate
+    began_anew: bool
+
+    def is_right(self) -> bool:
+        off = max(
+            float(np.abs(path.poses - self.found.trajectories[robot].poses)[:, :2].max())
+            for robot, path in self.right.trajectories.items()
+        )
+        ratios = np.sqrt(np.diag(self.found.joint) / np.diag(self.right.joint))
+        sigma = float(np.maximum(ratios, 1 / ratios).max())
+        return off < NEAR_M and sigma < NEAR_SIGMA
+
+
+def driven(
+    team: MetTeam, seconds: int, said: Callable[[int, Said], Said] = lambda _, said: said
+) -> Iterator[Second]:
+    """Second by second.
+
+    Args:
+        said: what of the entries of a second is heard then.
+    """
+    for second in range(seconds):
+        job: Any = team.back.begin(team.living)
+        assert job is not None
+        found: TeamEstimate = job()
+        right = banded_optimizer.solved(job.args[0], job.args[1], tolerance=SETTLED)
+        yield Second(found, right, found.kept is None)
+        team.back.on_solution(found)
+        for chain, entry in said(second, team.entries()):
+            team.back.insert(chain, entry)
+
+
+@pytest.mark.slow
+def test_a_team_that_drives_on_is_solved_from_what_was_kept_and_stays_right() -> None:
+    """Over a step of time, and longer than a tail waits."""
+    seconds = list(driven(MetTeam(4, 70, 40), 24))
+    assert all(second.is_right() for second in seconds)
+    assert sum(second.began_anew for second in seconds[4:]) <= 2
+
+
+@pytest.mark.slow
+def test_entries_that_come_late_or_never_are_no_harm() -> None:
+    waiting: Said = []
+
+    def lossy(second: int, entries: Said) -> Said:
+        heard = [entry for k, entry in enumerate(entries) if (second + k) % 4]
+        late, waiting[:] = waiting[:], [e for k, e in enumerate(entries) if not (second + k) % 4]
+        return [*heard, *(late if second % 7 else [])]
+
+    seconds = list(driven(MetTeam(4, 70, 40), 16, lossy))
+    assert all(second.is_right() for second in seconds)
+
+
+@pytest.mark.slow
+def test_a_robot_that_stands_while_others_drive_is_no_harm() -> None:
+    def standing(_: int, entries: Said) -> Said:
+        return [
+            (chain, entry) if chain.robot != 2 else (chain, GraphEntry(entry.seq, None, (), (), ()))
+            for chain, entry in entries
+        ]
+
+    seconds = list(driven(MetTeam(4, 70, 40), 12, standing))
+    assert all(second.is_right() for second in seconds)
+
+
+@pytest.mark.slow
+def test_who_joins_is_solved_with_the_others() -> None:
+    team = MetTeam(4, 0, 110)
+    for _ in range(70):
+        for chain, entry in team.entries():
+            if chain.robot != 3:
+                team.back.insert(chain, entry)
+    held: Said = []
+    again = MetTeam(4, 0, 110)
+    for _ in range(75):
+        held += [(chain, entry) for chain, entry in again.entries() if chain.robot == 3]
+
+    def joining(second: int, entries: Said) -> Said:
+        if second < 4:
+            return [(chain, entry) for chain, entry in entries if chain.robot != 3]
+        return [*(held if second == 4 else []), *entries]
+
+    seconds = list(driven(team, 10, joining))
+    assert all(second.is_right() for second in seconds)
+    assert [len(second.found.trajectories) for second in seconds] == 5 * [3] + 5 * [4]
+
+
+@pytest.mark.parametrize("fault", ["places", "path", "check"])
+def test_whatever_does_not_fit_is_solved_anew(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = {"places": "_matrix", "path": "approach"}
+    if fault == "check":
+        monkeypatch.setattr(quick_check, "misfit_as_modelled", lambda *_: None)
+    else:
+        monkeypatch.setattr(kept_solver, names[fault], lambda *_, **__: None)
+    seconds = list(driven(MetTeam(3, 40, 10), 3))
+    assert all(second.is_right() and second.began_anew for second in seconds)

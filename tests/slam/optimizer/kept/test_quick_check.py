@@ -1,0 +1,83 @@
+"""The questions of each second, against those that are asked of a solution made anew."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kept_scenes import a_problem, shaken
+
+from drslamd.slam.optimizer.banded import misfit, mountings
+from drslamd.slam.optimizer.banded.band_factor import BandFactor
+from drslamd.slam.optimizer.banded.newton_descent import descend
+from drslamd.slam.optimizer.banded.normal_equations import Equations
+from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.kept import quick_check
+from drslamd.slam.optimizer.problem import Problem
+from drslamd.slam.optimizer.sensor_priors import Calibration
+
+
+def with_errors(problem: Problem, point: Point, sigmas: dict[int, float]) -> Point:
+    """The newest ranges of pair 1 are so many sigmas off, counted from the last; others fit."""
+    ranges = problem.ranges
+    error = np.zeros(len(ranges))
+    mine = np.flatnonzero(ranges.pair == 1)
+    mine = mine[np.argsort(np.maximum(ranges.i, ranges.j)[mine], kind="stable")][::-1]
+    for back, size in sigmas.items():
+        error[mine[back]] = size * ranges.sigma[mine[back]]
+    return replace(point, sight=point.sight._replace(error=error))
+
+
+CASES = [
+    ({}, False),
+    (dict.fromkeys(range(3), 3.0), False),
+    (dict.fromkeys(range(4), 3.0), True),
+    (dict.fromkeys(range(1, 9), 3.0), True),
+    (dict.fromkeys(range(2, 5), 3.0), False),
+    ({k: (-1) ** k * 1.9 for k in range(10)}, True),
+    ({k: (-1) ** k * 1.8 for k in range(10)}, False),
+    ({k: (-1) ** k * 2.0 for k in range(9)}, True),
+]
+
+
+@pytest.mark.parametrize(("sigmas", "expected"), CASES)
+def test_runs_are_seen_where_there_are_any(sigmas: dict[int, float], expected: bool) -> None:
+    problem = a_problem(carried=False)
+    point = with_errors(problem, shaken(problem), sigmas)
+    assert quick_check.has_runs(problem, point) is expected
+    assert bool(misfit.runs(problem, point)) is expected
+
+
+@pytest.mark.parametrize("share", [0.2, 0.39, 0.41, 0.7])
+def test_pairs_of_which_many_ranges_are_wrong_are_named(share: float) -> None:
+    problem = a_problem(carried=False)
+    point = with_errors(problem, shaken(problem), {})
+    error = point.sight.error.copy()
+    mine = np.flatnonzero(problem.ranges.pair == 2)
+    # the newest ones fit, so that there is no run
+    error[mine[: int(share * len(mine))]] = 1.0
+    point = replace(point, sight=point.sight._replace(error=error))
+    assert not quick_check.has_runs(problem, point)
+    found = quick_check.lately_wrong(problem, point)
+    assert found.tolist() == misfit.contradicted(problem, point).tolist()
+
+
+def test_a_misfit_is_told_where_all_is_as_modelled_and_not_where_it_is_not() -> None:
+    problem = a_problem()
+    equations = Equations(problem)
+    point = descend(equations, Calibration.zero(problem.pairs, 3), 40)
+    factor = BandFactor.of(equations.weighed(point))
+    assert factor is not None
+    left = mountings.variances(equations, point, factor)
+    assert left is not None
+    ratio = quick_check.misfit_as_modelled(equations, point, factor, left)
+    assert ratio is not None
+    expected = misfit.guessed_misfit(equations, point, factor).ratio(problem.odometry.robot, 3)
+    assert np.allclose(ratio, expected)
+    ask = mountings.scores(equations, point, factor)
+    assert not ask.ask()
+    # a mounting that asks, odometry that does not fit
+    assert quick_check.misfit_as_modelled(equations, point, factor, left / 1e4) is None
+    worse = replace(point, link=point.link * 4)
+    assert quick_check.misfit_as_modelled(equations, worse, factor, left) is None
