@@ -62,7 +62,7 @@ long it took. So a counter that stood for seconds is a better reason than a mome
 LEAST_SAID = 3.0
 """Times the nominal sigma that is said at least of what was worth letting go."""
 ONCE = 15 * GRID_HZ
-"""Steps of the grid that one fault lasts at most."""
+"""Steps of the grid that one fault lasts at most; who stands for longer is parked."""
 STEPS = 25
 """A path that is bent back over half a minute takes more of them than other rounds do."""
 SURE = 15.0
@@ -176,7 +176,8 @@ def _choices(
     problem = equations.problem
     odometry, n = problem.odometry, problem.n
     test = np.where(best.lost | ~_near(problem, best.lost), 0.0, test)
-    stood = np.flatnonzero((n[odometry.j] - n[odometry.i] >= LONG) & (test > 0))
+    lasted = n[odometry.j] - n[odometry.i]
+    stood = np.flatnonzero((lasted >= LONG) & (lasted <= ONCE) & (test > 0))
     stood = stood[np.argsort(-test[stood], kind="stable")[:MOST_STOOD]]
     gaps = [(int(odometry.robot[k]), int(n[odometry.i[k]])) for k in stood]
     gaps += _begun(problem, _suspects(runs(problem, best.point)), test)
@@ -261,7 +262,7 @@ def without(problem: Problem, lost: NDArray[np.bool_]) -> Problem:
     either end: it says little of where they are.
     """
     odometry, ranges = problem.odometry, problem.ranges
-    seconds = (problem.n[odometry.j] - problem.n[odometry.i]) / GRID_HZ * lost
+    seconds = np.minimum(problem.n[odometry.j] - problem.n[odometry.i], ONCE) / GRID_HZ * lost
     sigma = seconds[:, None] * [LOST_MPS, LOST_MPS, LOST_RADPS]
     covariance = odometry.covariance + (sigma**2)[:, :, None] * np.eye(3)
     way = np.zeros(len(problem.robot))
