@@ -129,17 +129,16 @@ class PeersAround:
         shifts = self._back.graph.view.shifts
         return round((shifts.get(robot, 0.0) - shifts.get(self._own, 0.0)) * GRID_US)
 
-    def seen(self, leg: Leg, added: Packed, bold: float, utime: int) -> Neighbours:
+    def seen(self, leg: Leg, added: Packed, utime: int) -> Neighbours:
         """All of them from the end of our leg.
 
         Args:
             added: what is added to the covariance of our solved pose, bold already.
-            bold: times the variance that the solution claims.
             utime: of our odometry, us.
         """
         if self._relatives is None or not self._tracked:
             return NOBODY
-        seen, covariance = self._relatives.seen_from(leg.end, added, bold)
+        seen, covariance = self._relatives.seen_from(leg.end, added)
         stands, states, thens, unsure, speeds, turns = self._rows
         utimes = tuple(utime if still else then for still, then in zip(stands, thens, strict=True))
         return Neighbours(

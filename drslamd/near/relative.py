@@ -41,15 +41,12 @@ class Relatives:
     poses: Array
     known: Array
 
-    def seen_from(
-        self, pose: Sequence[float], added: Packed, bold: float = 1.0
-    ) -> tuple[Array, Array]:
+    def seen_from(self, pose: Sequence[float], added: Packed) -> tuple[Array, Array]:
         """(m, 3) a_T_b, and (6, m) its covariance in the axes of a.
 
         Args:
             pose: w_T_a.
             added: what our leg adds to its covariance, packed.
-            bold: times `known` that is claimed.
         """
         x, y, theta = pose
         dx, dy = self.poses[:, 0] - x, self.poses[:, 1] - y
@@ -59,7 +56,7 @@ class Relatives:
         seen[:, 2] = se2.wrap(self.poses[:, 2] - theta)
         covariance = np.empty_like(self.known)
         for row, here in enumerate(moved(added, dx, dy)):
-            covariance[row] = bold * self.known[row] + here
+            covariance[row] = self.known[row] + here
         return seen, np.array(turned(covariance, cos, sin))
 
 
@@ -79,6 +76,7 @@ def relatives(estimate: TeamEstimate, own: int, leg: Leg, legs: dict[int, Leg]) 
     levers = np.array([peer.lever for peer in legs.values()])
     along[:, 0, 2], along[:, 1, 2] = -levers[:, 1], levers[:, 0]
     j = np.concatenate([-across, along], axis=2)
-    known = j @ joint @ np.swapaxes(j, 1, 2)
+    bold = np.array([estimate.bold(own, robot) for robot in legs])
+    known = bold[:, None, None] * (j @ joint @ np.swapaxes(j, 1, 2))
     added = np.array([peer.added for peer in legs.values()]).T
     return Relatives(poses, known[:, UPPER[0], UPPER[1]].T + added)

@@ -145,7 +145,7 @@ class Surroundings:
             correction=_taken_off(leg.end, odom),
             covariance=covariance,
             resets=self._resets,
-            peers=self._peers.seen(leg, added, bold, self.utime),
+            peers=self._peers.seen(leg, added, self.utime),
         )
 
     def _speeds(self) -> tuple[float, float]:

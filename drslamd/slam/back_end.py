@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Set
+from dataclasses import replace
 from typing import NamedTuple
 
 from drslamd.config import Config
@@ -141,6 +142,8 @@ class BackEnd:
         """Module 3 has answered; what must be said of it."""
         self.estimate = result = self._anchored(result)
         self.revisions.on_solution(result, self._own.robot)
+        if bold := self.revisions.of_pairs:
+            self.estimate = result = replace(result, boldness=bold)
         own = result.trajectories.get(self._own.robot)
         if own is not None:
             self.history.update(own)

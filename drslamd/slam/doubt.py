@@ -16,8 +16,6 @@ from typing import NamedTuple
 
 from drslamd.slam.graph.estimate import TeamEstimate
 
-MUCH_WORSE = 3.0
-"""Times the configured sigma of odometry: as modelled it is below 2."""
 ODD_SCALE = 0.5
 """Of the way, where turns are as configured: who miscounts both wheels miscounts turns as well. As
 modelled it is below 0.3; where it is more, something else was bent until it fitted."""
@@ -81,9 +79,8 @@ def doubt_of(
     """
     if estimate is None:
         return None
-    level = estimate.late_level.get(robot, 1.0)
-    if level >= MUCH_WORSE:
-        return Doubt(robot, Reason.ODOMETRY, level=level)
+    if estimate.is_slipping(robot):
+        return Doubt(robot, Reason.ODOMETRY, level=estimate.late_level[robot])
     if _is_odd(robot, estimate):
         return Doubt(robot, Reason.SCALE, level=1 - estimate.correction(robot).scale)
     partners = {b if a == robot else a for a, b in estimate.bias_m if robot in (a, b)}
@@ -94,7 +91,9 @@ def doubt_of(
     for reason, found in witnesses:
         if found.all_contradict:
             return Doubt(robot, reason, tuple(sorted(found.wrong)))
-    return Doubt(robot, Reason.REVISIONS) if boldness >= BOLD else None
+    moved = frozenset(other for other in partners if estimate.bold(robot, other) >= BOLD)
+    is_moved = boldness >= BOLD or Partners(frozenset(partners), moved).all_contradict
+    return Doubt(robot, Reason.REVISIONS) if is_moved else None
 
 
 def _is_odd(robot: int, estimate: TeamEstimate) -> bool:

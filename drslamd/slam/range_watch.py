@@ -7,6 +7,7 @@ two seconds is doubt, long before anybody can say who is wrong.
 
 from __future__ import annotations
 
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,8 @@ from drslamd.conventions import GRID_US
 from drslamd.slam import se2
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
+from drslamd.slam.odometry import jumps
+from drslamd.slam.odometry.jumps import Jump
 from drslamd.slam.pose_now import noise_of_way
 from drslamd.slam.range_model import RangeModel
 from drslamd.slam.relative_pose.pair_end import PairEnd, level
@@ -25,6 +28,8 @@ FAR_SIGMAS = 3.0
 """Beyond them a range does not fit."""
 IN_A_ROW = 2
 """So many seconds of them are doubt; a burst is shorter."""
+LASTS = 3
+"""Seconds for which doubt is still feared: ranges cross the wrong value as robots drive."""
 LEAST_M = 1e-3
 """Antennas that touch have no direction."""
 MOST_BIAS_M = 1.0
@@ -48,6 +53,30 @@ class Partner(NamedTuple):
     ahead_us: int
     ranges: RangeBuffer
     since_us: int = 0
+
+
+class _Gap(NamedTuple):
+    """A range against where both robots should be.
+
+    Attributes:
+        metres: by which it is too long; sigma: of that.
+        sight: (2,) unit line of sight from us, in w; distance: on it, m.
+    """
+
+    metres: float
+    sigma: float
+    sight: Array
+    distance: float
+
+    @property
+    def is_far(self) -> bool:
+        return abs(self.metres) > FAR_SIGMAS * self.sigma
+
+    def if_moved(self, way: Array) -> _Gap:
+        """The same if we were elsewhere, by a way (2,) in w."""
+        apart = self.distance * self.sight - way
+        distance = max(float(np.hypot(*apart)), LEAST_M)
+        return _Gap(self.metres + self.distance - distance, self.sigma, apart / distance, distance)
 
 
 class _End(NamedTuple):
@@ -78,12 +107,15 @@ class RangeWatch:
         """
         self._sigma_m, self._model = sigma_m, model
         self.off: dict[int, int] = {}
-        self._gaps_m: dict[int, float] = {}
+        self._gap_m, self._jump_m = 0.0, 0.0
+        self._late_m: deque[float] = deque(maxlen=LASTS)
+        self._believed = -1
 
     @property
     def gap_m(self) -> float:
-        """How far ranges to all whom we see are off at least; 0 where any of them fits."""
-        return min(self._gaps_m.values(), default=0.0)
+        """By how much we may be elsewhere: as far as any range is off to a partner that is not
+        known to slip itself, or as far as our wheels jumped."""
+        return max(self._gap_m, self._jump_m, *self._late_m, 0.0)
 
     @property
     def doubted(self) -> frozenset[int]:
@@ -103,23 +135,41 @@ class RangeWatch:
         utime: int,
     ) -> None:
         """Once a second."""
-        found: dict[int, int] = {}
-        gaps_m: dict[int, float] = {}
+        gaps: dict[int, _Gap] = {}
         for robot, partner in partners.items() if estimate is not None else ():
             assert estimate is not None
-            off = self._off(estimate, own, partner, utime)
-            if off is not None:
-                metres, sigma = off
-                is_far = metres > FAR_SIGMAS * sigma
-                found[robot] = self.off.get(robot, 0) + 1 if is_far else 0
-                gaps_m[robot] = metres if is_far else 0.0
-        self.off, self._gaps_m = found, gaps_m
+            gap = self._off(estimate, own, partner, utime)
+            if gap is not None:
+                gaps[robot] = gap
+        self.off = {r: self.off.get(r, 0) + 1 if gap.is_far else 0 for r, gap in gaps.items()}
+        slipping = {r for r in gaps if estimate is not None and estimate.is_slipping(r)}
+        far_m = [abs(g.metres) for r, g in gaps.items() if g.is_far and r not in slipping]
+        self._gap_m = max(far_m, default=0.0)
+        self._late_m.append(self._gap_m if self.doubted else 0.0)
+        self._jump_m = self._feared(jumps.feared(own.track), estimate, own, list(gaps.values()))
+
+    def _feared(
+        self, jump: Jump | None, estimate: TeamEstimate | None, own: PairEnd, gaps: list[_Gap]
+    ) -> float:
+        """How far we may be from where our wheels say since they jumped, m; 0 once a range says
+        that we are there."""
+        if jump is None or estimate is None or jump.n == self._believed:
+            return 0.0
+        solved = estimate.trajectories.get(own.data.chain.robot)
+        if solved is None or not own.track.covers(int(solved.n[-1]), own.track.end - 1):
+            return 0.0
+        turned = float(solved.poses[-1, 2] - own.track.at(int(solved.n[-1]))[2])
+        less = se2.rotate(turned, -jump.way)
+        for gap in gaps:
+            if abs(gap.metres) < gap.sigma and gap.if_moved(less).is_far:
+                self._believed = jump.n
+                return 0.0
+        return float(np.hypot(*jump.way))
 
     def _off(
         self, estimate: TeamEstimate, own: PairEnd, partner: Partner, utime: int
-    ) -> tuple[float, float] | None:
-        """How far the newest ranges are off, m, and the sigma of that; None where nothing can be
-        said."""
+    ) -> _Gap | None:
+        """How far the newest ranges are off; None where nothing can be said."""
         at = _newest(own, partner, utime)
         if at is None:
             return None
@@ -147,7 +197,8 @@ class RangeWatch:
         variance = by_pose @ joint @ by_pose + u @ (a.added + b.added) @ u
         variance += self._sigma_m**2 + float(self._model.near_range_sigma(measured)) ** 2
         variance += min(bias.sigma, MOST_BIAS_M) ** 2
-        return abs(distance + bias.value + strong - measured), float(np.sqrt(variance))
+        off = measured - distance - bias.value - strong
+        return _Gap(off, float(np.sqrt(variance)), u, distance)
 
 
 def _newest(own: PairEnd, partner: Partner, utime: int) -> tuple[int, int] | None:

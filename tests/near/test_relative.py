@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from slam_scenes import NOISE, wander
 
@@ -56,6 +58,15 @@ def test_peers_are_where_both_ways_lead_as_sure_as_the_solution_is_of_both_toget
         known += lever @ se2.unpacked(own.added) @ lever.T
         known += turn @ se2.unpacked(legs[peer].added) @ turn.T
         assert np.allclose(covariance[:, k], se2.packed(known), atol=1e-8)
+
+
+def test_a_pair_that_solutions_moved_is_claimed_as_much_wider_and_no_other() -> None:
+    own, legs = leg_of(4), {9: leg_of(9), 2: leg_of(2)}
+    plain = relatives(TEAM, 4, own, legs).known
+    moved = relatives(replace(TEAM, boldness={(4, 9): 5.0}), 4, own, legs).known
+    known = np.array(legs[9].added)
+    assert np.allclose(moved[:, 0] - known, 5.0 * (plain[:, 0] - known))
+    assert np.array_equal(moved[:, 1], plain[:, 1])
 
 
 def test_what_both_are_wrong_in_alike_is_no_error_of_one_seen_from_the_other() -> None:

@@ -13,9 +13,9 @@ from drslamd.events import JobDone
 from drslamd.gossip import messages
 from drslamd.gossip.message_types import Pose, PoseState
 from drslamd.jobs import WHAT_IF
-from drslamd.slam.doubt import MUCH_WORSE, Reason
+from drslamd.slam.doubt import Reason
 from drslamd.slam.front_end import WhatIfJob
-from drslamd.slam.graph.estimate import Learned
+from drslamd.slam.graph.estimate import MUCH_WORSE, Learned
 from drslamd.slam.odometry.mounting import SIDES
 from drslamd.slam.relative_pose.mounting_search import FEWEST_ASKED
 from drslamd.slam.relative_pose.what_if import CASES, Case

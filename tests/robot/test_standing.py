@@ -12,8 +12,8 @@ from robot_scenes import RobotScene
 from drslamd.conditions.diagnosis import why_not_localised
 from drslamd.conventions import SECOND_US, Chain
 from drslamd.gossip.message_types import Heard, PoseState
-from drslamd.slam.doubt import MUCH_WORSE, Doubt, Reason
-from drslamd.slam.graph.estimate import Learned, Trajectory
+from drslamd.slam.doubt import Doubt, Reason
+from drslamd.slam.graph.estimate import MUCH_WORSE, Learned, Trajectory
 from drslamd.slam.range_watch import RangeWatch
 from drslamd.slam.relative_pose.estimate import Verdict
 from drslamd.slam.relative_pose.mounting_search import MOST

@@ -9,7 +9,6 @@ import pytest
 from drslamd.conventions import Segment
 from drslamd.slam.doubt import (
     BOLD,
-    MUCH_WORSE,
     ODD_SCALE,
     Doubt,
     Partners,
@@ -17,7 +16,7 @@ from drslamd.slam.doubt import (
     doubt_of,
     doubted_partners,
 )
-from drslamd.slam.graph.estimate import Learned, TeamEstimate
+from drslamd.slam.graph.estimate import MUCH_WORSE, Learned, TeamEstimate
 
 NOBODY: frozenset[int] = frozenset()
 
@@ -138,6 +137,13 @@ def test_windows_of_all_pairs_that_disagree_are_doubt() -> None:
     assert doubt_of(0, team(), windows=every) == Doubt(0, Reason.WINDOWS, (1, 2))
     # ranges of this second say it sooner
     assert doubt_of(0, team(), every, every) == Doubt(0, Reason.RANGES, (1, 2))
+
+
+@pytest.mark.parametrize(("moved", "is_doubt"), [(BOLD - 0.01, False), (BOLD, True)])
+def test_who_is_moved_against_all_partners_is_doubtful(moved: float, is_doubt: bool) -> None:
+    estimate = replace(team(), boldness={(0, 1): BOLD, (0, 2): moved})
+    assert doubt_of(0, estimate) == (Doubt(0, Reason.REVISIONS) if is_doubt else None)
+    assert doubt_of(1, estimate) is None
 
 
 @pytest.mark.parametrize(("boldness", "is_doubt"), [(BOLD - 0.01, False), (BOLD, True)])

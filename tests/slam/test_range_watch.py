@@ -10,15 +10,18 @@ import pytest
 from slam_scenes import EXACT, Array, inverted, product
 
 from drslamd.conventions import GRID_US, Chain, Segment
+from drslamd.slam import range_watch
 from drslamd.slam.graph.chain_data import ChainData
-from drslamd.slam.graph.estimate import Learned, TeamEstimate, Trajectory
+from drslamd.slam.graph.estimate import MUCH_WORSE, Learned, TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import Keyframe
+from drslamd.slam.odometry.jumps import Jump
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.odometry.track import Track
 from drslamd.slam.range_model import LINKTRACK
 from drslamd.slam.range_watch import (
     FAR_SIGMAS,
     IN_A_ROW,
+    LASTS,
     LATE_US,
     MOST_BIAS_M,
     Partner,
@@ -368,13 +371,84 @@ def gap_m(**metres_off: float) -> float:
 
 
 @pytest.mark.parametrize(
-    ("partner", "twin", "least"),
-    [(2.0, 3.0, 2.0), (3.0, -2.0, 2.0), (-2.0, -3.0, 2.0), (2.0, 0.0, 0.0), (0.1, 3.0, 0.0)],
+    ("partner", "twin", "most"),
+    [(2.0, 3.0, 3.0), (3.0, -2.0, 3.0), (-2.0, -3.0, 3.0), (2.0, 0.0, 2.0), (0.1, 0.1, 0.0)],
 )
-def test_a_pose_is_as_far_off_as_the_range_that_fits_best_and_not_at_all_where_one_fits(
-    partner: float, twin: float, least: float
+def test_a_pose_may_be_as_far_off_as_any_range_is(partner: float, twin: float, most: float) -> None:
+    """Who goes past one partner is seen by the other only."""
+    assert gap_m(partner=partner, twin=twin) == pytest.approx(most, abs=1e-3)
+
+
+@pytest.mark.parametrize(("level", "is_theirs"), [(MUCH_WORSE - 0.01, False), (MUCH_WORSE, True)])
+def test_a_partner_that_is_known_to_slip_makes_no_gap_of_ours(
+    level: float, is_theirs: bool
 ) -> None:
-    assert gap_m(partner=partner, twin=twin) == pytest.approx(least, abs=1e-3)
+    scene = Scene()
+    scene.hear(measured(between() + 2.0, 0.0, SIGMA), NEWEST - 8, NEWEST + 1)
+    assert scene.look(replace(solved(), late_level={PARTNER: level}))[PARTNER] == 1
+    assert scene.watch.gap_m == pytest.approx(0.0 if is_theirs else 2.0, abs=1e-3)
+
+
+def test_a_gap_that_was_doubt_is_feared_for_some_seconds() -> None:
+    scene = Scene()
+    scene.hear(measured(between() + 2.0, 0.0, SIGMA), NEWEST - 8, NEWEST + 1)
+    for _ in range(IN_A_ROW):
+        scene.look(solved())
+    scene.ranges = RangeBuffer(10.0)
+    scene.hear(measured(between(), 0.0, SIGMA), NEWEST - 8, NEWEST + 1)
+    for _ in range(LASTS - 1):
+        assert scene.look(solved())[PARTNER] == 0
+        assert scene.watch.gap_m == pytest.approx(2.0, abs=1e-3)
+    scene.look(solved())
+    assert scene.watch.gap_m == 0.0
+
+
+# wheels that jumped
+
+
+def jumped(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch, way: tuple[float, float] | None, n: int = 110
+) -> float:
+    """What is feared if our wheels went farther by such a way, along the axes of odometry."""
+    jump = None if way is None else Jump(n, np.array(way))
+    monkeypatch.setattr(range_watch.jumps, "feared", lambda track: jump)
+    scene.look(solved())
+    return scene.watch.gap_m
+
+
+def to_partner() -> Array:
+    """Unit line of sight along our odometry, which begins where we were solved."""
+    ways = [
+        product(pose, (1.5, 0.0, 0.0), (model.antenna_x_m, model.antenna_y_m, 0.0))[:2]
+        for pose, model in zip((W_OWN, W_PARTNER), MODELS, strict=True)
+    ]
+    sight = inverted(np.array([0.0, 0.0, W_OWN[2]]))
+    u = product(sight, (*(ways[1] - ways[0]), 0.0))[:2]
+    return np.asarray(u / np.hypot(*u))
+
+
+@pytest.mark.parametrize("metres", [2.0, -2.0])
+def test_a_jump_is_feared_until_a_range_says_where_we_are(
+    metres: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = Scene()
+    along, across = metres * to_partner(), metres * to_partner() @ [[0.0, 1.0], [-1.0, 0.0]]
+    # nobody is heard
+    assert jumped(scene, monkeypatch, tuple(along)) == pytest.approx(2.0)
+    scene.hear(measured(between(), 0.0, SIGMA), NEWEST - 8, NEWEST + 1)
+    # half a metre across the line of sight changes no range
+    assert jumped(scene, monkeypatch, tuple(across / 4)) == pytest.approx(0.5)
+    assert jumped(scene, monkeypatch, tuple(along)) == 0.0
+    # it stays believed, but the next jump is another one
+    assert jumped(scene, monkeypatch, tuple(across / 4)) == 0.0
+    assert jumped(scene, monkeypatch, tuple(across / 4), n=115) == pytest.approx(0.5)
+    assert jumped(scene, monkeypatch, None) == 0.0
+
+
+def test_ranges_that_fit_neither_clear_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene()
+    scene.hear(measured(between(), 2.0, SIGMA), NEWEST - 8, NEWEST + 1)
+    assert jumped(scene, monkeypatch, tuple(2.0 * to_partner())) == pytest.approx(2.0)
 
 
 def test_who_cannot_be_looked_at_has_no_say_in_how_far_a_pose_is_off() -> None:

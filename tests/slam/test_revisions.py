@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from drslamd.conventions import GRID_HZ, Chain, Segment
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
-from drslamd.slam.revisions import ALLOWED, REMEMBERED, Revisions, squared_move
+from drslamd.slam.revisions import (
+    ALLOWED,
+    ALLOWED_OF_PAIRS,
+    MOST_ROBOTS,
+    REMEMBERED,
+    Revisions,
+    squared_move,
+)
 
 SIGMA = 0.1
 FRAME = Segment(0, 1, 0)
@@ -78,3 +86,60 @@ def test_angles_are_compared_around_the_circle() -> None:
 
 def test_claims_are_a_second_apart_and_few() -> None:
     assert REMEMBERED == 20 * GRID_HZ
+
+
+# pairs
+
+
+def team(places: list[tuple[float, float]], n: list[int], turned: float = 0.0) -> TeamEstimate:
+    """Robots that stand in their own frames' directions; all is turned about the origin."""
+    cos, sin = math.cos(turned), math.sin(turned)
+    paths = {}
+    for robot, (x, y) in enumerate(places):
+        pose = [cos * x - sin * y, sin * x + cos * y, turned]
+        numbers = np.array(n, dtype=float) + 1000 * robot
+        paths[robot] = Trajectory(Chain(robot, 1), numbers, np.tile(pose, (len(n), 1)))
+    return TeamEstimate(FRAME, paths, joint=SIGMA**2 * np.eye(3 * len(places)))
+
+
+STANDING = [(0.0, 0.0), (3.0, 0.0), (0.0, 4.0)]
+
+
+def of_pairs(*solutions: TeamEstimate) -> dict[tuple[int, int], float]:
+    revisions = Revisions()
+    for estimate in solutions:
+        revisions.on_solution(estimate, 0)
+    return revisions.of_pairs
+
+
+def test_a_pair_that_is_moved_further_than_was_claimed_was_claimed_too_boldly() -> None:
+    """Along the line from one to the other both sigmas count."""
+    moved = [(0.0, 0.0), (3.0, 0.0), (0.0, 4.0 + 0.5)]
+    found = of_pairs(team(STANDING, [0, 10]), team(moved, [0, 10, 20]))
+    expected = 0.5**2 / (2 * SIGMA**2) / 3 / ALLOWED_OF_PAIRS
+    assert found.keys() == {(0, 2), (1, 2)}
+    assert found[0, 2] == pytest.approx(expected, rel=1e-3)
+    # the claim is the sum of both ends, so the estimate says it in that many times
+    wider = replace(team(STANDING, [0]), boldness=found)
+    for pair in ((0, 2), (2, 0)):
+        plain, bold = team(STANDING, [0]).relative(*pair), wider.relative(*pair)
+        assert plain is not None
+        assert bold is not None
+        assert bold[1] == pytest.approx(found[0, 2] * plain[1])
+
+
+def test_a_team_that_is_turned_as_a_whole_moves_no_pair() -> None:
+    later = team(STANDING, [0, 10, 20], turned=0.7)
+    assert of_pairs(team(STANDING, [0, 10]), later) == {}
+    other = replace(later, frame=Segment(2, 1, 0))
+    assert of_pairs(team(STANDING, [0, 10]), other) == {}
+    # and a pair does not hang on the frame
+    moved = replace(team([*STANDING[:2], (0.0, 6.0)], [0, 10, 20]), frame=Segment(2, 1, 0))
+    assert of_pairs(team(STANDING, [0, 10]), moved).keys() == {(0, 2), (1, 2)}
+
+
+def test_pairs_of_the_first_robots_of_a_large_team_are_watched() -> None:
+    places = [(float(k), 0.0) for k in range(MOST_ROBOTS + 2)]
+    moved = [(2.0 * x, y) for x, y in places]
+    found = of_pairs(team(places, [0, 10]), team(moved, [0, 10, 20]))
+    assert {robot for pair in found for robot in pair} == set(range(MOST_ROBOTS))

@@ -48,6 +48,10 @@ class Lifted:
     gain: float
 
 
+MUCH_WORSE = 3.0
+"""Times the configured sigma of odometry: as modelled it is below 2."""
+
+
 class Learned(NamedTuple):
     """A constant of a sensor, and its sigma, all that is known counted (infinite: nothing is)."""
 
@@ -82,6 +86,8 @@ class TeamEstimate:
             late, as far as it must be feared; 1 where none is named.
         late_level: likewise, of the last seconds only.
         contradicted: pairs whose ranges of late do not fit the rest.
+        boldness: by how much variances of pairs a < b that were claimed of late were too small
+            (`revisions`), where they were.
         is_explained: is the model, with what was learned, one of what was measured?
         converged: is it good enough to be used?
         settled: is it the same from wherever it was begun?
@@ -106,6 +112,7 @@ class TeamEstimate:
     odometry_level: dict[int, float] = field(default_factory=dict)
     late_level: dict[int, float] = field(default_factory=dict)
     contradicted: frozenset[tuple[int, int]] = frozenset()
+    boldness: dict[tuple[int, int], float] = field(default_factory=dict)
     is_explained: bool = True
     cost: float = 0.0
     iterations: int = 0
@@ -153,7 +160,15 @@ class TeamEstimate:
         by_a = -turn
         by_a[0, 2], by_a[1, 2] = a_T_b[1], -a_T_b[0]
         j = np.hstack([by_a, turn])
-        return a_T_b, j @ joint @ j.T
+        return a_T_b, self.bold(a, b) * (j @ joint @ j.T)
+
+    def bold(self, a: int, b: int) -> float:
+        """Times the covariance of a pair, see `boldness`."""
+        return self.boldness.get((min(a, b), max(a, b)), 1.0)
+
+    def is_slipping(self, robot: int) -> bool:
+        """Was odometry of a robot much worse than configured in the last seconds?"""
+        return self.late_level.get(robot, 1.0) >= MUCH_WORSE
 
     def correction(self, robot: int) -> Correction:
         """Of a robot's odometry."""

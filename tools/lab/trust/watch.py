@@ -140,10 +140,11 @@ def look(run: Run, recording: Recording, simulator: Simulator) -> None:
 def _add_pose(
     run: Run, recording: Recording, simulator: Simulator, robot: int, called: str
 ) -> None:
-    """A robot's own pose; not in a frame that began after a hole in odometry, as nobody knows where
-    that really is."""
+    """A robot's own pose as it is published; not in a frame that began after a hole in odometry, as
+    nobody knows where that really is."""
     member = simulator.members[robot]
-    estimate, found = member.robot.back.estimate, member.robot.pose()
+    where = member.robot.whereabouts(member.clock.local(simulator.now))
+    estimate, found = member.robot.back.estimate, where.pose
     if estimate is None or found is None or estimate.frame.segment:
         return
     origin = recording.trails[estimate.frame.robot].truth[0]
