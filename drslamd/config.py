@@ -14,6 +14,7 @@ import tomli
 from pydantic import (
     Field,
     ValidationError,
+    field_validator,
     model_validator,
 )
 
@@ -152,6 +153,29 @@ class GossipSection(Section):
         return self
 
 
+Place = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+
+class BeaconSection(Section):
+    """A module that no robot carries, and whose place somebody has measured: two make the frame of
+    the site. All of them have x and y, or all latitude and longitude (then x is east and y north of
+    the first)."""
+
+    uwb_id: Annotated[int, Field(ge=0, le=0xFFFFFFFF)]
+    x_m: Place | None = None
+    y_m: Place | None = None
+    latitude_deg: Annotated[float, Field(ge=-85, le=85)] | None = None
+    longitude_deg: Annotated[float, Field(ge=-180, le=180)] | None = None
+
+    @model_validator(mode="after")
+    def _place_is_said_once(self) -> BeaconSection:
+        metres, degrees = (self.x_m, self.y_m), (self.latitude_deg, self.longitude_deg)
+        said = [None not in pair for pair in (metres, degrees)]
+        if said.count(True) != 1 or any(v is not None for v in (degrees if said[0] else metres)):
+            raise ValueError("give x_m and y_m, or latitude_deg and longitude_deg")
+        return self
+
+
 class NearSection(Section):
     """The pose of now and the peers around it, for whoever steers by it."""
 
@@ -187,6 +211,16 @@ class Config(Section):
     gossip: GossipSection = GossipSection()
     near: NearSection = NearSection()
     daemon: DaemonSection = DaemonSection()
+    beacon: Annotated[list[BeaconSection], Field(default_factory=list, max_length=64)]
+
+    @field_validator("beacon")
+    @classmethod
+    def _beacons_are_of_one_kind(cls, found: list[BeaconSection]) -> list[BeaconSection]:
+        if len({beacon.x_m is None for beacon in found}) > 1:
+            raise ValueError("all have x_m and y_m, or all latitude_deg and longitude_deg")
+        if len({beacon.uwb_id for beacon in found}) < len(found):
+            raise ValueError("each module once")
+        return found
 
     @property
     def uwb_id(self) -> int:

@@ -103,6 +103,9 @@ def _place(location: Iterable[int | str], root: type[BaseModel]) -> _Place:
             inside, part = {"": inside[str(part)]}, next(parts, None)
             if part is None:  # the chosen section as a whole
                 break
+        if isinstance(part, int):  # one of several sections
+            keys[-1] += f"[{part}]"
+            continue
         keys.append(_shown_key(str(part)))
         model = inside[""]
         field = model.model_fields.get(str(part))
@@ -118,6 +121,8 @@ def _sections(field: FieldInfo) -> dict[str, type[BaseModel]]:
     if field.discriminator is not None:
         members = get_args(field.annotation)
         return {_choices(m.model_fields[field.discriminator])[0]: m for m in members}
+    if get_origin(field.annotation) is list:
+        return {"": get_args(field.annotation)[0]}
     is_section = isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel)
     return {"": field.annotation} if is_section else {}  # type: ignore[dict-item]
 
@@ -131,7 +136,9 @@ def _allowed(key: str, field: FieldInfo) -> str:
     if field.discriminator is not None:
         return f"a section, [{key}], with {field.discriminator} and what belongs to it"
     for section in _sections(field).values():
-        return f"a section, [{key}], with {', '.join(section.model_fields)}"
+        is_one = get_origin(field.annotation) is not list
+        name = f"[{key}]" if is_one else f"[[{key.partition('[')[0]}]]"
+        return f"a section, {name}, with {', '.join(section.model_fields)}"
     if choices := _choices(field):
         return f"allowed are {_listed(choices)}"
     kind, rules = _kind(field)

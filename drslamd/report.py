@@ -39,6 +39,7 @@ def status(robot: Robot, utime: int) -> dict[str, Any]:
         "peers": _peers(robot, utime),
         "pairs": {str(k): _pair(pair) for k, pair in sorted(robot.front.pairs.items())},
         "points": point_report.points(robot),
+        "site": point_report.site(robot, utime),
         "graph": _graph(robot),
     }
 
@@ -203,7 +204,7 @@ def trajectories(robot: Robot, utime: int) -> dict[str, Any]:
     """
     estimate = robot.back.estimate
     if estimate is None:
-        return {"frame": None, "robots": {}, "modules": {}}
+        return {"frame": None, "robots": {}, "modules": {}, "site": None}
     out = {}
     for number, solved in sorted(estimate.trajectories.items()):
         n, poses = solved.n, solved.poses
@@ -219,7 +220,8 @@ def trajectories(robot: Robot, utime: int) -> dict[str, Any]:
             "clock": clock_report.clock(robot, solved.chain, utime),
         }
     modules = point_report.modules(robot)
-    return {"frame": estimate.frame.robot, "robots": out, "modules": modules}
+    site = point_report.site(robot, utime)
+    return {"frame": estimate.frame.robot, "robots": out, "modules": modules, "site": site}
 
 
 def closures(robot: Robot) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from drslamd.config import Config
 from drslamd.gossip.team import Team
 from drslamd.jobs import POINTS, RELOCATION
+from drslamd.slam import settings
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.doubt import Doubt, Partners, doubt_of, doubted_partners
 from drslamd.slam.front_end import FrontEnd
@@ -15,6 +16,7 @@ from drslamd.slam.graph.estimate import PoseNow
 from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.points.point_targets import point_targets
 from drslamd.slam.points.points import Answer
+from drslamd.slam.points.site import Site, site_of
 from drslamd.slam.pose_now import pose_now
 from drslamd.slam.relative_pose.pair_end import PairEnd
 from drslamd.slam.relocation.relocation import Found
@@ -35,6 +37,7 @@ class Standing:
     def __init__(self, config: Config, team: Team, front: FrontEnd, back: BackEnd) -> None:
         self._most_mps, self._robot = config.wheels.max_speed_mps, team.own.robot
         self._namesakes, self._front, self._back = team.namesakes, front, back
+        self.survey = settings.survey(config)
         self._ranges_solve = config.optimizer.algorithm == "banded"
 
     def pose(self) -> PoseNow | None:
@@ -58,6 +61,10 @@ class Standing:
         return whereabouts(
             self.pose(), track, most, self._doubt(), utime, gap_m, by_ranges, is_point
         )
+
+    def site(self) -> Site | str | None:
+        """The frame of the site, or why there is none; None where no module has coordinates."""
+        return site_of(self._back.estimate, self.survey) if self.survey else None
 
     def asked(
         self,

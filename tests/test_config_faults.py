@@ -47,7 +47,9 @@ def file_with(section: str, lines: str) -> str:
 def plain_sections() -> dict[str, type[BaseModel]]:
     """Sections of one kind, by their names in the file."""
     found: dict[str, Any] = {
-        name: field.annotation for name, field in Config.model_fields.items() if name != "wheels"
+        name: field.annotation
+        for name, field in Config.model_fields.items()
+        if name not in ("wheels", "beacon")
     }
     return found
 
@@ -84,7 +86,7 @@ def test_a_value_of_another_kind_is_told_what_the_key_takes(value: str) -> None:
 
 
 @pytest.mark.parametrize("value", ["3", '"rbcd"', "true", "[1]", "2026-01-31", "[]"])
-@pytest.mark.parametrize("section", Config.model_fields)
+@pytest.mark.parametrize("section", [name for name in Config.model_fields if name != "beacon"])
 def test_a_value_in_the_place_of_a_section_is_told_what_stands_there(
     section: str, value: str
 ) -> None:
@@ -94,6 +96,46 @@ def test_a_value_in_the_place_of_a_section_is_told_what_stands_there(
     assert sentence.startswith(f"{section} = ")
     assert f": a section, [{section}], with {first}" in sentence
     assert is_plain(sentence)
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ("beacon = 3", "beacon = 3: a section, [[beacon]], with uwb_id, "),
+        ("beacon = [3]", "beacon[0] = 3: a section, [[beacon]], with uwb_id, "),
+        ("[[beacon]]\nx_m = 1\ny_m = 2", "beacon[0].uwb_id: missing; a whole number, "),
+        (
+            "[[beacon]]\nuwb_id = 1\nx_m = 1\ny_m = 2\n[[beacon]]\nuwb_id = -2\nx_m = 1\ny_m = 2",
+            "beacon[1].uwb_id = -2: a whole number, at least 0",
+        ),
+        ("[[beacon]]\nuwb_id = 1\nx_m = 1", "beacon[0]: give x_m and y_m, or latitude_deg and"),
+        (
+            "[[beacon]]\nuwb_id = 1\nx_m = 1\ny_m = 2\nlatitude_deg = 1",
+            "beacon[0]: give x_m and y_m, or latitude_deg and",
+        ),
+        ("[[beacon]]\nuwb_id = 1\nx = 1\nx_m = 1\ny_m = 1", "beacon[0].x = 1: "),
+    ],
+)
+def test_one_of_several_sections_is_named_by_its_number(lines: str, said: str) -> None:
+    others = "\n".join(f"[{k}]\n{text}" for k, text in BASE.items())
+    is_key = not lines.startswith("[")
+    (sentence,) = faults(f"{lines}\n{others}" if is_key else f"{others}\n{lines}")
+    assert sentence.startswith(said)
+    assert is_plain(sentence)
+
+
+@pytest.mark.parametrize(
+    ("second", "said"),
+    [
+        ("uwb_id = 2\nlatitude_deg = 48.0\nlongitude_deg = 11.0", "or all latitude_deg"),
+        ("uwb_id = 1\nx_m = 3\ny_m = 4", "each module once"),
+    ],
+)
+def test_places_of_a_site_are_of_one_kind_and_of_different_modules(second: str, said: str) -> None:
+    others = "\n".join(f"[{k}]\n{text}" for k, text in BASE.items())
+    first = "[[beacon]]\nuwb_id = 1\nx_m = 1\ny_m = 2"
+    (sentence,) = faults(f"{others}\n{first}\n[[beacon]]\n{second}")
+    assert said in sentence
 
 
 def test_what_belongs_to_a_section_inside_a_section_is_told_as_well() -> None:

@@ -93,7 +93,9 @@ def wrong_keys(page: Page) -> list[str]:
 def standing(section: str | None) -> list[dict[str, Any]]:
     """Where a key may stand, with what has to stand beside it."""
     named = [section] if section else [*Config.model_fields]
-    sections: list[dict[str, Any]] = [{name: {}} for name in named if name != "wheels"]
+    sections: list[dict[str, Any]] = [
+        {name: {}} for name in named if name not in ("wheels", "beacon")
+    ]
     return sections + [{"wheels": {"source": source}} for source in SOURCES if "wheels" in named]
 
 

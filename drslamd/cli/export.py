@@ -16,6 +16,7 @@ QUESTIONS = {
     "pyfg": ("graph",),
     "csv": ("graph",),
     "mcap": ("graph", "trajectory", "status"),
+    "geojson": ("trajectory",),
 }
 """What a daemon is asked for each format."""
 
@@ -31,6 +32,8 @@ formats:
   csv     keyframes, odometry, closures, ranges, windows (each answer of module 1), poses
   mcap    team.mcap with tf, odometry, poses with covariance, paths, diagnostics (pip install
           "drslamd[export]")
+  geojson team.geojson, paths and modules by longitude and latitude, for QGIS and web maps; needs
+          [[beacon]] with latitude_deg and longitude_deg
 
 All times are UNIX time; a sentence says how wrong they may be where that matters."""
 

@@ -25,6 +25,7 @@ from drslamd.slam.doubt import doubted_partners
 from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.relative_pose.estimate import Verdict
+from drslamd.standing import Standing
 from drslamd.whereabouts import Whereabouts
 
 PATIENCE_US = 3 * SECOND_US
@@ -52,6 +53,7 @@ class Stages(Protocol):
     team: Team
     front: FrontEnd
     back: BackEnd
+    standing: Standing
     outbox: Outbox
     ports: dict[str, PortState]
     network: NetworkState | None
@@ -77,6 +79,8 @@ def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
     yield "doubt", contradictions.doubt(doubt)
     yield "partners", contradictions.partners(_doubted_partners(robot) if not doubt else ())
     yield "mounting", _mountings(robot)
+    site = robot.standing.site()
+    yield "site", f"no frame of the site: {site}" if isinstance(site, str) else None
     yield "load", _load(robot, utime)
     yield "budget", robot.outbox.condition(utime)
     yield "state", _state(robot, utime)

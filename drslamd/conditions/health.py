@@ -35,6 +35,7 @@ CAUSES_FIRST = (
     "doubt",
     "partners",
     "pose",
+    "site",
     "state",
 )
 """Each may be why those behind it hold: a robot without a port is not localised either."""

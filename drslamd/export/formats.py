@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from drslamd.export import csv_tables, g2o_file, pyfg_file, tum_files
+from drslamd.export import csv_tables, g2o_file, geojson_file, pyfg_file, tum_files
 
 
 class CannotWrite(Exception):
@@ -26,6 +26,11 @@ def write(name: str, folder: Path, answers: Mapping[str, Any]) -> list[Path]:
     """
     if name == "tum":
         return tum_files.write(folder, answers["trajectory"])
+    if name == "geojson":
+        try:
+            return geojson_file.write(folder, answers["trajectory"])
+        except geojson_file.NoSite as error:
+            raise CannotWrite(str(error)) from None
     graph = answers["graph"]
     if name == "csv":
         return csv_tables.write(folder, graph)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from drslamd.conventions import FIRST_NODE, is_node
+from drslamd.gossip.message_types import PoseState
 from drslamd.robot import Robot
 from drslamd.slam.points.point_tracker import PointTracker
 
@@ -29,6 +31,32 @@ def modules(robot: Robot) -> dict[str, Any]:
             "sigma_m": round(sigma, 4),
             "covariance_m2": [xx, xy, yy],
         }
+    return out
+
+
+def site(robot: Robot, utime: int) -> dict[str, Any] | None:
+    """The frame of the site, and this robot in it; None where no module has coordinates."""
+    found, survey = robot.standing.site(), robot.standing.survey
+    if found is None or survey is None:
+        return None
+    if isinstance(found, str):
+        return {"why_not": found}
+    out: dict[str, Any] = {
+        "site_T_team": [round(float(v), 6) for v in found.site_T_w],
+        "sigma_deg": round(math.degrees(math.sqrt(float(found.covariance[2, 2]))), 3),
+        "sigma_m": round(math.sqrt(float(np.linalg.eigvalsh(found.covariance[:2, :2])[-1])), 4),
+        "modules": list(found.used),
+        "left_out": list(found.left_out),
+        "off_m": round(found.off_m, 4),
+        "origin_deg": None if survey.origin is None else list(survey.origin),
+    }
+    where = robot.whereabouts(utime)
+    if where.pose is not None:
+        pose, covariance = found.pose(where.pose)
+        out |= {"x_m": round(float(pose[0]), 4), "y_m": round(float(pose[1]), 4)}
+        if where.state is not PoseState.POSITION:
+            out["theta_deg"] = round(math.degrees(float(pose[2])), 3)
+        out["own_sigma_m"] = round(math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1])), 4)
     return out
 
 

@@ -44,11 +44,26 @@ def lines(s: dict[str, Any]) -> list[str]:
         f"(sigma {m['sigma_m']:.2f} m)"
         for uwb_id, m in s["graph"].get("modules", {}).items()
     ]
+    out += _site(s.get("site"))
     recording = s.get("recording")
     if recording:
         size = recording["bytes"] / 1e6
         out.append(f"recorded {size:.1f} MB in {recording['folder']}, now {recording['file']}")
     return out
+
+
+def _site(site: dict[str, Any] | None) -> list[str]:
+    if site is None:
+        return []
+    if "why_not" in site:
+        return [f"no frame of the site: {site['why_not']}"]
+    line = f"site: known to {site['sigma_m']:.2f} m and {site['sigma_deg']:.1f} deg"
+    if "x_m" in site:
+        line += f", x {site['x_m']:.2f} m, y {site['y_m']:.2f} m"
+        line += f", {site['theta_deg']:.1f} deg" if "theta_deg" in site else ""
+    if site["left_out"]:
+        line += f"; module {', '.join(map(str, site['left_out']))} does not fit and was moved"
+    return [line]
 
 
 def _heading(pose: dict[str, Any]) -> str:

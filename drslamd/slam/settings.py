@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from drslamd.config import Config, OdometrySection, RelativePoseSection
 from drslamd.config_wheels import AgilexSection, DbcSection, WheelSection
 from drslamd.conventions import SECOND_US, Chain
@@ -14,6 +16,7 @@ from drslamd.slam.optimizer.closures.closure_optimizer import ClosureOptimizer
 from drslamd.slam.optimizer.contract import Optimizer
 from drslamd.slam.optimizer.kept import kept_solver
 from drslamd.slam.optimizer.rbcd.rbcd_optimizer import RbcdOptimizer
+from drslamd.slam.points.site import Survey
 from drslamd.slam.robot_model import RobotModel
 from drslamd.slam.tuning import DEFAULTS, Tuning
 
@@ -36,6 +39,17 @@ def robot_model(config: Config, noise: OdometryNoise) -> RobotModel:
     uwb, wheels = config.uwb, config.wheels
     half_track_m = wheels.track_m / 2 if has_sides(wheels) else 0.0
     return RobotModel(noise, uwb.antenna_x_m, uwb.antenna_y_m, uwb.antenna_z_m, half_track_m)
+
+
+def survey(config: Config) -> Survey | None:
+    """Of `[[beacon]]`; None where there is none."""
+    degrees = {b.uwb_id: (b.latitude_deg, b.longitude_deg) for b in config.beacon}
+    if not degrees:
+        return None
+    if config.beacon[0].x_m is None:
+        known = {k: (lat, lon) for k, (lat, lon) in degrees.items() if lat is not None}
+        return Survey.of_degrees({k: (lat, lon or 0.0) for k, (lat, lon) in known.items()})
+    return Survey({b.uwb_id: np.array([b.x_m, b.y_m], dtype=float) for b in config.beacon})
 
 
 def has_sides(wheels: WheelSection) -> bool:

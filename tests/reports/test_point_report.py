@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from passing_scene import OWN, SENSORS, PassingScene
@@ -11,6 +13,7 @@ from drslamd.conventions import Chain, node_chain
 from drslamd.gossip.seal import team_key
 from drslamd.reports import point_report
 from drslamd.robot import Robot
+from drslamd.slam.odometry.track import RESOLUTION
 from drslamd.slam.points.point_tracker import PointTracker, Target
 
 NODE = node_chain(77)
@@ -53,3 +56,45 @@ def test_candidates_are_told_while_there_are_several() -> None:
     }
     assert (points["77"]["robot"], points["77"]["verdict"]) == (None, "ambiguous")
     assert len(points["77"]["candidates"]) == 2
+
+
+BEACONS = """
+[[beacon]]
+uwb_id = 77
+x_m = 10.0
+y_m = 0.0
+[[beacon]]
+uwb_id = 78
+x_m = 10.0
+y_m = 4.0
+"""
+
+
+@pytest.mark.parametrize("is_point", [False, True])
+def test_a_robot_has_a_pose_in_the_frame_of_the_site(is_point: bool) -> None:
+    robot, scene = Robot(config(OWN.robot, BEACONS), team_key(None), 1, {}), PassingScene(PLACE)
+    scene.drive(2)
+    assert point_report.site(robot, scene.utime) == {
+        "why_not": "no module of the site is known yet"
+    }
+    estimate = scene.estimate(NODE.robot, PLACE)
+    other = replace(estimate.nodes[NODE.robot], poses=np.array([[*(PLACE + [0.0, 4.0]), 0.0]]))
+    robot.back.estimate = replace(
+        estimate,
+        nodes={**estimate.nodes, NODE.robot + 1: other},
+        joint=1e-4 * np.eye(9),
+        points=frozenset([OWN.robot] if is_point else []),
+    )
+    for n, pose in enumerate(scene.path[:20]):
+        robot.front.reckoning.track.append(1_000 + n, np.round(pose / RESOLUTION))
+    site = point_report.site(robot, scene.utime)
+    assert site is not None
+    assert site["modules"] == [77, 78]
+    assert site["site_T_team"] == pytest.approx([7.0, 2.0, 0.0], abs=1e-6)
+    assert ("theta_deg" in site) is not is_point
+    last = scene.path[19]
+    assert (site["x_m"], site["y_m"]) == pytest.approx((last[0] + 7, last[1] + 2), abs=0.1)
+
+
+def test_without_coordinates_there_is_no_site() -> None:
+    assert point_report.site(a_robot(), 0) is None

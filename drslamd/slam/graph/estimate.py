@@ -10,7 +10,7 @@ import numpy as np
 from drslamd.conventions import Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.odometry.correction import Correction
-from drslamd.slam.se2 import Array
+from drslamd.slam.se2 import Array, Index
 
 
 @dataclass(frozen=True)
@@ -174,6 +174,17 @@ class TeamEstimate:
         """Of a robot's odometry."""
         parts = (self.scale, self.yaw, self.turn)
         return Correction(*(part.get(robot, Learned()).value for part in parts))
+
+    def rows_of(self, number: int) -> Index:
+        """(3,) where x, y, theta of the last pose of anybody are in `joint`.
+
+        Raises:
+            KeyError: nothing is claimed of it.
+        """
+        rows = self._rows(number)
+        if rows is None:
+            raise KeyError(number)
+        return np.arange(rows.start, rows.stop)
 
     def _rows(self, robot: int) -> slice | None:
         robots = [*self.trajectories, *self.nodes]
