@@ -33,7 +33,7 @@ from drslamd.events import (
     Tick,
     Write,
 )
-from drslamd.gossip.opening import is_news_of_a_member
+from drslamd.gossip.envelopes.opening import is_news_of_a_member
 from drslamd.gossip.seal import team_key
 from drslamd.io.clock import Clock, MonotonicClock, cpu_s
 from drslamd.io.near_socket import NearSocket

@@ -54,6 +54,7 @@ class Starts:
         """By robot: up to where its epochs are believed, where that is more than at first."""
         self._claims: dict[int, _Claim] = {}
         """By the peer that says so."""
+        self._was_silent = False
 
     def judge(self, origin: Chain, peer: Peer | None, utime: int) -> StartFault | None:
         """A proven message of a start that is not past: may it speak?
@@ -79,6 +80,9 @@ class Starts:
             said: how many entries our log has; None while this start has not said a word, so that
                 whoever knows it knows another of the same number.
         """
+        if said is not None and self._was_silent:
+            self._claims.clear()  # of what was known before our first word
+        self._was_silent = said is None
         own = self._own
         heard = {h.epoch for h in status.heard if h.id == own.robot}
         logs = [log for log in status.logs if log.id == own.robot]

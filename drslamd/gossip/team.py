@@ -10,6 +10,8 @@ from drslamd.events import ChannelMessage, Datagram, Send
 from drslamd.gossip import messages
 from drslamd.gossip.bounds import LAST_SEQ, Measurement, is_sayable
 from drslamd.gossip.entries.chapter_writer import ChapterWriter
+from drslamd.gossip.envelopes.opening import Opened, opened
+from drslamd.gossip.envelopes.splitting import entries_of, parts_of
 from drslamd.gossip.log_repeats import Place
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.membership.acquaintance import Acquaintance, vouched
@@ -18,11 +20,9 @@ from drslamd.gossip.membership.namesakes import Namesakes, unanswered
 from drslamd.gossip.membership.refusals import Fault, Refusals
 from drslamd.gossip.message_types import Received
 from drslamd.gossip.messages import Heard, Message, OdometryBatch, Pose, Status
-from drslamd.gossip.opening import Opened, opened
 from drslamd.gossip.peer import Peer, carrier, shared_module
 from drslamd.gossip.replicated_log import AHEAD
 from drslamd.gossip.seal import Header, Seal, SealFault
-from drslamd.gossip.splitting import entries_of, parts_of
 from drslamd.gossip.starts import Starts
 from drslamd.slam.graph.measurements import (
     ClosureMeasurement,

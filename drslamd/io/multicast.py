@@ -22,7 +22,7 @@ from pathlib import Path
 from drslamd.config import GossipSection
 from drslamd.events import Datagram, Event, NetworkState
 from drslamd.gossip import lc02
-from drslamd.gossip.shares import Shares
+from drslamd.gossip.membership.shares import Shares
 from drslamd.host.interfaces import NO_ADDRESS, SYSFS, address_of, fault_of
 from drslamd.io.backoff import Backoff
 from drslamd.io.clock import Clock

@@ -60,7 +60,7 @@ def reasons() -> set[str]:
     ports = {member.value for member in PortCondition if member is not PortCondition.OPEN}
     states = {member.name.lower().replace("_", " ") for member in PoseState}
     plain = said_in(PACKAGE / "gossip" / "team.py", r'self\.refused\["(.+?)"\]')
-    plain |= texts_returned(PACKAGE / "gossip" / "opening.py")
+    plain |= texts_returned(PACKAGE / "gossip" / "envelopes" / "opening.py")
     plain |= said_in(PACKAGE / "slam" / "front_end.py", r'\.count\("(.+?)"\)')
     plain |= texts_returned(PACKAGE / "slam" / "relative_pose" / "window_request.py")
     return names | values | ports | states | plain | set(CAUSES_FIRST)

@@ -11,8 +11,8 @@ from drslamd.config import OptimizerSection
 from drslamd.conventions import Chain
 from drslamd.events import ChannelMessage, Send
 from drslamd.gossip import lc02, messages
+from drslamd.gossip.envelopes.splitting import MEASUREMENTS_PER_ENTRY
 from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose, PoseState
-from drslamd.gossip.splitting import MEASUREMENTS_PER_ENTRY
 from drslamd.gossip.team import Team
 from drslamd.slam.graph.measurements import ClosureMeasurement, Keyframe, RangeMeasurement
 from drslamd.slam.graph.public_poses import PublicPoses

@@ -221,6 +221,16 @@ def test_before_the_first_word_whoever_knows_our_number_knows_another_start() ->
     assert claims(logs=log(10)) is None
 
 
+def test_what_was_claimed_before_our_first_word_counts_no_more_after_it() -> None:
+    team, seal = a_team(), a_seal(3)
+    for k, epoch in enumerate((10, 12)):
+        utime = T0 + 2 * k * SECOND
+        status = a_status((Heard(1, epoch, 0),))
+        team.receive(ChannelMessage(utime, *sealed(seal, status, utime)))
+        team.send(a_status(), utime)
+    assert team.superseded_by is None
+
+
 def test_who_holds_none_of_our_entries_proves_nothing_by_where_it_waits() -> None:
     assert claims(logs=log(10, complete=2**31 - 1, first=2**31 - 1)) is None
 

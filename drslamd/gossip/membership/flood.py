@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drslamd.conventions import MAX_ROBOT_ID
-from drslamd.gossip.shares import Shares
+from drslamd.gossip.membership.shares import Shares
 
 BUDGET = 50_000
 """Bytes a second, as a robot lets out by default."""

@@ -126,8 +126,10 @@ class Namesakes:
 
     def on_status(self, sender: int, status: Status, utime: int) -> None:
         """A peer says whom it hears: two of our id?"""
-        epochs = {heard.epoch for heard in status.heard if heard.id == self._own.robot}
-        if self._own.epoch in epochs and len(epochs) > 1:
+        of_us = [heard for heard in status.heard if heard.id == self._own.robot]
+        epochs = {heard.epoch for heard in of_us}
+        are_doubted = all(heard.delay_us == UNANSWERED for heard in of_us)
+        if self._own.epoch in epochs and len(epochs) > 1 and are_doubted:
             told = self._told.setdefault(sender, _Told(utime, utime))
             if utime - told.latest >= TOLD_US:
                 told.since = utime

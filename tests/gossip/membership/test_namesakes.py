@@ -12,7 +12,14 @@ from message_builders import SECOND, a_seal, a_status, an_entry, sealed
 
 from drslamd.conventions import Chain
 from drslamd.events import ChannelMessage
-from drslamd.gossip.membership.namesakes import GONE_US, SURE_US, TOLD_US, VOICES, Namesakes
+from drslamd.gossip.membership.namesakes import (
+    GONE_US,
+    SURE_US,
+    TOLD_US,
+    VOICES,
+    Namesakes,
+    unanswered,
+)
 from drslamd.gossip.message_types import UNANSWERED, Heard
 from drslamd.gossip.seal import Header
 from drslamd.gossip.team import Team
@@ -267,7 +274,10 @@ def test_who_speaks_under_our_id_is_named_while_it_is_heard_and_at_most_four_of_
 
 
 def test_a_peer_that_hears_two_of_our_id_must_say_so_twice() -> None:
-    found, both = Namesakes(OWN), a_status((Heard(*OWN, 7), Heard(1, 20, UNANSWERED)))
+    found, both = Namesakes(OWN), a_status(tuple(map(unanswered, (OWN, Chain(1, 20)))))
+    for after in (0, SURE_US):  # who is sure of one of them tells nothing of the kind
+        found.on_status(4, a_status((Heard(*OWN, 7), Heard(1, 20, UNANSWERED))), T0 + after)
+    assert not found.is_own_id_used(T0 + SURE_US)
     found.on_status(5, both, T0)
     assert not found.is_own_id_used(T0)
     found.on_status(5, a_status((Heard(1, 20, 7),)), T0 + SURE_US)  # only that it begins again

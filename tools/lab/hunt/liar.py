@@ -89,6 +89,8 @@ def _lie_to(
     beats = int(seconds * BEATS_A_SECOND)
     for beat in range(1, beats + 1):
         simulator.run(beat / BEATS_A_SECOND)
+        for robot, member in simulator.members.items():
+            liar.hears(robot, member.robot.own.epoch)
         while said < count * beat // beats:
             channel, payload = liar.lie(simulator.now)
             data = lc02.encode(said, channel, payload)

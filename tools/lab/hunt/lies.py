@@ -59,6 +59,10 @@ class Liar:
             self._public,
         )
 
+    def hears(self, robot: int, epoch: int) -> None:
+        """Whoever began again is answered under its new start."""
+        self._epochs[robot] = epoch
+
     def lie(self, utime: int) -> tuple[str, bytes]:
         """One message, stamped by a clock that it makes up: channel, payload."""
         message = self._kinds[int(self._rng.integers(len(self._kinds)))]()

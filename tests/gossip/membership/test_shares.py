@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from drslamd.conventions import SECOND_US
-from drslamd.gossip.shares import OF_LATE_US, Shares
+from drslamd.gossip.membership.shares import OF_LATE_US, Shares
 
 T0 = 100 * SECOND_US
 

@@ -9,7 +9,7 @@ from message_builders import OTHER_SECRET, SECOND, a_seal, a_status, an_entry, f
 
 from drslamd.events import ChannelMessage, Datagram
 from drslamd.gossip import lc02
-from drslamd.gossip.opening import Opened, is_news_of_a_member, opened
+from drslamd.gossip.envelopes.opening import Opened, is_news_of_a_member, opened
 from drslamd.gossip.seal import Seal, SealFault, team_key
 
 T0 = 100 * SECOND

@@ -7,8 +7,13 @@ from message_builders import HEADER, kinds
 
 from drslamd.gossip import messages
 from drslamd.gossip.bounds import Measurement
+from drslamd.gossip.envelopes.splitting import (
+    MEASUREMENTS_PER_ENTRY,
+    MODEL_EVERY,
+    entries_of,
+    parts_of,
+)
 from drslamd.gossip.lc02 import MAX_PAYLOAD
-from drslamd.gossip.splitting import MEASUREMENTS_PER_ENTRY, MODEL_EVERY, entries_of, parts_of
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.robot_model import UNTOLD

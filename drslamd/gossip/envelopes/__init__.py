@@ -1,0 +1,1 @@
+"""What comes is opened, and what does not fit one datagram is said in several."""
