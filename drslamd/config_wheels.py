@@ -75,12 +75,22 @@ class WheelSection(Section):
     reverse_right: bool = False
 
 
+class GyroKeys(Section):
+    """Of a base that may have a gyro; where it says nothing of one, the wheels give the heading."""
+
+    gyro_noise_deg_per_sqrt_s: Annotated[float, Field(ge=1e-4, le=5)] = 0.03
+    gyro_bias_deg_per_h: Annotated[float, Field(ge=0.1, le=10_000)] = 60.0
+    """One sigma of what is left when it was calibrated; while the robot stands it is learned."""
+    reverse_gyro: bool = False
+    """True when it counts turns to the right."""
+
+
 class SerialWheelSection(WheelSection):
     port: str
     baud: Baud = 115_200
 
 
-class KobukiSection(SerialWheelSection):
+class KobukiSection(SerialWheelSection, GyroKeys):
     source: Literal["kobuki"]
     track_m: Annotated[float, Field(gt=0.01, le=10)] = 0.230
     max_speed_mps: Annotated[float, Field(gt=0, le=50)] = 1.0
@@ -99,7 +109,7 @@ class RoboteqSection(SerialWheelSection):
     """What counts the turns: `?C` or, for motors with hall sensors alone, `?CB`."""
 
 
-class AsciiSection(SerialWheelSection):
+class AsciiSection(SerialWheelSection, GyroKeys):
     source: Literal["ascii"]
     counts_per_metre: Scale
 
@@ -117,13 +127,13 @@ class OdriveSection(CanWheelSection):
     """Motor turns per wheel turn."""
 
 
-class AgilexSection(CanWheelSection):
+class AgilexSection(CanWheelSection, GyroKeys):
     source: Literal["agilex"]
     wheelbase_m: Annotated[float, Field(gt=0.05, le=10)] | None = None
     """Distance between the axles, for a base that says how it steers (Hunter 2.0)."""
 
 
-class DbcSection(CanWheelSection):
+class DbcSection(CanWheelSection, GyroKeys):
     source: Literal["dbc"]
     dbc_file: str
     measures: Literal["counts", "wheel_speeds", "twist"]
@@ -148,6 +158,10 @@ class DbcSection(CanWheelSection):
     """Factor of `angular` to rad/s; `unit` when left out."""
     reverse_angular: bool = False
     """True when the base counts turns to the right."""
+    gyro: str = ""
+    """`Message.Signal` of a gyro's yaw rate, where the base has one."""
+    gyro_unit: Scale | None = None
+    """Factor to rad/s; what the DBC file says of its unit when left out."""
 
     @model_validator(mode="after")
     def _signals_fit_the_measure(self) -> DbcSection:
@@ -157,6 +171,8 @@ class DbcSection(CanWheelSection):
             raise ValueError(
                 f'measures = "{self.measures}" needs {" and ".join(missing)} as "Message.Signal"'
             )
+        if self.gyro and self.gyro.count(".") != 1:
+            raise ValueError('gyro names a "Message.Signal"')
         if self.measures == "counts" and self.counts_per_metre is None:
             raise ValueError('measures = "counts" needs counts_per_metre')
         if self.measures == "twist" and (self.reverse_left or self.reverse_right):

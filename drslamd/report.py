@@ -16,6 +16,7 @@ from drslamd.gossip.message_types import PoseState
 from drslamd.gossip.peer import Peer
 from drslamd.reports import clock_report, point_report
 from drslamd.robot import Robot
+from drslamd.sensors.gyro.gyro_heading import GyroHeading
 from drslamd.slam.consistency.pair import PairTracker
 from drslamd.slam.graph.trajectory import deform_track
 
@@ -111,6 +112,20 @@ def _wheels(robot: Robot, utime: int) -> dict[str, Any]:
         "age_s": age_s(utime, robot.wheels.last_motion_utime),
         "path_m": round(robot.front.reckoning.path_m, 3),
         "counters": robot.wheels.counters(),
+        **({"gyro": _gyro(robot.wheels.gyro, utime)} if robot.wheels.gyro.is_there else {}),
+    }
+
+
+def _gyro(gyro: GyroHeading, utime: int) -> dict[str, Any]:
+    """Does it give the heading, and what is known of it?"""
+    fault, rest, known = gyro.fault(utime), gyro.rest, gyro.comparison.known
+    return {
+        "in_use": gyro.is_in_use,
+        "fault": fault.value if fault else None,
+        "bias_deg_per_s": round(math.degrees(rest.bias_radps), 4),
+        "bias_sigma_deg_per_h": round(math.degrees(rest.told.yaw_rad_per_s) * 3600, 1),
+        "turns_of_wheels": round(known.ratio, 3),
+        "slips_s": gyro.comparison.slips,
     }
 
 

@@ -96,7 +96,7 @@ class Robot:
         self.config = config
         self.own = Chain(config.robot.id, epoch)
         self.uwb = LinkTrackInput(config.uwb_id, config.uwb.max_range_m, config.uwb.line)
-        self.wheels = WheelInput(config.wheels, dbc_text)
+        self.wheels = WheelInput(config.wheels, dbc_text, config.odometry)
         self.team = Team(Seal(key, config.robot.id, epoch, epochs), config.gossip.max_bytes_per_s)
         uses_kept = closure_method(config.relative_pose).uses_calibration
         self.calibration = CalibrationStore(kept, uses_kept, taped)

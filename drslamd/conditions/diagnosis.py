@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol
 
-from drslamd.conditions import contradictions
+from drslamd.conditions import contradictions, turns
 from drslamd.conditions.ports import port_cause, port_remedy
 from drslamd.config import Config
 from drslamd.config_wheels import SerialWheelSection
@@ -70,6 +70,7 @@ def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
     """Everything that is looked after, sensor by sensor and stage by stage."""
     yield "uwb", _sensor(robot, "uwb", robot.uwb.advice, utime)
     yield "wheels", _sensor(robot, "wheels", robot.wheels.advice, utime)
+    yield from turns.conditions(robot.wheels.gyro, utime)
     network = robot.network
     yield "network", None if network is None or network.up else network.detail
     yield "sleep", _sleep(robot.slept, utime)

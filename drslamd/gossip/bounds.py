@@ -37,7 +37,6 @@ LAST_SEGMENT = 2**15 - 1
 """Breaks in the odometry of one start, its 16 bits; then it needs another."""
 LAST_SEQ = 2**31 - 2
 """Of an entry: one past it still fits 32 bits. At one a second it takes 68 years."""
-TRAITS = 8
 MAX_TRAIT = 10.0
 LEAST_SIGMA = 2.0**-30
 """Of a robot's odometry; much less would be no positive number in 32 bits."""

@@ -63,6 +63,7 @@ class Team:
         self.last_echo: int | None = None
         self._next_seq = 0
         self._chapters = ChapterWriter()
+        self._told_model: RobotModel | None = None
         self._named_last = -1
         """The robot after which the next status goes on, when it cannot name all that are heard."""
         self.starts = Starts(self.own, seal.epochs)
@@ -105,12 +106,13 @@ class Team:
         ranges: Sequence[RangeMeasurement],
         closures: Sequence[ClosureMeasurement],
     ) -> Iterator[GraphEntry]:
-        """The next entries of our log, each small enough for one datagram; what no reader would
-        take is left out and counted."""
+        """The next entries of our log, a datagram each; what no reader would take is counted."""
         measured: list[Measurement] = [*keyframes, *ranges, *closures]
         measurements = [item for item in measured if is_sayable(item)]
         self.unsayable += len(measured) - len(measurements)
-        yield from entries_of(model, measurements, self._next_seq)
+        is_news = model != self._told_model
+        self._told_model = model if measurements else self._told_model
+        yield from entries_of(model, measurements, self._next_seq, is_news=is_news)
 
     def write_chapter(self, utime: int, *, aloud: bool) -> list[GraphEntry]:
         """Entries that follow where a chapter is due; they are said later, if `aloud`."""

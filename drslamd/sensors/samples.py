@@ -58,7 +58,36 @@ class Twist:
     angular_radps: float
 
 
-WheelSample = Union[WheelCounts, WheelTurns, WheelSpeeds, Twist]
+WheelReading = Union[WheelCounts, WheelTurns, WheelSpeeds, Twist]
+
+
+@dataclass(frozen=True)
+class GyroAngle:
+    """How far a gyro has turned, rad to the left; it may wrap at half a turn."""
+
+    utime: int
+    angle_rad: float
+
+
+@dataclass(frozen=True)
+class GyroRate:
+    """How fast a gyro turns, rad/s to the left."""
+
+    utime: int
+    radps: float
+
+
+WheelSample = Union[WheelReading, GyroAngle, GyroRate]
+"""What a base says; gyros come with it."""
+
+
+@dataclass(frozen=True)
+class GyroSigmas:
+    """How wrong the turns of a gyro are: random yaw, rad per square root of a second, and the
+    constant yaw rate, rad/s."""
+
+    yaw_rad_per_sqrt_s: float
+    yaw_rad_per_s: float
 
 
 @dataclass(frozen=True)
@@ -67,9 +96,14 @@ class Motion:
 
     `gap` says that the link to the previous one is lost (a counter was reset, too long a silence):
     distance and turn are then unknown and given as zero.
+
+    `gyro` says how wrong the turn is where a gyro gave it. `gyro_wrong_since` is the time since
+    when one did and was wrong; this turn makes that good.
     """
 
     utime: int
     distance_m: float
     turn_rad: float
     gap: bool = False
+    gyro: GyroSigmas | None = None
+    gyro_wrong_since: int | None = None

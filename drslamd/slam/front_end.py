@@ -33,6 +33,7 @@ from drslamd.slam.relative_pose.range_sampler import RangeSampler
 from drslamd.slam.relative_pose.window_request import WindowRequest, request
 from drslamd.slam.relocation.relocation import Relocation
 from drslamd.slam.relocation.sightings import Own
+from drslamd.slam.robot_model import with_gyro
 from drslamd.slam.se2 import Array
 from drslamd.slam.tuning import DEFAULTS, Tuning
 
@@ -102,6 +103,7 @@ class FrontEnd:
 
     def on_motion(self, motion: Motion) -> None:
         self.reckoning.add(self._known.corrected(motion))
+        self.model = with_gyro(self.model, motion)
 
     def interrupt(self) -> None:
         """Nobody watched for a while: no window spans it."""

@@ -41,12 +41,17 @@ def pose_now(
     return PoseNow(
         now * GRID_US,
         np.append(pose[:2], se2.wrap(pose[2])),
-        carried(known, float(solved.poses[-1, 2]), step, noise, level),
+        carried(known, float(solved.poses[-1, 2]), step, noise, level, last),
     )
 
 
 def carried(
-    covariance: Array, heading: float, step: Array, noise: OdometryNoise, level: float
+    covariance: Array,
+    heading: float,
+    step: Array,
+    noise: OdometryNoise,
+    level: float,
+    first: int | None = None,
 ) -> Array:
     """(3, 3) covariance of x, y, theta in w at the end of a way.
 
@@ -54,17 +59,24 @@ def carried(
         covariance: (3, 3) at its start; heading: there, in w, rad.
         step: (k, 3) the way, from its start.
         level: how many times the sigma of odometry is what is configured.
+        first: sample of the track where it begins, if it has all samples after it; else no gyro is
+            believed.
     """
     forward = np.eye(3)
     forward[:2, 2] = se2.rotate(heading, _lever(step)[:2, 2])
     moved = forward @ covariance @ forward.T
-    return np.asarray(moved + noise_of_way(heading, step, noise, level))
+    return np.asarray(moved + noise_of_way(heading, step, noise, level, first))
 
 
-def noise_of_way(heading: float, step: Array, noise: OdometryNoise, level: float) -> Array:
+def noise_of_way(
+    heading: float, step: Array, noise: OdometryNoise, level: float, first: int | None = None
+) -> Array:
     """(3, 3) what a way adds to the covariance of x, y, theta in w, see `carried`."""
-    lever = _lever(step)
-    added = lever @ covariance_between(noise, step, growth(step), 0, -1) @ lever.T
+    lever, gyro = _lever(step), noise.gyro
+    seconds = None
+    if gyro is not None and first is not None:
+        seconds = gyro.seconds(first + np.arange(len(step)), step)
+    added = lever @ covariance_between(noise, step, growth(step, seconds), 0, -1) @ lever.T
     return np.asarray(level**2 * se2.turned(added, heading))
 
 

@@ -32,7 +32,9 @@ def test_everything_is_looked_after_from_the_sensors_to_the_budget() -> None:
     keys = [key for key, _ in conditions(scene.robot, scene.utime)]
     team = [key for key in keys if key.startswith("team.")]
     of_poses = ["pose", "doubt", "partners", "mounting"]
-    hardware, rest = ["uwb", "wheels", "network", "sleep"], ["site", "load", "budget", "state"]
+    turns = ["gyro", "wheels.slip", "wheels.track"]
+    hardware = ["uwb", "wheels", *turns, "network", "sleep"]
+    rest = ["site", "load", "budget", "state"]
     assert keys == [*hardware, *team, *of_poses, *rest]
     assert len(team) >= 4
 

@@ -17,6 +17,7 @@ from drslamd.gossip.membership.namesakes import NamesakeFault
 from drslamd.gossip.message_types import PoseState
 from drslamd.gossip.seal import SealFault
 from drslamd.gossip.starts import StartFault
+from drslamd.sensors.gyro.comparison import GyroFault
 from drslamd.sensors.linktrack.codec import Refusal
 from drslamd.sensors.linktrack.linktrack_input import RangeRefusal
 from drslamd.sensors.wheels.wheel_base import Gap, ReadingRefusal
@@ -31,6 +32,7 @@ BY_NAME: dict[str, type[Enum]] = {
     "messages.refused.": WheelRefusal,
     "samples.refused.": ReadingRefusal,
     "gaps.": Gap,
+    "gyro.faults.": GyroFault,
 }
 """Counters, by what stands before the reason."""
 BY_VALUE: list[type[Enum]] = [FramingFault, SealFault, StartFault, NamesakeFault, Verdict]

@@ -24,6 +24,9 @@ from drslamd.gossip.codecs import CODECS
 from drslamd.gossip.message_types import Heard, LogState, Message, OdometryBatch, Status
 from drslamd.slam.graph.measurements import ClosureMeasurement, GraphEntry, RangeMeasurement
 
+PLAIN = (1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.5)
+"""Traits of a robot without a gyro."""
+
 
 def through(message: Message) -> Message | str:
     return messages.decode(messages.kind_of(message), messages.encode(HEADER, message))
@@ -119,6 +122,8 @@ def verdict(kind: str, *path: Any) -> Message | str:
     for step in way:
         at = at[step] if isinstance(step, int) else getattr(at, step)
     setattr(at, last, value)
+    if last == "traits":
+        raw.n_traits = len(value)
     return messages.decode(kind, raw.encode())
 
 
@@ -172,6 +177,9 @@ ACCEPTED: list[tuple[Any, ...]] = [
     ("GRAPH", "closures", 0, "covariance", (2e-8, 0, 0, 89_000, 0, 2e-8)),
     ("GRAPH", "traits", (9.5, 2.0**-30, 1e-9, 1e-9, -9.5, 9.5, 0.0, 0.0)),
     ("GRAPH", "traits", (1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 9.5)),
+    ("GRAPH", "traits", (*PLAIN, 9.5, 2.0**-30, 0, 0, 0, 0)),
+    ("GRAPH", "traits", (*PLAIN, 0.5, 0.5, 32_767, 65_534, 32_767, 65_535)),
+    ("GRAPH", "traits", (*PLAIN, 0.5, 0.5, 1, 7, 1, 7)),
     ("GRAPH", "ranges", 0, "turn", (31_416, -31_416)),
     ("GRAPH", "closures", 0, "corrected", (127, -127, 127, -127)),
     ("GRAPH", "keyframes", 0, "n", 0),
@@ -253,6 +261,17 @@ REFUSED: list[tuple[Any, ...]] = [
     ("GRAPH", "traits", (1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, -1e-9)),
     ("GRAPH", "traits", (1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 10.0)),
     ("GRAPH", "traits", (1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, NAN)),
+    ("GRAPH", "traits", (*PLAIN, 10.0, 0.5, 0, 0, 0, 0)),
+    ("GRAPH", "traits", (*PLAIN, 0.5, 0.0, 0, 0, 0, 0)),
+    ("GRAPH", "traits", (*PLAIN, 0.5, 0.5, 0.5, 0, 1, 0)),
+    ("GRAPH", "traits", (*PLAIN, 0.5, 0.5, -1, 0, 1, 0)),
+    ("GRAPH", "traits", (*PLAIN, 0.5, 0.5, 0, 65_536, 2, 0)),
+    ("GRAPH", "traits", (*PLAIN, 0.5, 0.5, 1, 7, 1, 6)),
+    ("GRAPH", "traits", (*PLAIN, 0.5, 0.5, 0, 0, 32_768, 0)),
+    ("GRAPH", "traits", (*PLAIN, 0.5, 0.5, 32_767, 65_535, 32_767, 65_535)),
+    ("GRAPH", "traits", PLAIN[:7]),
+    ("GRAPH", "traits", (*PLAIN, 0.5, 0.5, 0, 0, 0)),
+    ("GRAPH", "traits", (*PLAIN, 0.5, 0.5, 0, 0, NAN, 0)),
     ("GRAPH", "ranges", 0, "turn", (31_417, 0)),
     ("GRAPH", "ranges", 0, "turn", (0, -31_417)),
     ("GRAPH", "closures", 0, "corrected", (0, -128, 0, 0)),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from acquainted import introduce
 from message_builders import (
@@ -22,6 +24,7 @@ from drslamd.gossip import lc02
 from drslamd.gossip.message_types import Heard, LogState, Message, OdometryBatch, Status
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
+from drslamd.slam.odometry.gyro_noise import GyroNoise
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.robot_model import UNTOLD, RobotModel
 
@@ -394,3 +397,21 @@ def test_a_sender_without_a_name_is_called_unknown() -> None:
     team = a_team()
     team.receive(ChannelMessage(T0, *forged(a_status(), secret=OTHER_SECRET)))
     assert "from an unknown sender" in str(dict(team.conditions(T0))["team.wrong_tag"])
+
+
+def test_what_our_sensors_are_like_is_said_again_as_soon_as_it_is_another() -> None:
+    team = a_team()
+    turned = replace(UNTOLD, noise=replace(UNTOLD.noise, gyro=GyroNoise(0.25, 0.5, 70)))
+    said = []
+    for k in range(8):
+        if k == 5:  # without measurements there is no entry that could say it
+            assert not list(team.entries(turned, (), (), ()))
+        for entry in team.entries(UNTOLD if k < 5 else turned, an_entry(0, k).keyframes, (), ()):
+            said.append(team.append(entry, T0)[0].model)
+    assert said[1:] == [None] * 4 + [turned_as_sent(said[5])] + [None] * 2
+
+
+def turned_as_sent(model: RobotModel | None) -> RobotModel:
+    assert model is not None
+    assert model.noise.gyro == GyroNoise(0.25, 0.5, 70)
+    return model

@@ -27,6 +27,7 @@ from drslamd.slam.graph.measurements import (
     RangeMeasurement,
 )
 from drslamd.slam.graph.public_poses import MAX_HELD, MAX_PUBLIC, PublicPoses
+from drslamd.slam.odometry.gyro_noise import OPEN, GyroNoise
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.robot_model import RobotModel
 
@@ -115,9 +116,12 @@ closures = st.builds(
     corrected=st.tuples(*[st.integers(-127, 127).map(fiftieths)] * 4),
 )
 sigmas = st.floats(2**-20, 8, width=32)
+gyros = st.tuples(samples, samples | st.just(OPEN)).flatmap(
+    lambda span: st.builds(GyroNoise, sigmas, sigmas, st.just(min(span)), st.just(max(span)))
+)
 models = st.builds(
     RobotModel,
-    st.builds(OdometryNoise, sigmas, sigmas, sigmas, sigmas),
+    st.builds(OdometryNoise, sigmas, sigmas, sigmas, sigmas, st.none() | gyros),
     *[st.floats(-8, 8, width=32)] * 3,
     st.floats(0, 8, width=32),
 )

@@ -20,7 +20,7 @@ from drslamd.sensors.frame_scanner import FrameScanner
 from drslamd.sensors.linktrack.codec import LINKTRACK, Frame, Refusal, decode
 from drslamd.sensors.linktrack.linktrack_frames import ModuleFault
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
-from drslamd.sensors.samples import Twist, WheelCounts, WheelSpeeds, WheelTurns
+from drslamd.sensors.samples import GyroAngle, Twist, WheelCounts, WheelSpeeds, WheelTurns
 from drslamd.sensors.wheels.agilex import AgilexDriver
 from drslamd.sensors.wheels.ascii_odometry import AsciiDriver
 from drslamd.sensors.wheels.dbc import DbcDriver
@@ -124,15 +124,18 @@ def test_three_captured_frames_give_two_ranges(vectors: Path) -> None:
     assert [s.power_gap_db for s in samples] == [4.0, 4.0]
 
 
-def test_captured_kobuki_packets_give_their_counters(vectors: Path) -> None:
+def test_captured_kobuki_packets_give_their_counters_and_their_heading(vectors: Path) -> None:
     packets = {v["id"]: v for v in load(vectors, "kobuki.json")}
     driver, samples = KobukiDriver(), []
     for k, letter in enumerate("abc"):
         packet = packets[f"kobuki_{letter}"]
         data = bytes.fromhex(packet["hex"] + packet["trailing_hex"])
         samples += driver.feed(data, T0 + k * 20 * MS)
+    # (the base holds its heading in hundredths of a degree)
     assert samples == [
+        GyroAngle(T0 + 20 * MS, pytest.approx(math.radians(74.85))),
         WheelCounts(T0 + 20 * MS, 11252, 18272, 16),
+        GyroAngle(T0 + 40 * MS, pytest.approx(math.radians(74.86))),
         WheelCounts(T0 + 40 * MS, 11260, 18279, 16),
     ]
     wrap = KobukiDriver()

@@ -12,6 +12,7 @@ from slam_scenes import EXACT, NOISE, Array, product, same_pose, wander
 from drslamd.conventions import GRID_US, Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import Learned, PoseNow, TeamEstimate, Trajectory
+from drslamd.slam.odometry.gyro_noise import GyroNoise
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.odometry.track import RESOLUTION, Track
 from drslamd.slam.pose_now import carried, pose_now
@@ -178,3 +179,18 @@ def test_a_point_that_begins_to_drive_may_be_anywhere_on_a_circle() -> None:
     assert stood.pose == pytest.approx(SOLVED)
     aside = math.dist(PATH[10][:2], PATH[-1][:2])
     assert stood.covariance - KNOWN == pytest.approx(np.diag([aside**2, aside**2, 0.0]), abs=1e-3)
+
+
+def test_a_way_whose_heading_a_gyro_gave_is_as_uncertain_as_the_gyro() -> None:
+    """A metre ahead in a second: 0.01 rad/sqrt(s), and 0.002 rad/s besides."""
+    path = np.zeros((21, 3))
+    path[10:, 0] = np.linspace(0, 1, 11)
+    gyro = GyroNoise(0.01, 0.002, FIRST + 5)
+    team = replace(estimate(), joint=np.zeros((6, 6)))
+    found = pose_now(team, 4, track_of(path), replace(EXACT, gyro=gyro))
+    assert found is not None
+    assert found.covariance[2, 2] == pytest.approx(0.01**2 + 0.002**2, rel=1e-6)
+    late = replace(gyro, since=FIRST + 15)
+    found = pose_now(team, 4, track_of(path), replace(EXACT, gyro=late))
+    assert found is not None
+    assert found.covariance[2, 2] == pytest.approx(0.01**2 / 2 + 0.001**2, rel=1e-6)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from slam_scenes import NOISE
 
 from drslamd.config import OdometrySection
-from drslamd.slam.robot_model import UNTOLD, RobotModel
+from drslamd.conventions import GRID_US
+from drslamd.sensors.samples import GyroSigmas, Motion
+from drslamd.slam.odometry.gyro_noise import OPEN, GyroNoise
+from drslamd.slam.robot_model import UNTOLD, RobotModel, with_gyro
 from drslamd.slam.settings import odometry_noise
 
 MODEL = RobotModel(NOISE, 0.1, -0.2, 0.3, 0.4)
@@ -63,3 +67,55 @@ def test_wheels_stand_as_far_apart_as_a_configuration_may_say(
 def test_noise_that_no_configuration_allows_is_not_plausible() -> None:
     assert MODEL.is_plausible()
     assert not replace(MODEL, noise=replace(NOISE, scale=0.6)).is_plausible()
+
+
+GYRO = GyroNoise(0.002, 0.0001, 70_000, OPEN)
+SIGMAS = GyroSigmas(0.002, 0.0001)
+
+
+def motion(n: float, gyro: GyroSigmas | None = SIGMAS, **keys: Any) -> Motion:
+    """One that ended a little after sample n of the grid."""
+    return Motion(round(n * GRID_US), 0.1, 0.2, gyro=gyro, **keys)
+
+
+def test_of_a_robot_with_a_gyro_fourteen_numbers_travel() -> None:
+    model = replace(MODEL, noise=replace(NOISE, gyro=GYRO))
+    numbers = model.numbers()
+    assert numbers[:8] == MODEL.numbers()
+    assert numbers[8:] == (0.002, 0.0001, 1, 4464, 32_767, 65_535)
+    assert RobotModel.of_numbers(numbers) == model
+
+
+def test_a_gyro_counts_from_the_first_sample_after_its_first_turn() -> None:
+    model = with_gyro(MODEL, motion(70.4))
+    assert model.noise.gyro == GyroNoise(0.002, 0.0001, 71, OPEN)
+    assert with_gyro(model, motion(70.9)) is model
+    assert with_gyro(MODEL, motion(70.4, None)) is MODEL
+
+
+def test_a_gyro_that_is_better_known_says_so() -> None:
+    model = with_gyro(with_gyro(MODEL, motion(70)), motion(80, GyroSigmas(0.002, 0.00005)))
+    assert model.noise.gyro == GyroNoise(0.002, 0.00005, 71, OPEN)
+
+
+def test_a_gyro_is_in_use_until_the_last_sample_that_it_turned_whole() -> None:
+    model = with_gyro(with_gyro(MODEL, motion(70)), motion(90.5, None))
+    assert model.noise.gyro == GyroNoise(0.002, 0.0001, 71, 89)
+    assert with_gyro(model, motion(95, None)) is model
+    again = with_gyro(model, motion(120.5))
+    assert again.noise.gyro == GyroNoise(0.002, 0.0001, 121, OPEN)
+
+
+def test_of_one_that_was_wrong_counts_what_it_turned_before() -> None:
+    wrong = motion(90.5, None, gyro_wrong_since=round(80.5 * GRID_US))
+    model = with_gyro(with_gyro(MODEL, motion(70)), wrong)
+    assert model.noise.gyro == GyroNoise(0.002, 0.0001, 71, 80)
+    early = motion(90.5, None, gyro_wrong_since=60 * GRID_US)
+    assert with_gyro(with_gyro(MODEL, motion(70)), early).noise.gyro == GyroNoise(
+        0.002, 0.0001, 71, 71
+    )
+
+
+def test_a_gap_says_nothing_of_the_gyro() -> None:
+    model = with_gyro(MODEL, motion(70))
+    assert with_gyro(model, motion(90, None, gap=True)) is model

@@ -21,7 +21,7 @@ import numpy as np
 
 from drslamd import lcmtypes
 from drslamd.conventions import Chain
-from drslamd.gossip.bounds import TRAITS, bounded
+from drslamd.gossip.bounds import bounded
 from drslamd.gossip.entries.measurement_codecs import (
     filled_closure,
     filled_range,
@@ -35,6 +35,7 @@ from drslamd.gossip.entries.measurement_codecs import (
 )
 from drslamd.slam.graph.chapters import COUNTS_FOR, PER_ENTRY
 from drslamd.slam.graph.measurements import Chapter
+from drslamd.slam.robot_model import BY_GYRO
 from drslamd.slam.se2 import Index
 
 MAX_UNPACKED = 1 << 16
@@ -47,7 +48,8 @@ SHORT = 2**15 - 1
 _HEAD = struct.Struct(">b3bi5H")
 """Layer, parts, first, then how many peers, models, keyframes, ranges and closures."""
 _PEER = struct.Struct(">hq")
-_MODEL = struct.Struct(f">i{TRAITS}f")
+_MODEL = struct.Struct(">ib")
+"""Entry and number of traits, which follow."""
 _KEYFRAME, _RANGE, _CLOSURE = 5, 12, 19
 """Columns of each."""
 
@@ -73,9 +75,13 @@ def packed(chapter: Chapter) -> bytes:
     counts = map(len, (peers, chapter.models, keyframes, ranges, closures))
     out = [_HEAD.pack(chapter.layer, *chapter.parts, chapter.first, *counts)]
     out += [_PEER.pack(*said_peer(peer)) for peer in peers]
-    out += [_MODEL.pack(seq, *traits_of(model)) for seq, model in chapter.models]
+    out += [_model(seq, traits_of(model)) for seq, model in chapter.models]
     out += [_planes(keyframes), _planes(ranges), _planes(closures)]
     return zlib.compress(b"".join(out), 9)
+
+
+def _model(seq: int, traits: Sequence[float]) -> bytes:
+    return _MODEL.pack(seq, len(traits)) + struct.pack(f">{len(traits)}f", *traits)
 
 
 def _planes(rows: Sequence[Sequence[int]]) -> bytes:
@@ -117,6 +123,12 @@ class _Reader:
     def structs(self, kind: struct.Struct, count: int) -> list[tuple[Any, ...]]:
         return [kind.unpack(self.take(kind.size)) for _ in range(count)]
 
+    def model(self) -> tuple[int, tuple[float, ...]]:
+        """An entry, and the traits that it tells."""
+        seq, count = _MODEL.unpack(self.take(_MODEL.size))
+        traits = struct.Struct(f">{bounded('number of traits', count, 0, BY_GYRO)}f")
+        return seq, traits.unpack(self.take(traits.size))
+
     def rows(self, count: int, columns: int) -> list[list[int]]:
         rows: list[list[int]] = _rows(self.take(4 * count * columns), count, columns).tolist()
         return rows
@@ -146,7 +158,7 @@ def unpacked(data: bytes, seq: int) -> Chapter:
     ]
     models = [
         (bounded("entry", at, first, seq), read_model(traits))
-        for at, *traits in reader.structs(_MODEL, n_models)
+        for at, traits in (reader.model() for _ in range(n_models))
     ]
     names = lcmtypes.keyframe_t.__slots__
     keyframes = [

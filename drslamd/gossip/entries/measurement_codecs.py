@@ -11,6 +11,7 @@ from typing import Any
 from drslamd import lcmtypes
 from drslamd.conventions import (
     FIRST_NODE,
+    LAST_N,
     ROTATION_STEP_RAD,
     TRANSLATION_STEP_M,
     Chain,
@@ -18,14 +19,14 @@ from drslamd.conventions import (
     node_chain,
 )
 from drslamd.gossip import bounds
-from drslamd.gossip.bounds import LEAST_SIGMA, MAX_TRAIT, TRAITS, bounded
+from drslamd.gossip.bounds import LEAST_SIGMA, MAX_TRAIT, bounded
 from drslamd.slam.graph.measurements import (
     ClosureMeasurement,
     GraphEntry,
     Keyframe,
     RangeMeasurement,
 )
-from drslamd.slam.robot_model import RobotModel
+from drslamd.slam.robot_model import BY_GYRO, PLAIN, SPLIT, RobotModel
 
 NODES = 255
 """In the place of a peer's id: a module that no robot carries, its UWB id in the place of the epoch
@@ -45,18 +46,34 @@ def filled(kind: type[Any], values: Any) -> Any:
     return out
 
 
+def traits_of(model: RobotModel) -> tuple[float, ...]:
+    """As they travel: 8 numbers, of a robot whose heading comes from a gyro 14."""
+    numbers = model.numbers()
+    sigmas = (*numbers[:4], *numbers[PLAIN : PLAIN + 2])
+    told = [max(sigma, LEAST_SIGMA) for sigma in sigmas]
+    return (*told[:4], *numbers[4:PLAIN], *told[4:], *numbers[PLAIN + 2 :])
+
+
 def read_model(traits: Sequence[float]) -> RobotModel:
     """What a robot's sensors are like."""
-    if len(traits) != TRAITS:
-        raise ValueError(f"{len(traits)} traits, allowed are {TRAITS} or none")
-    sigmas, antenna, half_track = traits[:4], traits[4:7], traits[7:]
+    if len(traits) not in (PLAIN, BY_GYRO):
+        raise ValueError(f"{len(traits)} traits, allowed are {PLAIN}, {BY_GYRO} or none")
+    sigmas, antenna = (*traits[:4], *traits[PLAIN : PLAIN + 2]), traits[4 : PLAIN - 1]
     if not all(LEAST_SIGMA <= v < MAX_TRAIT for v in sigmas):
         raise ValueError("sigma out of range")
     if not all(abs(v) < MAX_TRAIT for v in antenna):
         raise ValueError("antenna out of range")
-    if not all(0 <= v < MAX_TRAIT for v in half_track):
+    if not 0 <= traits[PLAIN - 1] < MAX_TRAIT:
         raise ValueError("track out of range")
-    return RobotModel.of_numbers(tuple(traits))
+    if not all(0 <= v < SPLIT and v == int(v) for v in traits[PLAIN + 2 :]):
+        raise ValueError("samples of a gyro that are no whole numbers of 16 bits")
+    model = RobotModel.of_numbers(tuple(traits))
+    gyro = model.noise.gyro
+    if gyro is not None and (
+        gyro.since > min(gyro.until, LAST_N) or (gyro.until > LAST_N and not gyro.is_in_use)
+    ):
+        raise ValueError("a gyro that was used until before it was used")
+    return model
 
 
 def read_peer(p: Any) -> Chain:
@@ -68,11 +85,6 @@ def read_peer(p: Any) -> Chain:
 def said_peer(chain: Chain) -> tuple[int, int]:
     """The id and the epoch that stand for a peer in a message."""
     return (NODES, chain.robot - FIRST_NODE) if is_node(chain.robot) else chain
-
-
-def traits_of(model: RobotModel) -> tuple[float, ...]:
-    numbers = model.numbers()
-    return (*(max(sigma, LEAST_SIGMA) for sigma in numbers[:4]), *numbers[4:])
 
 
 def peers_of(entry: GraphEntry) -> list[Chain]:

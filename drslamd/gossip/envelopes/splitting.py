@@ -24,15 +24,19 @@ PUBLIC_ENVELOPE_BYTES = 80
 
 
 def entries_of(
-    model: RobotModel, measurements: Sequence[Measurement], first_seq: int
+    model: RobotModel, measurements: Sequence[Measurement], first_seq: int, *, is_news: bool
 ) -> Iterator[GraphEntry]:
-    """Log entries from this number on."""
+    """Log entries from this number on.
+
+    Args:
+        is_news: is the model another one than was said?
+    """
     starts = range(0, len(measurements), MEASUREMENTS_PER_ENTRY)
     for seq, first in enumerate(starts, start=first_seq):
         part = measurements[first : first + MEASUREMENTS_PER_ENTRY]
         yield GraphEntry(
             seq,
-            model if seq % MODEL_EVERY == 0 else None,
+            model if seq % MODEL_EVERY == 0 or (is_news and not first) else None,
             tuple(i for i in part if isinstance(i, Keyframe)),
             tuple(i for i in part if isinstance(i, RangeMeasurement)),
             tuple(i for i in part if isinstance(i, ClosureMeasurement)),

@@ -15,6 +15,10 @@ Hunter 2.0               no 0x311; in 0x221 no yaw rate but, in bytes 6 and 7, t
 Ranger                   0x291 says how its four wheels are steered. Only in mode 0 do the two paths
                          of 0x311 mean a turn; sideways and on the spot they are refused.
 
+LIMO                     beside 0x311 a gyro: 0x322 with rates about x, y and z in 0.01 deg/s, 0x323
+                         with yaw, pitch and roll in 0.01 deg, as its driver reads them. The yaw
+                         counts where it comes: the base makes it of all that its gyro says.
+
 A base that moves sideways (0x221, bytes 4 and 5: mecanum wheels) is refused while it does.
 """
 
@@ -26,7 +30,7 @@ from typing import Final, NamedTuple
 
 from drslamd.conventions import SECOND_US
 from drslamd.events import CanFrame
-from drslamd.sensors.samples import Twist, WheelCounts, WheelSample
+from drslamd.sensors.samples import GyroAngle, GyroRate, Twist, WheelCounts, WheelSample
 from drslamd.sensors.tally import Tally
 from drslamd.sensors.wheels.wheel_driver import CanDriver, Outcome, WheelRefusal, tallied
 
@@ -50,12 +54,17 @@ _SYSTEM_STATE: Final = 0x211
 _MOTION: Final = 0x221
 _MOTION_MODE: Final = 0x291
 _ODOMETRY: Final = 0x311
+_RATES: Final = 0x322
+_ANGLES: Final = 0x323
 _ONLY_IN_V1: Final = 0x151
 
 _STATE_AND_ERRORS: Final = struct.Struct(">B3xH")  # between them: control mode, battery
 _SPEEDS: Final = struct.Struct(">hh")  # 0.001 m/s, 0.001 rad/s
 _BESIDES: Final = struct.Struct(">4xhh")  # sideways 0.001 m/s, steering 0.001 rad
 _PATHS: Final = struct.Struct(">ii")
+_AXES: Final = struct.Struct(">3h")
+ANGLES_MISSING_US: Final = SECOND_US
+"""Rates count when angles have not come for so long."""
 
 _STATES: Final = {1: "an emergency stop", 2: "a fault"}
 
@@ -93,6 +102,7 @@ class AgilexDriver(CanDriver):
         self._sideways_utime: int | None = None
         self._state_utime: int | None = None
         self._odometry_utime: int | None = None
+        self._angle_utime: int | None = None
         self.vehicle_state = 0
         self.error_bits = 0
         self.tally: Tally[WheelRefusal] = Tally()
@@ -156,6 +166,8 @@ class AgilexDriver(CanDriver):
             return self._on_motion(frame, frame.utime - odometry_utime > ODOMETRY_MISSING_US)
         if frame.can_id == _MOTION_MODE:
             return self._on_mode(frame)
+        if frame.can_id in (_RATES, _ANGLES):
+            return self._on_gyro(frame)
         if frame.can_id == _SYSTEM_STATE:
             self._state_utime = frame.utime
             return self._on_state(frame.data)
@@ -170,6 +182,17 @@ class AgilexDriver(CanDriver):
         if self._undrivable():
             return WheelRefusal.NO_ODOMETRY
         return [WheelCounts(frame.utime, left, right, COUNTER_BITS)]
+
+    def _on_gyro(self, frame: CanFrame) -> Outcome:
+        if len(frame.data) < _AXES.size:
+            return WheelRefusal.SHORT
+        first, _, last = _AXES.unpack_from(frame.data)
+        if frame.can_id == _ANGLES:
+            self._angle_utime = frame.utime
+            return [GyroAngle(frame.utime, math.radians(first / 100))]
+        said = self._angle_utime
+        is_needed = said is None or frame.utime - said > ANGLES_MISSING_US
+        return [GyroRate(frame.utime, math.radians(last / 100))] if is_needed else None
 
     def _on_state(self, data: bytes) -> Outcome:
         if len(data) < _STATE_AND_ERRORS.size:

@@ -3,16 +3,19 @@
 There is no standard, so this is the project's own line, ended by CR, LF or both:
 
     $ODO,<ms>,<left>,<right>*HH
+    $ODO,<ms>,<left>,<right>,<heading>*HH
 
 ``ms`` is the time of the base in milliseconds (unsigned, wraps at 2 ** 32 as ``millis()`` does),
 ``left`` and ``right`` are the wheel counters in decimal (32 bit, signed or unsigned, they wrap),
 ``HH`` the exclusive or of all characters between ``$`` and ``*`` as two hex digits, as in NMEA.
-Example: ``$ODO,123456,1532,-48*4B``. Send one at least every 100 ms. Other lines are ignored, so
-the base may print what else it likes.
+``heading`` is the angle that a gyro has turned to the left, in degrees, with up to four digits
+after the point; it may go on or wrap. Example: ``$ODO,123456,1532,-48*4B``. Send one at least every
+100 ms. Other lines are ignored, so the base may print what else it likes.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from functools import reduce
 from operator import xor
@@ -21,7 +24,7 @@ from typing import Final
 from drslamd.conventions import MILLISECOND_US
 from drslamd.sensors.device_clock import DeviceClock
 from drslamd.sensors.line_scanner import LineScanner
-from drslamd.sensors.samples import WheelCounts, WheelSample
+from drslamd.sensors.samples import GyroAngle, WheelCounts, WheelSample
 from drslamd.sensors.tally import Tally
 from drslamd.sensors.wheels.wheel_driver import Outcome, SerialDriver, WheelRefusal, tallied
 
@@ -30,7 +33,8 @@ TIME_BITS: Final = 32
 
 _START: Final = b"$ODO,"
 _LINE: Final = re.compile(
-    rb"\$(?P<text>ODO,(?P<ms>\d{1,10}),(?P<left>-?\d{1,10}),(?P<right>-?\d{1,10}))"
+    rb"\$(?P<text>ODO,(?P<ms>\d{1,10}),(?P<left>-?\d{1,10}),(?P<right>-?\d{1,10})"
+    rb"(,(?P<heading>-?\d{1,7}(\.\d{1,4})?))?)"
     rb"\*(?P<sum>[0-9A-Fa-f]{2})"
 )
 
@@ -67,7 +71,10 @@ class AsciiDriver(SerialDriver):
         measured = self._clock.to_host(time_ms, utime)
         if measured is None:
             return WheelRefusal.TIME
-        return [WheelCounts(measured, left, right, COUNTER_BITS)]
+        counts = WheelCounts(measured, left, right, COUNTER_BITS)
+        if match["heading"] is None:
+            return [counts]
+        return [GyroAngle(measured, math.radians(float(match["heading"]))), counts]
 
 
 def _fits(count: int) -> bool:

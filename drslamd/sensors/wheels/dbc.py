@@ -5,7 +5,7 @@ the body. When both are in one frame they make one sample; when they are in two,
 one multiplexed message, they are brought to a common time as in `side_pairing`. Counts are taken
 raw, since a scaled counter does not wrap at a power of two, with the sign of their factor; counts
 that are floating point do not wrap. Speeds are taken scaled and multiplied by ``unit``, or by what
-the unit in the file says.
+the unit in the file says. A third signal may be the yaw rate of a gyro.
 
 Ids that hold a node number are masked by ``id_mask`` before the look-up; the node number is what
 stands outside the mask, shifted down (ODrive: mask 0x1F, node = axis; VESC: mask 0x1FFFFF00, node =
@@ -21,7 +21,14 @@ from drslamd.config import ConfigError
 from drslamd.config_wheels import DbcSection
 from drslamd.conventions import SECOND_US
 from drslamd.events import CanFrame
-from drslamd.sensors.samples import Twist, WheelCounts, WheelSample, WheelSpeeds, WheelTurns
+from drslamd.sensors.samples import (
+    GyroRate,
+    Twist,
+    WheelCounts,
+    WheelSample,
+    WheelSpeeds,
+    WheelTurns,
+)
 from drslamd.sensors.tally import Tally
 from drslamd.sensors.wheels.dbc_file import messages_of
 from drslamd.sensors.wheels.dbc_signal import SignalReader, Value
@@ -74,7 +81,8 @@ class DbcDriver(CanDriver):
         self._node_shift = _node_shift(section)
         keys = ("linear", "angular") if section.measures == "twist" else ("left", "right")
         paths = {key: getattr(section, key) for key in keys}
-        messages = messages_of(dbc_text, paths)
+        wanted = {**paths, "gyro": section.gyro} if section.gyro else paths
+        messages = messages_of(dbc_text, wanted)
         signals = [_signal(messages[key], path) for key, path in paths.items()]
         nodes = (section.left_node, section.right_node)
         if len(set(zip(paths.values(), nodes, strict=True))) < len(keys):
@@ -92,6 +100,7 @@ class DbcDriver(CanDriver):
             )
             for side, key, signal, node in zip(Side, keys, signals, nodes, strict=True)
         ]
+        self._gyro = _gyro(section, messages["gyro"]) if section.gyro else None
         self._counts = section.measures == "counts"
         self._bits = _counter_bits(section, keys, signals) if self._counts else None
         self._pairing = SidePairing(linear if self._bits is None else wrapping(self._bits))
@@ -118,6 +127,21 @@ class DbcDriver(CanDriver):
         )
 
     def _decode(self, frame: CanFrame) -> Outcome:
+        wheels, turn = self._wheels(frame), self._turn(frame)
+        if wheels is None or isinstance(wheels, WheelRefusal):
+            return turn if wheels is None else wheels
+        return [*turn, *wheels] if isinstance(turn, list) else wheels
+
+    def _turn(self, frame: CanFrame) -> Outcome:
+        gyro = self._gyro
+        if gyro is None or not self._is_meant(frame, gyro):
+            return None
+        value = gyro.reader.scaled(frame.data)
+        if value is None or isinstance(value, WheelRefusal):
+            return value
+        return [GyroRate(frame.utime, value * gyro.unit)]
+
+    def _wheels(self, frame: CanFrame) -> Outcome:
         values: dict[Side, float] = {}
         for source in self._sources:
             value = self._value(source, frame)
@@ -188,6 +212,13 @@ def _counter_bits(section: DbcSection, keys: tuple[str, str], signals: list[Sign
     return section.counter_bits
 
 
+def _gyro(section: DbcSection, message: Message) -> _Source:
+    signal = _signal(message, section.gyro)
+    unit = section.gyro_unit or _unit_of(section, "gyro", signal, "gyro_unit")
+    reader = SignalReader(message, signal.name)
+    return _Source(Side.FIRST, "gyro", message, reader, None, unit)
+
+
 def _unit(section: DbcSection, key: str, signal: Signal) -> float:
     """Factor from the number that the file means to m/s or rad/s, with its sign."""
     if section.measures == "counts":
@@ -197,13 +228,18 @@ def _unit(section: DbcSection, key: str, signal: Signal) -> float:
     given = section.angular_unit if is_turn and section.angular_unit else section.unit
     if given is not None:
         return sign * given
-    known = _TURN_RATES if is_turn else _SPEEDS
+    return sign * _unit_of(section, key, signal, "angular_unit" if is_turn else "unit")
+
+
+def _unit_of(section: DbcSection, key: str, signal: Signal, instead: str) -> float:
+    """Factor to m/s or rad/s by the name of the unit in the file; `instead` is the key to give."""
+    known, si = (_SPEEDS, "m/s") if instead == "unit" else (_TURN_RATES, "rad/s")
     name = (signal.unit or "").strip().lower()
     if name not in known:
-        what = "angular_unit, the factor to rad/s" if is_turn else "unit, the factor to m/s"
+        what = f"{instead}, the factor to {si}"
         fault = f'the DBC file gives it in "{signal.unit}"; give wheels.{what}'
         raise ConfigError([f'wheels.{key} = "{getattr(section, key)}": {fault}'])
-    return sign * known[name]
+    return known[name]
 
 
 def _node_shift(section: DbcSection) -> int:

@@ -3,10 +3,12 @@
 Source: kobuki_core, packets and packet_finder. A packet is AA 55, the length of the payload, the
 payload, and the exclusive or of length and payload. The payload is a row of sub-payloads: id,
 length, data. Core data (id 1) hold the time of the base in ms and both wheel counters, all 16 bit.
+Inertia (id 4) holds the angle that the base makes of its gyro, id 13 raw rates of all three axes.
 """
 
 from __future__ import annotations
 
+import math
 import re
 import struct
 from functools import reduce
@@ -16,7 +18,7 @@ from typing import Final
 from drslamd.conventions import MILLISECOND_US
 from drslamd.sensors.device_clock import DeviceClock
 from drslamd.sensors.frame_scanner import NEED_MORE, NOT_A_FRAME, FrameScanner
-from drslamd.sensors.samples import WheelCounts, WheelSample
+from drslamd.sensors.samples import GyroAngle, GyroRate, WheelCounts, WheelSample
 from drslamd.sensors.tally import Tally
 from drslamd.sensors.wheels.wheel_driver import Outcome, SerialDriver, WheelRefusal, tallied
 
@@ -26,6 +28,12 @@ TIME_BITS: Final = 16
 _HEADER: Final = b"\xaa\x55"
 _CORE: Final = 1
 _TIME_AND_COUNTS: Final = struct.Struct("<H3x2H")  # between them: bumper, wheel drop, cliff
+
+_INERTIA: Final = 4
+_ANGLE: Final = struct.Struct("<h")  # 0.01 deg; a rate and unused bytes follow
+_RAW_GYRO: Final = 13
+_RAW_DEG_PER_S: Final = 0.00875
+"""One digit of the gyro's z; x, y, z are one after the other behind two bytes."""
 
 _LENGTHS: Final = {_CORE: {15}, 3: {3}, 4: {7}, 5: {6}, 6: {2}, 13: {14, 20}, 16: {16}, 21: {21}}
 """Sub-payloads of known length: another one means that the packet is damaged."""
@@ -88,4 +96,17 @@ class KobukiDriver(SerialDriver):
         measured = self._clock.to_host(time_ms, utime)
         if measured is None:
             return WheelRefusal.TIME
-        return [WheelCounts(measured, left, right, COUNTER_BITS)]
+        counts = WheelCounts(measured, left, right, COUNTER_BITS)
+        return [*_gyro(parts, measured), counts]
+
+
+def _gyro(parts: dict[int, bytes], utime: int) -> list[WheelSample]:
+    """The heading that the base has integrated, else the mean of its raw rates."""
+    if _INERTIA in parts:
+        (angle,) = _ANGLE.unpack_from(parts[_INERTIA])
+        return [GyroAngle(utime, math.radians(angle / 100))]
+    if _RAW_GYRO in parts:
+        data = parts[_RAW_GYRO]
+        turns = [z for _, _, z in struct.iter_unpack("<3h", data[2:])]
+        return [GyroRate(utime, math.radians(_RAW_DEG_PER_S * sum(turns) / len(turns)))]
+    return []

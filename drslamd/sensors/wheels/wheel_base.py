@@ -39,7 +39,7 @@ from drslamd.sensors.samples import (
     Motion,
     Twist,
     WheelCounts,
-    WheelSample,
+    WheelReading,
     WheelSpeeds,
     WheelTurns,
 )
@@ -146,7 +146,7 @@ class WheelBase:
         self.gaps: Counter[Gap] = Counter()
         self.trouble: Gap | ReadingRefusal | None = None
 
-    def add(self, sample: WheelSample) -> Motion | None:
+    def add(self, sample: WheelReading) -> Motion | None:
         """The motion since the last one, or None when the sample was refused."""
         now = self._reading(sample)
         outcome = self._judge(now)
@@ -163,7 +163,7 @@ class WheelBase:
         turn = (outcome.right_m - outcome.left_m) / self._geometry.track_m
         return Motion(now.utime, distance, turn)
 
-    def _reading(self, sample: WheelSample) -> _Reading:
+    def _reading(self, sample: WheelReading) -> _Reading:
         if isinstance(sample, WheelCounts):
             return _Position(sample.utime, sample.left, sample.right, sample.bits)
         if isinstance(sample, WheelTurns):

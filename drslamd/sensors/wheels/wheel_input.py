@@ -12,10 +12,12 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
+from drslamd.config import OdometrySection
 from drslamd.config_wheels import (
     AgilexSection,
     AsciiSection,
     DbcSection,
+    GyroKeys,
     KobukiSection,
     OdriveSection,
     RoboteqSection,
@@ -23,7 +25,8 @@ from drslamd.config_wheels import (
 )
 from drslamd.conventions import SECOND_US
 from drslamd.events import CanFrame
-from drslamd.sensors.samples import Motion, WheelSample
+from drslamd.sensors.gyro.gyro_heading import GyroHeading
+from drslamd.sensors.samples import GyroAngle, GyroRate, GyroSigmas, Motion, WheelSample
 from drslamd.sensors.wheels import agilex
 from drslamd.sensors.wheels.agilex import AgilexDriver
 from drslamd.sensors.wheels.ascii_odometry import AsciiDriver
@@ -132,12 +135,24 @@ _REMEDIES: Final[dict[Gap | ReadingRefusal | None, str]] = {
 }
 
 
+def _gyro(section: WheelSection, odometry: OdometrySection) -> GyroHeading:
+    keys = section if isinstance(section, GyroKeys) else GyroKeys()
+    sigmas = GyroSigmas(
+        math.radians(keys.gyro_noise_deg_per_sqrt_s), math.radians(keys.gyro_bias_deg_per_h / 3600)
+    )
+    per_m, per_sqrt_m = odometry.yaw_sigma_deg_per_m, odometry.random_yaw_deg_per_sqrt_m
+    wheels_yaw = math.radians(per_m), math.radians(per_sqrt_m)
+    half_track_m = section.track_m / 2
+    return GyroHeading(sigmas, wheels_yaw, half_track_m, is_reversed=keys.reverse_gyro)
+
+
 class WheelInput:
     """The wheel sensor of one robot.
 
     Args:
         section: the ``wheels`` section of the configuration.
         dbc_text: content of its DBC file, for ``source = "dbc"``.
+        odometry: how wrong its heading by wheels may be, for a gyro to be held against.
 
     Raises:
         ConfigError: the DBC file cannot be used with this section.
@@ -145,10 +160,16 @@ class WheelInput:
     Attributes:
         driver: the codec, with a tally of its packets, lines or frames.
         base: the kinematics, with tallies of samples and gaps.
+        gyro: what becomes of the readings of its gyro, if it sends any.
         last_motion_utime: arrival of the input that gave the last motion without ``gap``.
     """
 
-    def __init__(self, section: WheelSection, dbc_text: str = "") -> None:
+    def __init__(
+        self,
+        section: WheelSection,
+        dbc_text: str = "",
+        odometry: OdometrySection | None = None,
+    ) -> None:
         self.driver, per_metre = SOURCES[type(section)](section, dbc_text)
         self._serial = self.driver if isinstance(self.driver, SerialDriver) else None
         self._polled = self.driver if isinstance(self.driver, PolledDriver) else None
@@ -162,6 +183,7 @@ class WheelInput:
                 reverse_right=section.reverse_right,
             )
         )
+        self.gyro = _gyro(section, odometry or OdometrySection())
         self._last_input: int | None = None
         self._trying_since = 0
         self._samples_before = 0
@@ -209,6 +231,7 @@ class WheelInput:
             "messages.unpaired": self.driver.unpaired(),
             **self.base.tally.counters("samples"),
             **gaps,
+            **(self.gyro.counters() if self.gyro.is_there else {}),
         }
 
     def advice(self, utime: int) -> str | None:
@@ -224,7 +247,7 @@ class WheelInput:
         self._last_input = utime
 
     def _motions(self, samples: list[WheelSample], utime: int) -> list[Motion]:
-        outcomes = [self.base.add(sample) for sample in samples]
+        outcomes = [self._motion(sample) for sample in samples]
         motions = [motion for motion in outcomes if motion is not None]
         if any(not motion.gap for motion in motions):
             self.last_motion_utime = self._trying_since = utime
@@ -232,6 +255,13 @@ class WheelInput:
             self._refused_before = self.driver.tally.refused.copy()
             self._not_finite_before = self.driver.tally.refused[WheelRefusal.NOT_FINITE]
         return motions
+
+    def _motion(self, sample: WheelSample) -> Motion | None:
+        if isinstance(sample, (GyroAngle, GyroRate)):
+            self.gyro.add(sample)
+            return None
+        motion = self.base.add(sample)
+        return motion if motion is None or not self.gyro.is_there else self.gyro.turned(motion)
 
     def _silence(self, utime: int) -> str | None:
         if self._last_input is None:

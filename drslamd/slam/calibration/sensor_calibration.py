@@ -92,6 +92,8 @@ class SensorCalibration:
     def corrected(self, motion: Motion) -> Motion:
         """Odometry without its known errors."""
         distance, turn = motion.distance_m, motion.turn_rad
+        if motion.gyro is not None:
+            return replace(motion, distance_m=(1 - self.scale.value) * distance)
         return replace(
             motion,
             distance_m=(1 - self.scale.value) * distance,

@@ -22,7 +22,7 @@ from drslamd.slam.chi_squared import quantile3
 from drslamd.slam.consistency import loops
 from drslamd.slam.consistency.incremental_clique import IncrementalClique, bits
 from drslamd.slam.consistency.loops import Places, columns
-from drslamd.slam.odometry.noise import OdometryNoise, twist_covariance
+from drslamd.slam.odometry.noise import SUMS, OdometryNoise, twist_covariance
 from drslamd.slam.se2 import Array
 
 MAX_VERTICES = 1_000
@@ -41,7 +41,7 @@ class Candidate:
         a_T_b: (3,).
         covariance: (3, 3) of x, y, theta in the frame of a.
         a_pose, b_pose: (3,) oa_T_a and ob_T_b at the two ends.
-        a_sums, b_sums: (6,) `odometry.growth` of both chains there.
+        a_sums, b_sums: (13,) `odometry.growth` of both chains there.
     """
 
     closure: int
@@ -67,7 +67,7 @@ class _Columns:
 
     @staticmethod
     def empty() -> _Columns:
-        return _Columns(*(np.empty((rows, MAX_VERTICES)) for rows in (1, 3, 6, 2, 2, 6, 6)))
+        return _Columns(*(np.empty((rows, MAX_VERTICES)) for rows in (1, 3, 6, 2, 2, SUMS, SUMS)))
 
     def all(self) -> list[Array]:
         return [

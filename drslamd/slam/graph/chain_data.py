@@ -8,7 +8,7 @@ from drslamd.conventions import ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain
 from drslamd.slam.graph.measurements import Keyframe
 from drslamd.slam.graph.tables import KeyframeTable, positions
 from drslamd.slam.graph.timed_rows import NEVER, TimedRows
-from drslamd.slam.odometry.noise import growth
+from drslamd.slam.odometry.noise import SUMS, growth
 from drslamd.slam.robot_model import UNTOLD, RobotModel
 from drslamd.slam.se2 import Array
 
@@ -33,7 +33,7 @@ class ChainData:
         self._said = TimedRows(5, identity=1, most=MAX_KEYFRAMES)
         self._table = KeyframeTable(np.empty((0, 5)))
         self._table_changes = 0
-        self._sums, self._summed_n = np.empty((0, 6)), np.empty(0)
+        self._sums, self._summed_n = np.empty((0, SUMS)), np.empty(0)
         self._summed = 0
         """So many rows from the first on are those that were summed."""
 
@@ -44,6 +44,8 @@ class ChainData:
     def take_model(self, seq: int, model: RobotModel) -> None:
         """What the robot says of its sensors in log entry `seq`; the latest entry counts."""
         if seq > self._model_seq and model.is_plausible():
+            if model.noise.gyro_span != self.model.noise.gyro_span:
+                self._summed, self._sums, self._summed_n = 0, np.empty((0, SUMS)), np.empty(0)
             self._model_seq, self.model = seq, model
 
     @property
@@ -74,16 +76,16 @@ class ChainData:
 
     @property
     def sums(self) -> Array:
-        """(k, 6) `noise.growth` along the chain; only differences within a segment count."""
+        """(k, 13) `noise.growth` along the chain; only differences within a segment count."""
         rows, known = self.keyframes.rows, self._sums
         if self._summed == len(rows) == len(known):
             return known
         if self._summed:
             last = self._summed - 1
-            grown = growth(rows[last:, 2:]) + known[last]
+            grown = self._growth(rows[last:]) + known[last]
             sums = np.concatenate([known[:last], grown])
         else:
-            sums = growth(rows[:, 2:])
+            sums = self._growth(rows)
             # what came late in front of the known rows, or was dropped there, moves no sum
             at, there = positions(rows[:, 0], self._summed_n)
             if there.any():
@@ -91,3 +93,8 @@ class ChainData:
                 sums += known[first] - sums[at[first]]
         self._sums, self._summed, self._summed_n = sums, len(rows), rows[:, 0]
         return sums
+
+    def _growth(self, rows: Array) -> Array:
+        """Along rows of `KeyframeTable`."""
+        gyro = self.model.noise.gyro
+        return growth(rows[:, 2:], None if gyro is None else gyro.seconds(rows[:, 0], rows[:, 2:]))

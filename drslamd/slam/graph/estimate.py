@@ -77,6 +77,7 @@ class TeamEstimate:
             `everybody`; of the others nothing is claimed.
         bias_m: range bias of each pair, m.
         scale, yaw: of each robot's odometry, fraction and rad/m.
+        gyro_rate: in place of that of the robots whose heading a gyro gives, rad/s.
         near_bias_m: of the team, at range 0 (`RangeModel.near_range_shape`).
         team_bias_m: what the biases of all pairs have in common.
         turn: by which fraction turns are longer than odometry says; antenna_m: where the antenna is
@@ -104,6 +105,7 @@ class TeamEstimate:
     bias_m: dict[tuple[int, int], Learned] = field(default_factory=dict)
     scale: dict[int, Learned] = field(default_factory=dict)
     yaw: dict[int, Learned] = field(default_factory=dict)
+    gyro_rate: dict[int, Learned] = field(default_factory=dict)
     near_bias_m: Learned = field(default_factory=Learned)
     team_bias_m: Learned = field(default_factory=Learned)
     turn: dict[int, Learned] = field(default_factory=dict)

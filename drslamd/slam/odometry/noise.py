@@ -6,10 +6,15 @@ grows with the path:
     distance' = (1 + scale) distance + N(0, translation^2 |distance|)
     turn'     = turn + yaw |distance| + N(0, yaw_random^2 |distance|)
 
+Where a gyro gives the turn, it errs by time (`gyro_noise`), with t the seconds in motion:
+
+    turn'     = turn + rate t + N(0, rate_random^2 t)
+
 Errors are left twists in the frame of the origin, where they add up: a yaw error at place p moves
 all that follows by the twist [y, -x, 1], a translation error moves it by itself, and a wrong scale
-by the way gone. So six sums along a chain (`growth`) give the covariance between any two of its
-poses. Modules 1, 2 and 3 and the paper's optimisers all take it from here.
+by the way gone. So six sums along a chain for each source of the heading, and the path length, give
+the covariance between any two of its poses (`growth`). Modules 1, 2 and 3 and the paper's
+optimisers all take it from here.
 
 Covariances are rows here, in the order xx xy xt yy yt tt of `se2.packed`, with one column for each
 way: a few operations on long rows instead of many small matrices.
@@ -18,10 +23,11 @@ way: a few operations on long rows instead of many small matrices.
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drslamd.slam.odometry.gyro_noise import GyroNoise
 from drslamd.slam.se2 import Array
 
 MOST_SCALE = 0.5
@@ -32,6 +38,12 @@ MOST_YAW = math.radians(20)
 """Likewise of the yaw rate, rad/m, and of random yaw, rad per sqrt(m)."""
 ROUNDING = 1.001
 """Sigmas travel as 32-bit numbers."""
+OTHER_PATH_M, OTHER_S = 10.0, 60.0
+"""Over so much one yaw rate counts as random that is not the one which module 3 learns."""
+
+WHEELS, GYRO, PATH, SUMS = slice(0, 6), slice(6, 12), 12, 13
+"""Which of the sums of `growth` are those of the heading by wheels and by gyro and the length of
+the path, and how many there are."""
 
 
 @dataclass(frozen=True)
@@ -43,47 +55,87 @@ class OdometryNoise:
         yaw_rad_per_m: of the constant yaw rate.
         translation_per_sqrt_m: of random translation, m per square root of a metre.
         yaw_rad_per_sqrt_m: of random yaw.
+        gyro: of the heading where a gyro gave it; None where none ever did.
     """
 
     scale: float
     yaw_rad_per_m: float
     translation_per_sqrt_m: float
     yaw_rad_per_sqrt_m: float
+    gyro: GyroNoise | None = None
+
+    @property
+    def by_wheels(self) -> tuple[float, float, float, float]:
+        """The four sigmas."""
+        turn = self.yaw_rad_per_sqrt_m
+        return self.scale, self.yaw_rad_per_m, self.translation_per_sqrt_m, turn
+
+    @property
+    def gyro_span(self) -> tuple[int, int] | None:
+        """Samples whose heading a gyro gave."""
+        return None if self.gyro is None else self.gyro.span
+
+    @property
+    def learns_gyro(self) -> bool:
+        """Is the constant yaw rate that module 3 learns that of a gyro, in rad/s?"""
+        return self.gyro is not None and self.gyro.is_in_use
 
     def is_plausible(self) -> bool:
         """Could a configuration say this?"""
         most = (MOST_SCALE, MOST_YAW, MOST_TRANSLATION, MOST_YAW)
-        return all(
-            0 < value <= ROUNDING * limit for value, limit in zip(astuple(self), most, strict=True)
+        is_gyro_plausible = self.gyro is None or self.gyro.is_plausible()
+        return is_gyro_plausible and all(
+            0 < value <= ROUNDING * limit for value, limit in zip(self.by_wheels, most, strict=True)
         )
 
     def random_part(self) -> OdometryNoise:
         """Without the two constants, where those are unknowns of their own."""
-        return OdometryNoise(0.0, 0.0, self.translation_per_sqrt_m, self.yaw_rad_per_sqrt_m)
+        turn, gyro = self.yaw_rad_per_sqrt_m, self.gyro
+        if gyro is not None and gyro.is_in_use:
+            turn = math.hypot(turn, self.yaw_rad_per_m * math.sqrt(OTHER_PATH_M))
+            gyro = replace(gyro, yaw_rad_per_s=0.0)
+        elif gyro is not None:
+            random = math.hypot(gyro.yaw_rad_per_sqrt_s, gyro.yaw_rad_per_s * math.sqrt(OTHER_S))
+            gyro = replace(gyro, yaw_rad_per_s=0.0, yaw_rad_per_sqrt_s=random)
+        return OdometryNoise(0.0, 0.0, self.translation_per_sqrt_m, turn, gyro)
 
 
-def growth(places: Array) -> Array:
+def growth(places: Array, seconds: Array | None = None) -> Array:
     """Sums along a chain from which the covariance between any two of its poses follows.
 
     Args:
         places: (..., k, 2 or more) o_T_a of chains without holes; x and y count.
+        seconds: (..., k - 1) in motion under a gyro, None where wheels gave all the heading.
 
     Returns:
-        (..., k, 6): path length s, then the integrals over s of y, -x, y*y, -x*y and x*x.
+        (..., k, 13): the integrals over s of 1, y, -x, y*y, -x*y and x*x where the wheels gave the
+        heading, those over t where a gyro did, and the path length s.
     """
     place = places[..., :2]
     before, after = place[..., :-1, :], place[..., 1:, :]
-    sums = np.zeros((*place.shape[:-1], 6))
-    np.cumsum(step_sums(after - before, (after + before) / 2), axis=-2, out=sums[..., 1:, :])
+    sums = np.zeros((*place.shape[:-1], SUMS))
+    terms = step_sums(after - before, (after + before) / 2, seconds)
+    np.cumsum(terms, axis=-2, out=sums[..., 1:, :])
     return sums
 
 
-def step_sums(way: Array, middle: Array) -> Array:
-    """(..., 6) the terms of `growth` over straight steps `way` (..., 2) about `middle` (..., 2)."""
+def step_sums(way: Array, middle: Array, seconds: Array | None = None) -> Array:
+    """(..., 13) the terms of `growth` over straight steps `way` (..., 2) about `middle` (..., 2).
+
+    Args:
+        seconds: (...) see `growth`.
+    """
     x, y = middle[..., 0], middle[..., 1]
     length = np.hypot(way[..., 0], way[..., 1])
     terms = np.stack([np.ones_like(x), y, -x, y * y, -x * y, x * x], axis=-1)
-    return np.asarray(terms * length[..., None])
+    out = np.zeros((*length.shape, SUMS))
+    out[..., PATH] = length
+    if seconds is None:
+        out[..., WHEELS] = terms * length[..., None]
+    else:
+        out[..., WHEELS] = terms * np.where(seconds > 0, 0.0, length)[..., None]
+        out[..., GYRO] = terms * seconds[..., None]
+    return out
 
 
 def twist_covariance(noise: OdometryNoise, way: Array, sums: Array) -> Array:
@@ -93,33 +145,42 @@ def twist_covariance(noise: OdometryNoise, way: Array, sums: Array) -> Array:
 
     Args:
         way: (2, m) difference of the places at both ends, m.
-        sums: (6, m) difference of `growth` there.
+        sums: (13, m) difference of `growth` there.
     """
-    forward = np.where(sums[:1] < 0, -sums, sums)
+    forward = forwards(sums)
     covariance = random_covariance(noise, forward)
     wx, wy = noise.scale * way
-    by, bx, bs = noise.yaw_rad_per_m * forward[[1, 2, 0]]
-    covariance[0] += wx * wx + by * by
-    covariance[1] += wx * wy + by * bx
-    covariance[2] += by * bs
-    covariance[3] += wy * wy + bx * bx
-    covariance[4] += bx * bs
-    covariance[5] += bs * bs
+    rates = [noise.yaw_rad_per_m * forward[[1, 2, 0]]]
+    if noise.gyro is not None:
+        rates.append(noise.gyro.yaw_rad_per_s * forward[GYRO][[1, 2, 0]])
+    covariance[0] += wx * wx + sum(by * by for by, _, _ in rates)
+    covariance[1] += wx * wy + sum(by * bx for by, bx, _ in rates)
+    covariance[2] += sum(by * bs for by, _, bs in rates)
+    covariance[3] += wy * wy + sum(bx * bx for _, bx, _ in rates)
+    covariance[4] += sum(bx * bs for _, bx, bs in rates)
+    covariance[5] += sum(bs * bs for _, _, bs in rates)
     return covariance
 
 
+def forwards(sums: Array) -> Array:
+    """Sums (13, m) of ways that may go back in time, as of the same ways forwards."""
+    return np.asarray(np.where(sums[PATH] + sums[GYRO.start] < 0, -sums, sums))
+
+
 def random_covariance(noise: OdometryNoise, sums: Array) -> Array:
-    """(6, m): the part of `twist_covariance` that is not constant for a robot, of sums (6, m)."""
-    s, y, x_neg, yy, xy_neg, xx = sums
+    """(6, m): the part of `twist_covariance` that is not constant for a robot, of sums (13, m)."""
+    s, y, x_neg, yy, xy_neg, xx = sums[WHEELS]
     turn, shift = noise.yaw_rad_per_sqrt_m**2, noise.translation_per_sqrt_m**2
-    drawn = shift * s
-    out = np.empty(sums.shape)
+    drawn = shift * sums[PATH]
+    out = np.empty((6, *sums.shape[1:]))
     out[0] = turn * yy + drawn
     out[1] = turn * xy_neg
     out[2] = turn * y
     out[3] = turn * xx + drawn
     out[4] = turn * x_neg
     out[5] = turn * s
+    if noise.gyro is not None:
+        out += noise.gyro.yaw_rad_per_sqrt_s**2 * sums[GYRO][[3, 4, 1, 5, 2, 0]]
     return out
 
 
@@ -146,17 +207,25 @@ def link_covariance(noise: OdometryNoise, i_T_j: Array, sums: Array) -> Array:
     Sums over a whole trajectory would lose the last digits of a short link far from the origin.
 
     Args:
-        sums: (m, 6) of `growth` over the way that was driven from i to j, in frame i.
+        sums: (m, 13) of `growth` over the way that was driven from i to j, in frame i.
     """
     return _matrices(twist_covariance(noise, i_T_j[:, :2].T, sums.T))
 
 
 def seen_from(sums: Array, a_T_b: Array) -> Array:
-    """(m, 6) sums of `growth` over ways in frames b, as frames a have them.
+    """(m, 13) sums of `growth` over ways in frames b, as frames a have them.
 
     Args:
-        sums: (m, 6) in b; a_T_b: (m, 3).
+        sums: (m, 13) in b; a_T_b: (m, 3).
     """
+    out: Array = sums.copy()
+    for which in (WHEELS, GYRO):
+        out[:, which] = _seen_from(sums[:, which], a_T_b)
+    return out
+
+
+def _seen_from(sums: Array, a_T_b: Array) -> Array:
+    """(m, 6) of (m, 6)."""
     s, by, bx, yy, xy, xx = sums[:, 0], sums[:, 1], -sums[:, 2], sums[:, 3], -sums[:, 4], sums[:, 5]
     x0, y0, theta = a_T_b.T
     cos, sin = np.cos(theta), np.sin(theta)
@@ -177,14 +246,17 @@ def seen_from(sums: Array, a_T_b: Array) -> Array:
     return np.stack(columns, axis=-1)
 
 
-def by_yaw_rate(sums: Array, end: Array) -> Array:
-    """(m, 3) how a relative pose moves with the constant yaw rate, per rad/m.
+def by_yaw_rate(sums: Array, end: Array, noise: OdometryNoise | None = None) -> Array:
+    """(m, 3) how a relative pose moves with the constant yaw rate, per rad/m or, of a robot whose
+    gyro's rate is learned, per rad/s.
 
     Args:
-        sums: (m, 6) of `growth` over the way from i to j, in frame i.
+        sums: (m, 13) of `growth` over the way from i to j, in frame i.
         end: (m, 2) where the way, or a point that moves with its end, is in frame i.
+        noise: of the robot's odometry.
     """
-    s, y, x_neg = sums[:, 0], sums[:, 1], sums[:, 2]
+    first = GYRO.start if noise is not None and noise.learns_gyro else WHEELS.start
+    s, y, x_neg = sums[:, first], sums[:, first + 1], sums[:, first + 2]
     return np.stack([y - s * end[:, 1], x_neg + s * end[:, 0], s], axis=-1)
 
 

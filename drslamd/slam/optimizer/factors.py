@@ -150,7 +150,7 @@ def odometry(graph: PoseGraph, numbers: Numbering, robots: list[int]) -> Odometr
         chain, place = graph.view.chains[robot], numbers.place[robot]
         edges = chain_links(chain, calibrated=True)
         i, j = place[edges.i], place[edges.j]
-        by_yaw = by_yaw_rate(chain.links.sums, edges.measured[:, :2])
+        by_yaw = by_yaw_rate(chain.links.sums, edges.measured[:, :2], chain.model.noise)
         used = (i >= 0) & (j >= 0)
         of = np.full(len(i), index)
         rows = (i, j, edges.measured, edges.covariance, of, by_yaw, chain.links.by_turn)

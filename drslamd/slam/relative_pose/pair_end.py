@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drslamd.conventions import GRID_US
+from drslamd.conventions import GRID_US, SECOND_US
 from drslamd.slam import se2
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.odometry.track import Track
+from drslamd.slam.relative_pose.window import NO_GYRO
 from drslamd.slam.robot_model import RobotModel
 from drslamd.slam.se2 import Array
 
@@ -48,6 +49,14 @@ class PairEnd:
     def poses(self, utime: Array | float) -> Array:
         """(k, 3) odometry poses at times (k,) of our clock."""
         return self.track.at_time(self.grid(utime))
+
+    def gyro_span(self, utime: int) -> tuple[float, float]:
+        """Seconds after `utime` of our clock from when and until when a gyro gave the heading."""
+        span = self.data.model.noise.gyro_span
+        if span is None:
+            return NO_GYRO
+        since, until = (np.array(span) * GRID_US - self.ahead_us - utime) / SECOND_US
+        return float(since), float(until)
 
     @property
     def first_us(self) -> int:

@@ -7,6 +7,7 @@ contradict it. Measurement i was taken while a stood at ``a_T_ai`` and b at ``b_
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,9 @@ from numpy.typing import NDArray
 
 from drslamd.slam import se2
 from drslamd.slam.se2 import Array
+
+NO_GYRO = (math.inf, math.inf)
+"""Span of who has none."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +30,8 @@ class Window:
         a_poses: (n, 3) a_T_ai, body of a at measurement i in its body at the reference time.
         b_poses: (n, 3) b_T_bi.
         a_antenna, b_antenna: (2,) antennas in the body frames, metres.
+        a_gyro, b_gyro: seconds after the reference time from when and until when a gyro gave the
+            heading.
     """
 
     t: Array
@@ -34,6 +40,8 @@ class Window:
     b_poses: Array
     a_antenna: Array
     b_antenna: Array
+    a_gyro: tuple[float, float] = NO_GYRO
+    b_gyro: tuple[float, float] = NO_GYRO
 
     def __len__(self) -> int:
         return len(self.t)

@@ -14,23 +14,26 @@ matrix product of rank fourteen.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
-from typing import Any
 
 import numpy as np
 
-from drslamd.slam.odometry.noise import OdometryNoise, growth, random_covariance
+from drslamd.conventions import GRID_HZ
+from drslamd.slam.odometry.gyro_noise import GyroNoise, turned_seconds
+from drslamd.slam.odometry.noise import GYRO, OdometryNoise, forwards, growth, random_covariance
 from drslamd.slam.relative_pose.estimate import PairNoise
 from drslamd.slam.relative_pose.window_stack import WindowStack
 from drslamd.slam.se2 import Array, Index
 
-_SIGMAS = tuple(field.name for field in fields(OdometryNoise))
 _MATRIX = [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
 """Where a packed covariance has the elements of its matrix."""
 
 
 def way_twists(
-    poses: Array, noises: Sequence[OdometryNoise], before: Index, antenna_sigma: float = 0.0
+    poses: Array,
+    noises: Sequence[OdometryNoise],
+    before: Index,
+    antenna_sigma: float = 0.0,
+    seconds: Array | None = None,
 ) -> Array:
     """What the noise of odometry adds up to between measurements and reference time.
 
@@ -40,6 +43,7 @@ def way_twists(
         noises: sigmas of each robot.
         before: (m,) how many measurements lie before the reference time.
         antenna_sigma: how far the point that ranges are measured from may be beside the antenna, m.
+        seconds: (m, n) in motion under a gyro, of the n steps between measurements and reference.
 
     Returns:
         (m, 7, 3, n): covariance (3, 3) of the random part of the twist [x, y, theta], the twist of
@@ -51,22 +55,45 @@ def way_twists(
     robot, there = np.arange(m)[:, None], np.arange(n) + (np.arange(n) >= before[:, None])
     track = np.zeros((m, n + 1, 2))
     track[robot, there] = paths
-    sums = growth(track)
+    sums = growth(track, seconds)
     way = np.moveaxis(sums[robot, there] - sums[robot, before[:, None]], -1, 0)
     # the sigmas of all robots as those of one, whose numbers are columns
-    columns: Any = np.array([[getattr(n, name) for name in _SIGMAS] for n in noises]).T[..., None]
-    noise = OdometryNoise(*columns)
+    scale, yaw, shift, turn = np.array([noise.by_wheels for noise in noises]).T[..., None]
+    gyro = None if seconds is None else _gyros(noises)
+    noise = OdometryNoise(scale, yaw, shift, turn, gyro)
     out = np.zeros((m, 7, 3, n))
     cos, sin = antenna_sigma * np.cos(heading), antenna_sigma * np.sin(heading)
     out[:, 5, 0], out[:, 5, 1], out[:, 6, 0], out[:, 6, 1] = cos, sin, -sin, cos
-    random = random_covariance(noise, np.where(way[0] < 0, -way, way))
+    random = random_covariance(noise, forwards(way))
     for row, packed in enumerate(_MATRIX):
         for column, place in enumerate(packed):
             out[:, row, column] = random[place]
     for column, place in enumerate((1, 2, 0)):
         out[:, 3, column] = noise.yaw_rad_per_m * way[place]
+        if noise.gyro is not None:  # (as if both constants went together: a little too careful)
+            out[:, 3, column] += noise.gyro.yaw_rad_per_s * way[GYRO][place]
     out[:, 4, :2] = (noise.scale * paths.transpose(2, 0, 1)).transpose(1, 0, 2)
     return out
+
+
+def _gyros(noises: Sequence[OdometryNoise]) -> GyroNoise:
+    """Of all robots as one, whose sigmas are columns; 0 of those without."""
+    told = [noise.gyro for noise in noises]
+    sigmas = [(g.yaw_rad_per_sqrt_s, g.yaw_rad_per_s) if g else (0.0, 0.0) for g in told]
+    random, rate = np.array(sigmas).T[..., None]
+    return GyroNoise(random, rate, since=0)
+
+
+def gyro_seconds(stack: WindowStack) -> Array:
+    """(2 w, n) in motion under a gyro, s, of the robots a and then b, see `way_twists`."""
+    w, n = stack.t.shape
+    row, there = np.arange(w)[:, None], np.arange(n) + (np.arange(n) >= stack.before[:, None])
+    samples, poses = np.zeros((w, n + 1)), np.zeros((2, w, n + 1, 3))
+    samples[row, there] = stack.t * GRID_HZ
+    poses[:, row, there] = stack.poses
+    since, until = np.moveaxis(stack.gyros * GRID_HZ, -1, 0)[..., None]
+    seconds = turned_seconds(np.stack([samples, samples]), poses, (since, until))
+    return seconds.reshape(2 * w, n)
 
 
 def moments(points: Array, directions: Array) -> Array:
@@ -131,7 +158,9 @@ class WindowNoise:
         self._points = stack.points.transpose(1, 0, 2)
         robots = [noise.a for noise in noises] + [noise.b for noise in noises]
         poses = stack.poses.reshape(-1, self.longest, 3)
-        twists = way_twists(poses, robots, np.tile(stack.before, 2), model.antenna_sigma_m)
+        seconds = gyro_seconds(stack) if any(robot.gyro for robot in robots) else None
+        before = np.tile(stack.before, 2)
+        twists = way_twists(poses, robots, before, model.antenna_sigma_m, seconds)
         self._twists = twists.reshape(2, -1, 7, 3, self.longest).swapaxes(0, 1)
         self._ranges = model.covariance(stack.t, stack.ranges, sigma, bias)
         if self._held is not None:

@@ -79,5 +79,7 @@ def request(
         b_poses=se2.between(b.poses(at), b.poses(when)),
         a_antenna=a.data.model.antenna,
         b_antenna=b.data.model.antenna,
+        a_gyro=a.gyro_span(at),
+        b_gyro=b.gyro_span(at),
     )
     return WindowRequest(window, at, anchor_a, anchor_b)

@@ -68,6 +68,7 @@ class WindowStack:
         points: (2, w, n) their antennas, x + iy; 0 where there is no measurement.
         counts: (w,) measurements of each window.
         before: (w,) of them before the reference time, or at it.
+        gyros: (2, w, 2) seconds after it from when and until when a gyro gave the heading.
     """
 
     t: Array
@@ -76,6 +77,7 @@ class WindowStack:
     points: Array
     counts: Index
     before: Index
+    gyros: Array
 
     @staticmethod
     def of(windows: Sequence[Window]) -> WindowStack:
@@ -91,7 +93,8 @@ class WindowStack:
         points += poses[..., 0] + 1j * poses[..., 1]
         points *= np.arange(shape[1]) < counts[:, None]
         before = np.array([window.before for window in windows])
-        return WindowStack(t, ranges, poses, points, counts, before)
+        gyros = np.array([[w.a_gyro for w in windows], [w.b_gyro for w in windows]])
+        return WindowStack(t, ranges, poses, points, counts, before, gyros)
 
     @cached_property
     def held(self) -> NDArray[np.bool_] | None:

@@ -19,8 +19,10 @@ from drslamd.slam.graph.measurements import (
     Placed,
     RangeMeasurement,
 )
+from drslamd.slam.odometry.gyro_noise import OPEN, GyroNoise
 from drslamd.slam.robot_model import UNTOLD
 
+TURNED = replace(UNTOLD, noise=replace(UNTOLD.noise, gyro=GyroNoise(0.25, 0.5, 70_000, OPEN)))
 A, B = Chain(4, 12), Chain(7, 2**62)
 SEQ = 70
 
@@ -42,7 +44,7 @@ SAMPLE = Chapter(
     layer=0,
     first=3,
     parts=(2, 1, 1),
-    models=((5, UNTOLD),),
+    models=((5, UNTOLD), (9, TURNED)),
     keyframes=(Keyframe(10, 0, -(2**31), 2**31 - 1, 5), Keyframe(2**31 - 2, 9, 0, -1, -7)),
     ranges=((place(5), ranged(40, A, 3.5)), (place(5, 1), ranged(40, A, 2.25)),
             (place(4), ranged(40, B, -1.5))),
@@ -160,3 +162,12 @@ def test_a_minute_of_driving_has_a_sixth_of_the_bytes_of_its_entries() -> None:
     ordered = tuple(sorted(ranges, key=lambda placed: (placed[1].peer, placed[0])))
     chapter = Chapter(2, 0, (0, 0, 0), (), tuple(frames), ordered)
     assert len(packed(chapter)) < 60 * (70 + 2 * 27 + 20) / 6
+
+
+def test_a_model_with_a_number_of_traits_that_none_has_is_refused() -> None:
+    data = bytearray(zlib.decompress(packed(Chapter(2, 3, (0, 0, 0), ((5, UNTOLD),)))))
+    at = data.index((5).to_bytes(4, "big") + b"\x08") + 4
+    for count in (-1 & 0xFF, 7, 15):
+        data[at] = count
+        with pytest.raises(ValueError, match="traits"):
+            unpacked(zlib.compress(bytes(data)), SEQ)

@@ -7,10 +7,11 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from lab.play.emulators import LinkTrackEmulator, WheelEmulator, as_heard_at
+from lab.play.emulators import KobukiEmulator, LinkTrackEmulator, WheelEmulator, as_heard_at
 from lab.play.playback import BASES, Hardware, robot_config
 from lab.recordings.recording import Recording, Trail
 
+from drslamd.config_wheels import KobukiSection
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.samples import Motion
 from drslamd.sensors.wheels.wheel_input import WheelInput
@@ -103,3 +104,15 @@ def test_at_the_wrong_speed_something_else_arrives(heard: int) -> None:
     assert data[:8] not in wrong
     # one byte of 10 bits sent is about heard/sent bytes heard, less where edges are missed
     assert len(wrong) <= math.ceil(len(data) * max(heard / 921_600, 1) * 1.2)
+
+
+def test_the_angle_of_a_gyro_comes_back_from_a_kobuki() -> None:
+    base = KobukiEmulator()
+    base.gyro = lambda t: 3.0 + t
+    wheels = WheelInput(KobukiSection(source="kobuki", port="x"))
+    for k in range(10):
+        wheels.feed(base.stream(0.02 * k, 0.0, 0.0), at(0.02 * k))
+    found = wheels.gyro.track.at(at(0.18))
+    assert found is not None
+    # (the first packet only tells the time of the base)
+    assert found[1] == pytest.approx(0.16, abs=2e-4)

@@ -95,3 +95,18 @@ def test_the_same_seed_gives_the_same_recording() -> None:
     one, same, other = (world.simulate(scene, seed).ranges for seed in (1, 1, 2))
     assert np.array_equal(one, same)
     assert len(one) != len(other) or not np.array_equal(one, other)
+
+
+def test_a_gyro_errs_by_a_constant_rate_and_at_random() -> None:
+    """Over many robots: 10 deg/h are 1 degree in 353 s, 0.01 deg/sqrt(s) are 0.19."""
+    scene = world.Scene(robots=1, seconds=60.0, odometry_hz=10, range_hz=1)
+    plain = world.simulate(scene, 3)
+    ends = []
+    for seed in range(300):
+        trail = world.with_gyros(plain, seed).trails[0]
+        assert trail.gyro is not None
+        turned = np.unwrap(trail.truth[:, 2])
+        ends.append(np.degrees(trail.gyro[-1] - (turned[-1] - turned[0])))
+    expected = np.hypot(10 * 60 / 3600, 0.01 * np.sqrt(60))
+    assert np.std(ends) == pytest.approx(expected, rel=0.15)
+    assert plain.trails[0].gyro is None

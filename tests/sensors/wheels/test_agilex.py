@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from drslamd.config_wheels import AgilexSection
 from drslamd.events import CanFrame
-from drslamd.sensors.samples import Twist, WheelCounts
+from drslamd.sensors.samples import GyroAngle, GyroRate, Twist, WheelCounts
 from drslamd.sensors.wheels.agilex import AgilexDriver, Steering
 from drslamd.sensors.wheels.wheel_driver import WheelRefusal
 from drslamd.sensors.wheels.wheel_input import WheelInput
@@ -229,3 +229,31 @@ def test_a_state_without_odometry_has_its_own_sentence() -> None:
     said = driver.why_no_sample(T0 + MS)
     assert said is not None
     assert "neither 0x311 nor 0x221" in said
+
+
+def axes(can_id: int, *values: int, utime: int = T0) -> CanFrame:
+    return agilex(can_id, struct.pack(">3h", *values), utime)
+
+
+def test_the_yaw_of_a_limo_is_the_first_of_its_angles() -> None:
+    assert AgilexDriver().on_frame(axes(0x323, -17_999, 12, 34)) == [
+        GyroAngle(T0, math.radians(-179.99))
+    ]
+
+
+@pytest.mark.parametrize(("after", "used"), [(SECOND_US, False), (SECOND_US + MS, True)])
+def test_its_turning_rate_is_the_last_and_counts_while_angles_are_missing(
+    after: int, used: bool
+) -> None:
+    driver = AgilexDriver()
+    assert driver.on_frame(axes(0x322, 1, 2, 1234)) == [GyroRate(T0, math.radians(12.34))]
+    driver.on_frame(axes(0x323, 0, 0, 0))
+    rate = GyroRate(T0 + after, math.radians(-12.34))
+    assert driver.on_frame(axes(0x322, 0, 0, -1234, utime=T0 + after)) == ([rate] if used else [])
+
+
+@pytest.mark.parametrize("can_id", [0x322, 0x323])
+def test_a_frame_of_the_gyro_that_is_short_is_counted(can_id: int) -> None:
+    driver = AgilexDriver()
+    assert driver.on_frame(agilex(can_id, bytes(5))) == []
+    assert driver.tally.refused[WheelRefusal.SHORT] == 1

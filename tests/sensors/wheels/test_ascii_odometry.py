@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import random
+from functools import reduce
+from operator import xor
 
 import pytest
 from frames import SECOND_US, ascii_line, cut
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drslamd.sensors.samples import WheelCounts
+from drslamd.sensors.samples import GyroAngle, WheelCounts
 from drslamd.sensors.wheels.ascii_odometry import AsciiDriver
 from drslamd.sensors.wheels.wheel_driver import WheelRefusal
 
@@ -123,3 +126,27 @@ def test_whole_and_byte_by_byte_and_random_reads_give_the_same(seed: int) -> Non
 def test_no_bytes_make_the_driver_raise(data: bytes) -> None:
     for stream in (data, b"$ODO," + data + b"\n"):
         AsciiDriver().feed(stream, T0)
+
+
+def line(text: str) -> bytes:
+    return f"${text}*{reduce(xor, text.encode()):02X}\n".encode()
+
+
+@pytest.mark.parametrize(
+    ("column", "degrees"),
+    [("12.5", 12.5), ("-179.9999", -179.9999), ("1234567", 1_234_567.0), ("0", 0.0)],
+)
+def test_a_fourth_column_is_the_angle_of_a_gyro(column: str, degrees: float) -> None:
+    driver = AsciiDriver()
+    driver.feed(line("ODO,1000,0,0"), T0)
+    gyro, counts = driver.feed(line(f"ODO,1020,5,7,{column}"), T0 + 20 * MS)
+    assert gyro == GyroAngle(T0 + 20 * MS, math.radians(degrees))
+    assert counts == WheelCounts(T0 + 20 * MS, 5, 7, 32)
+
+
+@pytest.mark.parametrize("column", ["", "1.23456", "12345678", "1e3", "nan", "1,2", "."])
+def test_a_column_that_is_no_angle_makes_the_line_malformed(column: str) -> None:
+    driver = AsciiDriver()
+    driver.feed(line("ODO,1000,0,0"), T0)
+    assert driver.feed(line(f"ODO,1020,5,7,{column}"), T0 + 20 * MS) == []
+    assert driver.tally.refused[WheelRefusal.MALFORMED] == 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 import sys
 from typing import Any
@@ -14,7 +15,14 @@ from hypothesis import strategies as st
 from drslamd.config import ConfigError
 from drslamd.config_wheels import DbcSection
 from drslamd.events import CanFrame
-from drslamd.sensors.samples import Twist, WheelCounts, WheelSample, WheelSpeeds, WheelTurns
+from drslamd.sensors.samples import (
+    GyroRate,
+    Twist,
+    WheelCounts,
+    WheelSample,
+    WheelSpeeds,
+    WheelTurns,
+)
 from drslamd.sensors.wheels.wheel_driver import WheelRefusal
 
 pytest.importorskip("cantools")
@@ -54,6 +62,9 @@ BO_ 262 WideLeft: 8 Base
  SG_ Count : 0|64@1+ (1,0) [0|0] "" Vector__XXX
 BO_ 263 WideRight: 8 Base
  SG_ Count : 0|64@1+ (1,0) [0|0] "" Vector__XXX
+BO_ 264 Imu: 8 Base
+ SG_ Yaw : 0|16@1- (0.1,0) [0|0] "deg/s" Vector__XXX
+ SG_ Odd : 16|16@1- (0.1,0) [0|0] "grad/s" Vector__XXX
 SIG_VALTYPE_ 9 Turns : 1;
 SIG_VALTYPE_ 9 Rate : 1;
 """
@@ -450,3 +461,58 @@ def test_no_frame_makes_the_driver_raise(can_id: int, data: bytes, extended: boo
     ):
         driver.on_frame(frame(can_id, data, extended=extended))
         assert driver.tally.received == 1
+
+
+# a gyro
+
+COUNTED = {"left": "LeftWheel.Count", "right": "RightWheel.Count", "counts_per_metre": 1.0}
+
+
+def turning(driver: DbcDriver, yaw: int) -> list[WheelSample]:
+    return driver.on_frame(CanFrame(T0, 264, False, struct.pack("<h6x", yaw)))
+
+
+def test_a_gyro_is_read_in_the_unit_of_the_file() -> None:
+    driver = DbcDriver(section(**COUNTED, gyro="Imu.Yaw"), DBC)
+    assert turning(driver, -123) == [GyroRate(T0, pytest.approx(math.radians(-12.3)))]
+
+
+def test_a_factor_that_is_given_counts_instead() -> None:
+    driver = DbcDriver(section(**COUNTED, gyro="Imu.Odd", gyro_unit=0.01), DBC)
+    frame = CanFrame(T0, 264, False, struct.pack("<2h4x", 0, 50))
+    assert driver.on_frame(frame) == [GyroRate(T0, pytest.approx(0.05))]
+
+
+def test_without_its_key_a_gyro_is_not_read() -> None:
+    driver = DbcDriver(section(**COUNTED), DBC)
+    assert turning(driver, 5) == []
+    assert driver.tally.accepted == 0
+
+
+def test_a_gyro_in_the_frame_of_the_wheels_comes_with_them() -> None:
+    keys = {"measures": "wheel_speeds", "left": "Speeds.SpeedL", "right": "Speeds.SpeedR"}
+    driver = DbcDriver(section(**keys, gyro="Speeds.SpeedR", gyro_unit=0.1), DBC)
+    frame = CanFrame(T0, 257, False, struct.pack(">hh4x", 360, 720))
+    gyro, wheels = driver.on_frame(frame)
+    assert gyro == GyroRate(T0, pytest.approx(0.72))
+    assert wheels == WheelSpeeds(T0, pytest.approx(1.0), pytest.approx(2.0))
+
+
+def test_a_short_frame_of_a_gyro_is_counted_and_costs_nothing_else() -> None:
+    driver = DbcDriver(section(**COUNTED, gyro="Imu.Yaw"), DBC)
+    assert driver.on_frame(CanFrame(T0, 264, False, b"\1")) == []
+    assert driver.tally.refused[WheelRefusal.SHORT] == 1
+
+
+@pytest.mark.parametrize(
+    ("gyro", "what"),
+    [("Imu.Roll", "wheels.gyro"), ("Imus.Yaw", "wheels.gyro"), ("Imu.Odd", "wheels.gyro_unit")],
+)
+def test_a_gyro_that_is_not_in_the_file_is_named(gyro: str, what: str) -> None:
+    with pytest.raises(ConfigError, match=what):
+        DbcDriver(section(**COUNTED, gyro=gyro), DBC)
+
+
+def test_a_gyro_is_named_by_message_and_signal() -> None:
+    with pytest.raises(ValueError, match=r"Message\.Signal"):
+        section(**COUNTED, gyro="Yaw")

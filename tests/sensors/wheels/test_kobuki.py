@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import random
+import struct
 
 import pytest
 from frames import KOBUKI_REST, SECOND_US, cut, kobuki_core, kobuki_packet
@@ -10,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drslamd.sensors.frame_scanner import FrameScanner
-from drslamd.sensors.samples import WheelCounts, WheelSample
+from drslamd.sensors.samples import GyroAngle, GyroRate, WheelCounts, WheelSample
 from drslamd.sensors.wheels.kobuki import KobukiDriver, KobukiFormat, sub_payloads
 from drslamd.sensors.wheels.wheel_driver import WheelRefusal
 
@@ -28,6 +30,10 @@ def packets(count: int, start_ms: int = 61840, start_count: int = 11245) -> list
     ]
 
 
+def counts(samples: list[WheelSample]) -> list[WheelCounts]:
+    return [sample for sample in samples if isinstance(sample, WheelCounts)]
+
+
 def fed(reads: list[bytes]) -> tuple[list[WheelSample], object]:
     driver = KobukiDriver()
     return [s for read in reads for s in driver.feed(read, T0)], driver.tally
@@ -38,7 +44,7 @@ def test_the_first_packet_gives_nothing_the_others_counters() -> None:
     samples = []
     for k, packet in enumerate(packets(3)):
         samples += driver.feed(packet, T0 + 20 * k * MS)
-    assert samples == [
+    assert counts(samples) == [
         WheelCounts(T0 + 20 * MS, 11253, 11238, 16),
         WheelCounts(T0 + 40 * MS, 11261, 11231, 16),
     ]
@@ -50,7 +56,7 @@ def test_samples_carry_the_time_of_the_base_not_that_of_the_read() -> None:
     first, second, *batch = packets(6)
     driver.feed(first, T0)
     driver.feed(second, T0 + 20 * MS)
-    samples = driver.feed(b"".join(batch), T0 + 100 * MS)
+    samples = counts(driver.feed(b"".join(batch), T0 + 100 * MS))
     assert [s.utime for s in samples] == [T0 + k * 20 * MS for k in range(2, 6)]
 
 
@@ -59,7 +65,7 @@ def test_time_and_counters_wrap_at_16_bits() -> None:
     samples = []
     for k, packet in enumerate(packets(5, 65500, 65520)):
         samples += driver.feed(packet, T0 + 20 * k * MS)
-    assert [s.utime for s in samples] == [T0 + k * 20 * MS for k in range(1, 5)]
+    assert [s.utime for s in counts(samples)] == [T0 + k * 20 * MS for k in range(1, 5)]
     assert samples[-1] == WheelCounts(T0 + 80 * MS, 16, 65492, 16)
 
 
@@ -78,7 +84,7 @@ def test_whole_and_byte_by_byte_and_random_reads_give_the_same(seed: int) -> Non
 @pytest.mark.parametrize("value", range(256))
 def test_one_poisoned_byte_costs_no_packet(value: int) -> None:
     stream = [*packets(1), bytes([value]), *packets(2, 61860)]
-    assert len(fed([b"".join(stream)])[0]) == 2
+    assert len(counts(fed([b"".join(stream)])[0])) == 2
 
 
 def test_unknown_sub_payloads_are_skipped_by_their_length() -> None:
@@ -148,3 +154,34 @@ def test_bit_flips_never_raise_and_good_packets_go_on(a: int, b: int) -> None:
     for k, packet in enumerate(good):
         samples += driver.feed(packet, T0 + (2 + k) * 20 * MS)
     assert samples[-1] == WheelCounts(T0 + 8 * 20 * MS, 11245 + 64, 11245 - 56, 16)
+
+
+def after_a_first(rest: bytes) -> list[WheelSample]:
+    """Samples of a packet with sub-payloads `rest`, behind one with none."""
+    driver = KobukiDriver()
+    driver.feed(kobuki_packet(kobuki_core(1000, 0, 0)), T0)
+    return driver.feed(kobuki_packet(kobuki_core(1020, 1, 2) + rest), T0 + 20 * MS)
+
+
+RAW = bytes([13, 14, 1, 6]) + struct.pack("<6h", 9, 9, 100, -9, 9, -300)
+
+
+@pytest.mark.parametrize("degrees", [74.84, -180.0, 179.99])
+def test_the_angle_of_the_gyro_comes_before_the_counters(degrees: float) -> None:
+    inertia = bytes([4, 7]) + struct.pack("<2h3x", round(100 * degrees), 33)
+    gyro, wheels = after_a_first(inertia + RAW)
+    assert isinstance(gyro, GyroAngle)
+    assert math.degrees(gyro.angle_rad) == pytest.approx(degrees)
+    assert gyro.utime == wheels.utime == T0 + 20 * MS
+    assert wheels == WheelCounts(T0 + 20 * MS, 1, 2, 16)
+
+
+def test_without_an_angle_it_is_the_mean_of_its_raw_rates_about_the_vertical() -> None:
+    """100 and -300 digits of 0.00875 deg/s."""
+    gyro, _ = after_a_first(RAW)
+    assert isinstance(gyro, GyroRate)
+    assert math.degrees(gyro.radps) == pytest.approx(-0.875)
+
+
+def test_a_base_that_says_nothing_of_its_gyro_gives_counters_only() -> None:
+    assert after_a_first(b"") == [WheelCounts(T0 + 20 * MS, 1, 2, 16)]

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from slam_scenes import NOISE
 
-from drslamd.sensors.samples import Motion
+from drslamd.sensors.samples import GyroSigmas, Motion
 from drslamd.slam.calibration.sensor_calibration import (
     CHANGED_BIAS_M,
     CHANGED_SCALE,
@@ -136,3 +136,11 @@ def test_every_constant_has_a_bound(times: float, is_believed: bool) -> None:
     assert is_sound({"scale": [times * MOST_SCALE_ERROR, 0.01]}) is is_believed
     assert is_sound({"yaw_rad_per_m": [times * MOST_YAW_RATE, 0.01]}) is is_believed
     assert is_sound({"bias_m": {"2": [times * MOST_BIAS_M, 0.01]}}) is is_believed
+
+
+def test_turns_of_a_gyro_are_not_corrected_by_what_is_known_of_the_wheels() -> None:
+    known = SensorCalibration(Learned(0.2, 0.01), Learned(0.1, 0.01), {}, turn=Learned(0.5, 0.1))
+    motion = Motion(1, 1.0, 0.4, gyro=GyroSigmas(0.01, 0.001))
+    assert known.corrected(motion) == replace(motion, distance_m=0.8)
+    by_wheels = known.corrected(replace(motion, gyro=None))
+    assert by_wheels.turn_rad == pytest.approx(1.5 * 0.4 - 0.1)

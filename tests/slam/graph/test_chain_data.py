@@ -14,7 +14,8 @@ from drslamd.conventions import Chain
 from drslamd.slam.graph import chain_data, timed_rows
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import Keyframe
-from drslamd.slam.odometry.noise import growth
+from drslamd.slam.odometry.gyro_noise import GyroNoise
+from drslamd.slam.odometry.noise import GYRO, growth
 from drslamd.slam.robot_model import UNTOLD, RobotModel
 
 A = Chain(0, 5)
@@ -159,3 +160,22 @@ def test_a_model_that_no_configuration_allows_is_not_believed(
     data = ChainData(A)
     data.take_model(0, model)
     assert data.model == (model if is_believed else UNTOLD)
+
+
+def test_sums_are_those_of_the_gyro_that_the_robot_last_spoke_of() -> None:
+    data = ChainData(A)
+    path = wander(np.random.default_rng(5), 30, 0.4)
+    for k in keyframes(range(20), path[:20]):
+        data.add(k)
+    by_wheels = data.sums
+    assert by_wheels[-1, GYRO.start] == 0.0
+    gyro = GyroNoise(0.01, 0.001, 5)
+    data.take_model(1, replace(UNTOLD, noise=replace(NOISE, gyro=gyro)))
+    n, poses = data.keyframes.rows[:, 0], data.keyframes.poses
+    assert data.sums == pytest.approx(growth(poses, gyro.seconds(n, poses)))
+    assert data.sums[-1, GYRO.start] == pytest.approx((n[-1] - 5) / 10)
+    for k in keyframes(range(30), path)[20:]:
+        data.add(k)
+    assert data.sums[-1, GYRO.start] == pytest.approx((data.keyframes.n[-1] - 5) / 10)
+    data.take_model(2, replace(UNTOLD, noise=NOISE))
+    assert data.sums[:20] == pytest.approx(by_wheels)

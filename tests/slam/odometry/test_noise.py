@@ -10,11 +10,21 @@ import pytest
 from slam_scenes import NOISE, Array, wander
 
 from drslamd.slam import se2
+from drslamd.slam.odometry.gyro_noise import OPEN, GyroNoise
 from drslamd.slam.odometry.noise import (
+    GYRO as BY_TIME,
+)
+from drslamd.slam.odometry.noise import (
+    OTHER_PATH_M,
+    OTHER_S,
+    PATH,
+    WHEELS,
     OdometryNoise,
+    by_yaw_rate,
     covariance_between,
     growth,
     link_covariance,
+    seen_from,
     step_sums,
 )
 
@@ -26,6 +36,14 @@ PARTS = {
     "random yaw": replace(QUIET, yaw_rad_per_sqrt_m=math.radians(0.5)),
     "everything": NOISE,
 }
+GYRO = GyroNoise(math.radians(0.4), math.radians(0.3), 0)
+BY_GYRO = {
+    "random yaw of a gyro": replace(QUIET, gyro=replace(GYRO, yaw_rad_per_s=1e-12)),
+    "rate of a gyro": replace(QUIET, gyro=replace(GYRO, yaw_rad_per_sqrt_s=1e-12)),
+    "a gyro and wheels": replace(NOISE, gyro=GYRO),
+}
+SECONDS = 0.5
+"""Of each step."""
 
 
 def noisy_twists(
@@ -39,10 +57,15 @@ def noisy_twists(
     length = np.hypot(step[:, 0], step[:, 1])
     scale = 1 + rng.normal(0, noise.scale, drives)
     bend = rng.normal(0, noise.yaw_rad_per_m, drives)
+    rate = rng.normal(0, noise.gyro.yaw_rad_per_s if noise.gyro else 1.0, drives)
     wrong = np.tile(path[i], (drives, 1))
     for m in range(i, k):
         root = math.sqrt(length[m])
-        turn = bend * length[m] + rng.normal(0, noise.yaw_rad_per_sqrt_m * root, drives)
+        if noise.gyro:
+            sigma = noise.gyro.yaw_rad_per_sqrt_s * math.sqrt(SECONDS)
+            turn = rate * SECONDS + rng.normal(0, sigma, drives)
+        else:
+            turn = bend * length[m] + rng.normal(0, noise.yaw_rad_per_sqrt_m * root, drives)
         shift = rng.normal(0, noise.translation_per_sqrt_m * root, (drives, 2))
         half = np.column_stack([scale[:, None] * step[m, :2] / 2, np.full(drives, step[m, 2] / 2)])
         nudge = np.column_stack([shift, turn])
@@ -58,12 +81,13 @@ def noisy_twists(
     return se2.log(se2.compose(wrong, se2.inverse(path[k])))
 
 
-@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize("part", [*PARTS, *BY_GYRO])
 def test_the_growth_of_uncertainty_is_that_of_noisy_drives(part: str) -> None:
-    noise = PARTS[part]
+    noise = (PARTS | BY_GYRO)[part]
     rng = np.random.default_rng(7)
     path = wander(rng, 200, 0.1)
-    poses, sums = path, growth(path)
+    seconds = np.full(199, SECONDS) if noise.gyro else None
+    poses, sums = path, growth(path, seconds)
     drives = 4000
     for i, k in ((0, 199), (60, 150)):
         predicted = covariance_between(noise, poses, sums, i, k)
@@ -112,7 +136,7 @@ def test_a_straight_line_has_a_closed_form() -> None:
 
 
 def test_a_path_of_one_pose_has_grown_nothing() -> None:
-    assert np.array_equal(growth(np.ones((1, 3))), np.zeros((1, 6)))
+    assert np.array_equal(growth(np.ones((1, 3))), np.zeros((1, 13)))
 
 
 def test_a_link_alone_is_as_uncertain_as_in_its_chain() -> None:
@@ -152,3 +176,60 @@ def test_noise_is_plausible_up_to_what_a_configuration_may_say(name: str, most: 
     assert not replace(NOISE, **{name: 1.002 * most}).is_plausible()
     assert not replace(NOISE, **{name: 0.0}).is_plausible()
     assert not replace(NOISE, **{name: math.nan}).is_plausible()
+
+
+def test_where_a_gyro_gave_the_heading_the_path_adds_to_translation_only() -> None:
+    path = wander(np.random.default_rng(11), 21, 0.3)
+    seconds = np.where(np.arange(20) < 8, 0.0, 0.7)
+    whole, by_wheels = growth(path, seconds), growth(path[:9])
+    assert whole[-1, WHEELS] == pytest.approx(by_wheels[-1, WHEELS])
+    assert whole[-1, PATH] == pytest.approx(growth(path)[-1, PATH])
+    assert whole[-1, BY_TIME.start] == pytest.approx(12 * 0.7)
+
+
+def test_sums_of_a_gyro_are_seen_from_elsewhere_as_those_of_wheels_are() -> None:
+    path, a_T_b = wander(np.random.default_rng(12), 30, 0.3), np.array([2.0, -3.0, 0.8])
+    moved = se2.compose(a_T_b, path)
+    seconds = np.linspace(0, 1, 29)
+    there = seen_from(growth(path, seconds)[-1:], a_T_b[None])
+    assert there[0] == pytest.approx(growth(moved, seconds)[-1])
+
+
+def test_a_pose_moves_with_the_rate_that_is_learned() -> None:
+    """Driven anew with a rate of the gyro, or of the wheels where those give the heading."""
+    path = wander(np.random.default_rng(13), 30, 0.3)
+    path = se2.between(path[0], path)
+    step, seconds, small = se2.between(path[:-1], path[1:]), np.linspace(0.2, 1, 29), 1e-6
+    length = np.hypot(step[:, 0], step[:, 1])
+    for noise, by, along in (
+        (replace(NOISE, gyro=GYRO), seconds, growth(path, seconds)),
+        (NOISE, length, growth(path)),
+    ):
+        end = np.zeros(3)
+        for part, turn in zip(step, small * by, strict=True):
+            half = np.array([0.0, 0.0, turn / 2])
+            for move in (half, part, half):
+                end = se2.compose(end, move)
+        moves = by_yaw_rate(along[-1:], path[-1:, :2], noise)[0]
+        assert (end - path[-1]) / small == pytest.approx(moves, rel=0.02, abs=0.05)
+
+
+def test_of_two_yaw_rates_the_one_that_is_not_learned_counts_as_random() -> None:
+    used = replace(NOISE, gyro=GYRO).random_part()
+    assert used.gyro == replace(GYRO, yaw_rad_per_s=0.0)
+    assert (used.scale, used.yaw_rad_per_m) == (0.0, 0.0)
+    by_path = NOISE.yaw_rad_per_sqrt_m**2 + NOISE.yaw_rad_per_m**2 * OTHER_PATH_M
+    assert used.yaw_rad_per_sqrt_m**2 == pytest.approx(by_path)
+    gone = replace(NOISE, gyro=replace(GYRO, until=7)).random_part()
+    assert gone.gyro is not None
+    assert gone.yaw_rad_per_sqrt_m == NOISE.yaw_rad_per_sqrt_m
+    by_time = GYRO.yaw_rad_per_sqrt_s**2 + GYRO.yaw_rad_per_s**2 * OTHER_S
+    assert gone.gyro.yaw_rad_per_sqrt_s**2 == pytest.approx(by_time)
+
+
+def test_a_gyro_that_no_source_may_state_makes_noise_implausible() -> None:
+    assert replace(NOISE, gyro=GYRO).is_plausible()
+    assert not replace(NOISE, gyro=replace(GYRO, yaw_rad_per_s=0.0)).is_plausible()
+    assert replace(NOISE, gyro=GYRO).learns_gyro
+    assert not replace(NOISE, gyro=replace(GYRO, until=OPEN - 1)).learns_gyro
+    assert not NOISE.learns_gyro

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from slam_scenes import NOISE, model_of
 
-from drslamd.slam.relative_pose.pair_end import Anchor, at_keyframes, level
+from drslamd.conventions import Chain
+from drslamd.slam.graph.chain_data import ChainData
+from drslamd.slam.odometry.gyro_noise import OPEN, GyroNoise
+from drslamd.slam.odometry.track import Track
+from drslamd.slam.relative_pose.pair_end import Anchor, PairEnd, at_keyframes, level
+from drslamd.slam.relative_pose.window import NO_GYRO
 
 
 @pytest.mark.parametrize(
@@ -64,3 +70,15 @@ def test_the_covariance_at_keyframes_is_that_of_small_errors_at_the_bodies() -> 
         steps.append((at_keyframes(moved, cov, *ends)[0] - pose) / 1e-6)
     jacobian = np.array(steps).T
     assert found == pytest.approx(jacobian @ cov @ jacobian.T, abs=1e-5)
+
+
+def test_the_span_of_a_gyro_is_told_in_seconds_of_our_clock() -> None:
+    """Its clock is 2 s ahead of ours; sample 1000 is 100 s there, 98 s here."""
+    data = ChainData(Chain(3, 1))
+    end = PairEnd(Track(10), data, ahead_us=2_000_000)
+    assert end.gyro_span(90_000_000) == NO_GYRO
+    gyro = GyroNoise(0.01, 0.001, 1000, 1205)
+    data.take_model(0, model_of(replace(NOISE, gyro=gyro)))
+    assert end.gyro_span(90_000_000) == pytest.approx((8.0, 28.5))
+    data.take_model(1, model_of(replace(NOISE, gyro=replace(gyro, until=OPEN))))
+    assert end.gyro_span(90_000_000)[1] > 1e8

@@ -11,14 +11,17 @@ from slam_scenes import NOISE, Array, seen_from_last, wander
 from window_scenes import noise_of
 
 from drslamd.slam import se2
+from drslamd.slam.odometry.gyro_noise import GyroNoise
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.range_model import LINKTRACK, RangeNoise
-from drslamd.slam.relative_pose.window import Window
+from drslamd.slam.relative_pose.window import NO_GYRO, Window
 from drslamd.slam.relative_pose.window_noise import (
+    gyro_seconds,
     moments,
     odometry_covariance,
     way_twists,
 )
+from drslamd.slam.relative_pose.window_stack import WindowStack
 
 QUIET = OdometryNoise(1e-12, 1e-12, 1e-12, 1e-12)
 BOTH = np.zeros(2, dtype=np.int64)
@@ -46,25 +49,35 @@ def of_one_robot(
     noise: OdometryNoise,
     before: int,
     antenna_sigma: float = 0.0,
+    seconds: Array | None = None,
 ) -> Array:
     moment = moments(points @ [1, 1j], directions @ [1, 1j])
     split = np.array([before])
-    twist = way_twists(path[None], [noise], split, antenna_sigma)
+    twist = way_twists(path[None], [noise], split, antenna_sigma, seconds)
     return from_lower(odometry_covariance(twist[None], moment[None, None], split)[0])
 
 
 def noisy_windows(
-    rng: np.random.Generator, path: Array, noise: OdometryNoise, drives: int, reference: int
+    rng: np.random.Generator,
+    path: Array,
+    noise: OdometryNoise,
+    drives: int,
+    reference: int,
+    seconds: float = 0.0,
 ) -> Array:
     """(drives, n, 3) a path as noisy odometry has it, each seen from its own pose `reference`."""
     step = se2.between(path[:-1], path[1:])
     length = np.hypot(step[:, 0], step[:, 1])
     scale = 1 + rng.normal(0, noise.scale, drives)
     bend = rng.normal(0, noise.yaw_rad_per_m, drives)
+    rate = rng.normal(0, noise.gyro.yaw_rad_per_s if noise.gyro else 1.0, drives)
     poses = [np.zeros((drives, 3))]
     for m in range(len(step)):
         root = math.sqrt(length[m])
         turn = bend * length[m] + rng.normal(0, noise.yaw_rad_per_sqrt_m * root, drives)
+        if noise.gyro:
+            sigma = noise.gyro.yaw_rad_per_sqrt_s * math.sqrt(seconds)
+            turn = rate * seconds + rng.normal(0, sigma, drives)
         shift = rng.normal(0, noise.translation_per_sqrt_m * root, (drives, 2))
         nothing = np.zeros(drives)
         half_turn = np.column_stack([nothing, nothing, turn / 2])
@@ -96,6 +109,44 @@ def test_what_odometry_does_to_residuals_is_what_noisy_drives_do(part: str, refe
     sigma = np.sqrt(np.diag(predicted) + 1e-6)  # of less than a millimetre nothing is claimed
     assert np.abs((seen - predicted) / np.outer(sigma, sigma)).max() < 0.13
     assert sigma[0] > 2 * sigma[reference - 4]
+
+
+@pytest.mark.parametrize("reference", [39, 30])
+def test_where_a_gyro_gives_the_heading_residuals_are_as_wrong_as_its_time(reference: int) -> None:
+    rng, drives, each = np.random.default_rng(21), 6000, 0.8
+    noise = replace(NOISE, gyro=GyroNoise(math.radians(0.4), math.radians(0.2), 0))
+    path = wander(rng, 40, 0.25)
+    true = se2.between(path[reference], path)
+    points, seconds = true[:, :2], np.full((1, 40), each)
+    seconds[0, reference if reference < 39 else -1] = 0.0  # between the measurement and itself
+    directions = np.tile([0.6, 0.8], (40, 1))
+    wrong = noisy_windows(rng, path, noise, drives, reference, each)[..., :2]
+    residuals = -np.sum((wrong - points) * directions, axis=2)
+    seen = residuals.T @ residuals / drives
+    predicted = of_one_robot(points, true, directions, noise, reference + 1, seconds=seconds)
+    sigma = np.sqrt(np.diag(predicted) + 1e-6)
+    assert np.abs((seen - predicted) / np.outer(sigma, sigma)).max() < 0.13
+
+
+def test_seconds_under_a_gyro_are_those_of_the_window_that_lie_in_its_span() -> None:
+    """From 2 s before to 1 s after the reference; b has no gyro."""
+    t = np.array([-3.0, -2.0, -1.5, 0.5, 1.5])
+    ahead = np.stack([t, 0 * t, 0 * t], axis=-1)
+    window = Window(t, t + 9, ahead, ahead, np.zeros(2), np.zeros(2), a_gyro=(-2.0, 1.0))
+    assert gyro_seconds(WindowStack.of([window])).tolist() == [[0.0, 0.5, 1.5, 0.5, 0.0], [0.0] * 5]
+
+
+def test_windows_of_several_lengths_have_the_seconds_that_each_has_alone() -> None:
+    rng = np.random.default_rng(23)
+    windows = []
+    for count, span in ((9, (-3.0, 0.4)), (5, NO_GYRO), (7, (-1.0, math.inf))):
+        t = np.linspace(-4.0, 1.0, count)
+        path = wander(rng, count, 0.3)
+        windows.append(Window(t, t + 9, path, path, np.zeros(2), np.zeros(2), b_gyro=span))
+    together = gyro_seconds(WindowStack.of(windows)).reshape(2, 3, 9)
+    for k, window in enumerate(windows):
+        alone = gyro_seconds(WindowStack.of([window])).reshape(2, -1)
+        assert together[:, k, : len(window)] == pytest.approx(alone)
 
 
 def test_the_measurement_at_the_reference_time_is_not_touched_by_odometry() -> None:

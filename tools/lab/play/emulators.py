@@ -6,6 +6,7 @@ mistake in a decoder does not hide behind the same mistake in its test.
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Callable, Sequence
 from typing import Protocol
@@ -98,10 +99,17 @@ class WheelEmulator(Protocol):
 
 
 class KobukiEmulator:
-    """The base of a TurtleBot 2: streams 16-bit counters."""
+    """The base of a TurtleBot 2: streams 16-bit counters, and the angle of its gyro.
+
+    Attributes:
+        gyro: its angle at a time, rad; None where the base does not say it.
+    """
 
     track_m = 0.230
     _per_metre = 11_724.4
+
+    def __init__(self) -> None:
+        self.gyro: Callable[[float], float | None] = lambda t: None
 
     def config(self, port: str) -> str:
         return f'source = "kobuki"\nport = "{port}"\n'
@@ -110,6 +118,10 @@ class KobukiEmulator:
         left, right = (round(path * self._per_metre) & 0xFFFF for path in (left_m, right_m))
         core = struct.pack("<H3B2H", round(t * 1000) & 0xFFFF, 0, 0, 0, left, right) + bytes(6)
         payload = bytes([1, len(core)]) + core
+        angle = self.gyro(t)
+        if angle is not None:
+            said = (round(math.degrees(angle) * 100) + 18_000) % 36_000 - 18_000
+            payload += struct.pack("<2Bh5x", 4, 7, said)
         body = bytes([len(payload)]) + payload
         check = 0
         for byte in body:

@@ -16,7 +16,7 @@ from lab.play.emulators import (
     RoboteqEmulator,
     WheelEmulator,
 )
-from lab.recordings.recording import Array, Recording, wheel_paths
+from lab.recordings.recording import Array, Recording, Trail, wheel_paths
 
 BASES: tuple[type, ...] = (KobukiEmulator, RoboteqEmulator, AsciiEmulator)
 
@@ -44,6 +44,21 @@ class Hardware:
         self.antenna_z_m = 0.0
         self.wiring: Wiring = lambda t, left, right: (left, right)
         self._recording = recording
+        if isinstance(base, KobukiEmulator):
+            base.gyro = self.gyro_angle
+        self.gyro_wiring: Callable[[float, float], float | None] = lambda t, angle: angle
+
+    @property
+    def trail(self) -> Trail:
+        """Of its robot."""
+        return self._recording.trails[self.robot]
+
+    def gyro_angle(self, t: float) -> float | None:
+        """What the gyro of the base says, rad; None without one."""
+        trail = self._recording.trails[self.robot]
+        if trail.gyro is None:
+            return None
+        return self.gyro_wiring(t, float(np.interp(t, trail.t, trail.gyro)))
 
     def uwb_chunks(self) -> Iterator[Chunk]:
         """One frame for each moment at which this module measured anything."""

@@ -27,12 +27,14 @@ class Trail:
         t: (m,) stamps of the odometry, s, ascending.
         odometry: (m, 3) dead-reckoned poses, m and rad, any start, angle counting on.
         truth: (m, 3) true poses at the same stamps.
+        gyro: (m,) the angle that a gyro says, rad, where the base has one.
     """
 
     robot: int
     t: Array
     odometry: Array
     truth: Array
+    gyro: Array | None = None
 
 
 @dataclass(frozen=True)

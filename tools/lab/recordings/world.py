@@ -7,7 +7,7 @@ a constant scale error and yaw rate per robot, random yaw and random translation
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,6 +38,27 @@ class OdometryModel:
     yaw_deg_per_m: float = 0.15
     yaw_deg_per_sqrt_m: float = 0.5
     translation_per_sqrt_m: float = 0.01
+
+
+@dataclass(frozen=True)
+class GyroModel:
+    """Random yaw and one sigma of a constant rate."""
+
+    deg_per_sqrt_s: float = 0.01
+    deg_per_h: float = 10.0
+
+
+def with_gyros(recording: Recording, seed: int, model: GyroModel = GyroModel()) -> Recording:
+    """The same drive and the same wheels, with a gyro in every base."""
+    trails = {}
+    for robot, trail in recording.trails.items():
+        rng = np.random.default_rng([seed, robot, 4])
+        step = np.diff(trail.t, prepend=trail.t[0])
+        noise = rng.normal(size=len(step)) * np.sqrt(step) * model.deg_per_sqrt_s
+        rate = rng.normal(0, model.deg_per_h) / 3600
+        said = np.unwrap(trail.truth[:, 2]) + np.radians(np.cumsum(noise + rate * step))
+        trails[robot] = replace(trail, gyro=said - said[0])
+    return replace(recording, trails=trails)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,9 @@ from pathlib import Path
 
 from lab.progress import Progress
 from lab.reproduce import experiment, pages, pictures, plan, rbcd_table, verdict
+from lab.reproduce.gyro import gyro_rows
 from lab.reproduce.state import State
+from lab.reproduce.tally import Tally
 
 EXAMPLES = """\
 examples:
@@ -22,6 +24,7 @@ examples:
   tools/reproduce --seeds 40 --out /tmp/x   more of them, elsewhere
   tools/reproduce --rbcd data               module 3 against its centralised optimum, 15 minutes
   tools/reproduce --rbcd data --quick       one recorded case and one graph of them
+  tools/reproduce --gyro --seeds 4          what a gyro brings, and what a wrong one costs
   tools/reproduce --calibrate               the noise for which odometry is as wrong as the paper's
 
 The folder gets results.md, results.json (with the verdict) and pictures.
@@ -38,6 +41,8 @@ def main(arguments: list[str] | None = None) -> int:
         return 0
     if options.rbcd is not None:
         return rbcd(options.rbcd, options.quick)
+    if options.gyro:
+        return gyro(1 if options.quick else options.seeds)
     out = options.out or Path("out/reproduce-quick" if options.quick else "out/reproduce")
     pieces = plan.quick() if options.quick else plan.full(options.seeds)
     state = State(out / "state.json")
@@ -68,6 +73,25 @@ def rbcd(data: Path, quick: bool) -> int:
     return 0 if all(reached) else 1
 
 
+def gyro(seeds: int) -> int:
+    """Print what a gyro in every base brings; the exit code."""
+    cases = gyro_rows.CASES
+    progress = Progress("reproducing", float(seeds * len(cases)))
+    totals: dict[str, Tally] = {}
+    print(gyro_rows.HEAD)
+    reached = []
+    for k, case in enumerate(cases):
+        total = totals[case.name] = Tally()
+        for seed in range(seeds):
+            progress(float(k * seeds + seed))
+            total.merge(gyro_rows.run(case, seed).sums)
+        row, is_reached = gyro_rows.row(case, totals)
+        reached.append(is_reached)
+        print(row, flush=True)
+    progress.end()
+    return 0 if all(reached) else 1
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="tools/reproduce",
@@ -80,6 +104,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="default out/reproduce[-quick]")
     parser.add_argument(
         "--rbcd", type=Path, metavar="DATA", help="hold module 3 against its centralised optimum"
+    )
+    parser.add_argument(
+        "--gyro", action="store_true", help="the experiment with gyros, 20 minutes a seed"
     )
     parser.add_argument("--calibrate", action="store_true", help="print the noise and end")
     return parser

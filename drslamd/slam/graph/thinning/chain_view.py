@@ -18,7 +18,8 @@ from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.tables import KeyframeTable
 from drslamd.slam.graph.thinning.time_cells import Kind, Stretch, stretches, with_edge
 from drslamd.slam.graph.timed_rows import NEVER
-from drslamd.slam.odometry.noise import seen_from, step_sums
+from drslamd.slam.odometry.gyro_noise import GyroNoise
+from drslamd.slam.odometry.noise import SUMS, seen_from, step_sums
 from drslamd.slam.se2 import Array, Index
 
 
@@ -28,7 +29,7 @@ class ChainLinks:
 
     Attributes:
         measured: (m, 3) relative poses, scale and yaw rate left in.
-        sums: (m, 6) `noise.growth` over the way that was driven, in frames i.
+        sums: (m, 13) `noise.growth` over the way that was driven, in frames i.
         by_turn: (m, 3) how `measured` moves when turns are longer by a fraction.
     """
 
@@ -45,7 +46,7 @@ class Carried:
     Attributes:
         n: (m,) those keyframes.
         keyframe_T_body: (m, 3).
-        sums: (m, 6) `noise.growth` over the ways between, in the frames of the keyframes.
+        sums: (m, 13) `noise.growth` over the ways between, in the frames of the keyframes.
         is_after: (m,) was the body there after its keyframe?
     """
 
@@ -64,7 +65,7 @@ class ChainPart:
         stays: (k,) which rows stay.
         own: (r,) for each row, the row that begins its cell.
         near: (r,) for each row, the row that stands for it: r is that which follows the stretch.
-        steps: (r, 6) `noise.step_sums` from each row to the next, in the frame of its `own`; what
+        steps: (r, 13) `noise.step_sums` from each row to the next, in the frame of its `own`; what
             they are across a break nobody asks.
         links: between the rows `stays` and on to the next stretch, numbered as `stays` is.
     """
@@ -78,11 +79,14 @@ class ChainPart:
     links: ChainLinks
 
 
-def thinned(stretch: Stretch, rows: Array, after: Array) -> ChainPart:
+def thinned(
+    stretch: Stretch, rows: Array, after: Array, gyro: GyroNoise | None = None
+) -> ChainPart:
     """Thin a stretch of a chain.
 
     Args:
         rows: (r, 5) of `KeyframeTable`; after: (0 or 1, 5) the row that follows.
+        gyro: of the chain.
     """
     both = KeyframeTable(np.concatenate([rows, after]))
     n, segment, poses, count = both.n, both.segment, both.poses, len(rows)
@@ -95,12 +99,12 @@ def thinned(stretch: Stretch, rows: Array, after: Array) -> ChainPart:
     own = stays[np.cumsum(begins) - 1]
     start = poses[own[:-1]]
     here, there = se2.between(start, poses[:-1]), se2.between(start, poses[1:])
-    steps = np.zeros((count, 6))
-    steps[: len(there)] = step_sums(there[:, :2] - here[:, :2], (there[:, :2] + here[:, :2]) / 2)
+    steps, at = np.zeros((count, SUMS)), (there[:, :2] + here[:, :2]) / 2
+    seconds = None if gyro is None else gyro.seconds(both.rows[:, 0], poses)
+    steps[: len(there)] = step_sums(there[:, :2] - here[:, :2], at, seconds)
     last = stays[1:] - 1
     linked = np.flatnonzero(is_joined[last])
     turn = se2.wrap(there[:, 2] - here[:, 2])
-    at = (there[:, :2] + here[:, :2]) / 2
     turned = np.zeros((count, 3))
     turned[: len(there)] = np.column_stack([turn, turn[:, None] * at])
     first = stays[stays < count]
@@ -155,15 +159,15 @@ class OldParts:
         none = np.zeros(0, dtype=np.int64)
         self.own = np.concatenate([none, *(part.own + start for part, start in each)])
         self.near = np.concatenate([none, *(part.near + start for part, start in each)])
-        self.steps = np.concatenate([*(part.steps for part in parts), np.zeros((1, 6))])
+        self.steps = np.concatenate([*(part.steps for part in parts), np.zeros((1, SUMS))])
 
     def sums_between(self, first: Index, end: Index) -> Array:
-        """(m, 6) sums of the steps first .. end - 1, each of one cell and of one at least."""
+        """(m, 13) sums of the steps first .. end - 1, each of one cell and of one at least."""
         if not len(first):
-            return np.zeros((0, 6))
+            return np.zeros((0, SUMS))
         order = np.argsort(first, kind="stable")
         ends = np.stack([first[order], end[order]], axis=-1).ravel()
-        out = np.empty((len(first), 6))
+        out = np.empty((len(first), SUMS))
         out[order] = np.add.reduceat(self.steps[: ends.max() + 1], ends)[::2]
         return out
 
@@ -215,7 +219,7 @@ class ChainView:
     def carried(self, rows: Index) -> Carried:
         """Where the bodies of rows (m,) of `held` were, seen from the keyframes that stay."""
         near, held = self.standing_for(rows), self.held
-        sums, is_after = np.zeros((len(rows), 6)), rows >= near
+        sums, is_after = np.zeros((len(rows), SUMS)), rows >= near
         for which, first, end in ((rows > near, near, rows), (rows < near, rows, near)):
             sums[which] = self._old.sums_between(first[which], end[which])
         # the sums of a way are in the frame of the cell that it crosses
@@ -228,7 +232,8 @@ class ChainView:
 def whole(data: ChainData) -> ChainView:
     """A chain of which nothing is thinned."""
     rows = data.keyframes.rows
-    return ChainView(data, OldParts([]), [thinned(Stretch(0, 0, NEVER), rows, rows[:0])])
+    gyro = data.model.noise.gyro
+    return ChainView(data, OldParts([]), [thinned(Stretch(0, 0, NEVER), rows, rows[:0], gyro)])
 
 
 @dataclass
@@ -238,11 +243,13 @@ class _Made:
     Attributes:
         changes: of the chain, when it was last seen to be the same.
         edge: segment of its first row, and the row that follows.
+        span: samples whose heading a gyro gave.
     """
 
     part: ChainPart
     changes: int
     edge: list[float]
+    span: tuple[int, int] | None
 
 
 class ChainThinning:
@@ -273,15 +280,17 @@ class ChainThinning:
         after = data.keyframes.rows[which.stop : which.stop + 1]
         # (a row in front of a part may change its segments)
         edge = [rows[0, 1], *after.ravel().tolist()]
+        gyro, span = data.model.noise.gyro, data.model.noise.gyro_span
         made = self._made.get(stretch.kind)
         is_same = (
             made is not None
             and made.part.stretch == stretch
             and made.edge == edge
+            and made.span == span
             and data.is_same(made.changes, stretch.first, stretch.end)
         )
         if made is None or not is_same:
-            made = _Made(thinned(stretch, rows, after), 0, edge)
+            made = _Made(thinned(stretch, rows, after, gyro), 0, edge, span)
             self._made[stretch.kind] = made
         made.changes = data.changes
         return made.part

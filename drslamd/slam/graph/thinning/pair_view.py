@@ -21,7 +21,7 @@ from drslamd.slam.graph.tables import CLOSURE_COLUMNS, RANGE_COLUMNS, ClosureTab
 from drslamd.slam.graph.thinning.chain_view import Carried, ChainPart, ChainView
 from drslamd.slam.graph.thinning.time_cells import Kind
 from drslamd.slam.graph.timed_rows import NEVER
-from drslamd.slam.odometry.noise import OdometryNoise, by_yaw_rate, link_covariance
+from drslamd.slam.odometry.noise import PATH, OdometryNoise, by_yaw_rate, link_covariance
 from drslamd.slam.robot_model import RobotModel
 from drslamd.slam.se2 import Array, Index
 
@@ -144,7 +144,7 @@ def thinned_ranges(table: RangeTable, a: ChainView, b: ChainView) -> tuple[Range
             n[old], arm[old] = carried.n, se2.transform(carried.keyframe_T_body, arm[old])
             turn[old] = se2.wrap(turn[old] + carried.keyframe_T_body[:, 2])
             variance[old] += _spread(end.model.noise, carried, arm[old])
-            moves[old, number] = _moves(carried, arm[old])
+            moves[old, number] = _moves(carried, arm[old], end.model.noise)
     table.sigma_m[:] = np.sqrt(variance)
     return table, moves
 
@@ -156,13 +156,13 @@ def _spread(noise: OdometryNoise, carried: Carried, points: Array) -> Array:
     return np.asarray(np.einsum("kij,kjl,kil->k", lever, twist, lever) / 2)
 
 
-def _moves(carried: Carried, points: Array) -> Array:
+def _moves(carried: Carried, points: Array, noise: OdometryNoise) -> Array:
     """(m, 2, 2) how bodies' points (m, 2) move with yaw rate and scale, one row each."""
-    by_yaw = by_yaw_rate(carried.sums, points)[:, :2]
+    by_yaw = by_yaw_rate(carried.sums, points, noise)[:, :2]
     moves = np.empty((len(points), 2, 2))
     moves[:, 0] = np.where(carried.is_after[:, None], by_yaw, -by_yaw)
     moves[:, 1] = carried.keyframe_T_body[:, :2]
-    moves[carried.sums[:, 0] < MOVING_M] = 0.0
+    moves[carried.sums[:, PATH] < MOVING_M] = 0.0
     return moves
 
 

@@ -22,6 +22,7 @@ from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.odometry.correction import Correction
+from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.banded.banded_solver import SETTLED
@@ -105,6 +106,7 @@ class TeamProblem:
         is_known: is there a solution of the same keyframes? Then it is solved to the end, which
             costs some steps more and would be in vain while others come.
         is_near: is there one of nearly all of them, with a model that was right?
+        by_gyro: robots whose constant yaw rate is that of a gyro.
     """
 
     problem: Problem
@@ -113,6 +115,7 @@ class TeamProblem:
     pairs: list[tuple[int, int]]
     places: Numbering
     is_known: bool
+    by_gyro: frozenset[int]
     is_near: bool = False
 
 
@@ -131,7 +134,7 @@ def build_problem(
         bias=BiasPrior.of(numbers.bias_sigma, numbers.model),
         scale=np.array([data.model.noise.scale for data in chains]),
         scale_tails=numbers.scale_tails,
-        yaw=np.array([max(data.model.noise.yaw_rad_per_m, YAW_PRIOR_FLOOR) for data in chains]),
+        yaw=np.array([_yaw_prior(data.model.noise) for data in chains]),
         near_bias=numbers.model.near_bias_sigma_m,
     )
     problem = Problem(
@@ -148,10 +151,20 @@ def build_problem(
         range_sigma=numbers.range_sigma,
         model=numbers.model,
     )
-    start = _start(previous, known, pairs, robots)
+    by_gyro = {c.chain.robot for c in chains if c.model.noise.learns_gyro}
+    start = _start(previous, known, pairs, robots, by_gyro)
     solved = {chain.chain: places.n[places.of_robot(chain.chain.robot)] for chain in chains}
     is_known, is_near = _knows(previous, group, solved), _is_near(previous, group, solved)
-    return TeamProblem(problem, start, list(solved), pairs, places, is_known, is_near)
+    return TeamProblem(
+        problem, start, list(solved), pairs, places, is_known, frozenset(by_gyro), is_near
+    )
+
+
+def _yaw_prior(noise: OdometryNoise) -> float:
+    """Sigma of the constant yaw rate that is learned: rad/m, of a gyro rad/s."""
+    if noise.gyro is not None and noise.gyro.is_in_use:
+        return noise.gyro.yaw_rad_per_s
+    return max(noise.yaw_rad_per_m, YAW_PRIOR_FLOOR)
 
 
 def _knows(previous: TeamEstimate | None, group: Group, keyframes: Mapping[Chain, Index]) -> bool:
@@ -180,12 +193,13 @@ def _start(
     known: Mapping[int, Correction],
     pairs: list[tuple[int, int]],
     robots: list[int],
+    by_gyro: set[int],
 ) -> Calibration:
     """What the last solution learned, and what closures were found with."""
     if previous is None:
         start = Calibration.zero(len(pairs), len(robots))
     else:
-        start = _learned(previous, pairs, robots)
+        start = _learned(previous, pairs, robots, by_gyro)
     odometry = [
         known.get(robot, Correction(start.scale[at], 0.0, start.turn[at]))
         for at, robot in enumerate(robots)
@@ -198,13 +212,16 @@ def _start(
 
 
 def _learned(
-    previous: TeamEstimate, pairs: list[tuple[int, int]], robots: list[int]
+    previous: TeamEstimate, pairs: list[tuple[int, int]], robots: list[int], by_gyro: set[int]
 ) -> Calibration:
     """By the last solution."""
+    rates = [previous.gyro_rate if robot in by_gyro else previous.yaw for robot in robots]
     return Calibration(
         bias=np.array([previous.bias_m.get(pair, Learned()).value for pair in pairs]),
         scale=np.array([previous.scale.get(robot, Learned()).value for robot in robots]),
-        yaw=np.array([previous.yaw.get(robot, Learned()).value for robot in robots]),
+        yaw=np.array(
+            [of.get(robot, Learned()).value for of, robot in zip(rates, robots, strict=True)]
+        ),
         near_bias=np.array([previous.near_bias_m.value]),
         team_bias=np.array([previous.team_bias_m.value]),
         turn=np.array([previous.turn.get(robot, Learned()).value for robot in robots]),
@@ -238,8 +255,7 @@ def solved(
     """
     mine = {chain.robot: team.places.of_robot(chain.robot) for chain in team.chains}
     last = tuple(int(at[-1]) for at in mine.values())
-    if tolerance is None:
-        tolerance = SETTLED if team.is_known else TOLERANCE
+    tolerance = tolerance or (SETTLED if team.is_known else TOLERANCE)
     solution, kept = solve(team, last, tolerance, kept)
     learned, spread, doubted = solution.calibration, solution.spread, solution.doubted
     assert spread is not None
@@ -251,6 +267,7 @@ def solved(
     }
     points = frozenset(s.robot for s in group.points) - {s.robot for s in group.members}
     turn = _named(list(mine), learned.turn, spread.turn)
+    yaw = _named(list(mine), learned.yaw, spread.yaw)
     x, y = (_named(list(mine), learned.antenna[:, k], spread.antenna[:, k]) for k in (0, 1))
     return TeamEstimate(
         frame=group.frame,
@@ -262,7 +279,8 @@ def solved(
         ),
         bias_m=_named(team.pairs, learned.bias, spread.bias),
         scale=_named(list(mine), learned.scale, spread.scale),
-        yaw=_named(list(mine), learned.yaw, spread.yaw),
+        yaw={robot: value for robot, value in yaw.items() if robot not in team.by_gyro},
+        gyro_rate={robot: yaw[robot] for robot in team.by_gyro},
         near_bias_m=Learned(float(learned.near_bias[0]), float(spread.near_bias[0])),
         team_bias_m=Learned(float(learned.team_bias[0]), float(spread.team_bias[0])),
         turn={robot: turn[robot] for robot in compress(mine, doubted.track)},

@@ -15,7 +15,7 @@ from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import Keyframe
 from drslamd.slam.graph.thinning.chain_view import ChainThinning, ChainView, whole
 from drslamd.slam.graph.thinning.time_cells import RECENT_S
-from drslamd.slam.odometry.noise import OdometryNoise, by_yaw_rate
+from drslamd.slam.odometry.noise import PATH, WHEELS, OdometryNoise, by_yaw_rate
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.factors import chain_links
 from drslamd.slam.robot_model import RobotModel
@@ -255,7 +255,8 @@ def test_the_way_between_is_summed_in_the_frame_of_that_keyframe() -> None:
             x, y = (here + there) / 2
             length = math.hypot(*(there - here))
             sums += length * np.array([1, y, -x, y * y, -x * y, x * x])
-        assert carried.sums[k] == pytest.approx(sums, abs=1e-9)
+        assert carried.sums[k, WHEELS] == pytest.approx(sums, abs=1e-9)
+        assert carried.sums[k, PATH] == pytest.approx(sums[0], abs=1e-9)
     assert {bool(after) for after in carried.is_after} == {True, False}
 
 

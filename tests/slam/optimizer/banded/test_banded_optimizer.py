@@ -28,6 +28,7 @@ from drslamd.slam.graph.estimate import Learned, TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
+from drslamd.slam.odometry.gyro_noise import GyroNoise
 from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.banded.banded_optimizer import (
     SCALE_TAILS,
@@ -247,6 +248,33 @@ def test_priors_are_those_of_the_robots_and_of_the_configuration() -> None:
     )
     assert problem.priors.near_bias == LINKTRACK.near_bias_sigma_m
     assert (problem.pairs, problem.range_sigma) == (3, 0.10)
+
+
+def test_a_gyro_whose_noise_by_time_is_that_of_the_wheels_by_path_changes_nothing_else() -> None:
+    """0.4 m/s all along: sigmas by path and by time can be the same."""
+    team = small_team(5, count=60)
+    group = group_of(team.graph)
+    by_wheels = build_problem(team.graph, group, None, BANDED)
+    gyro = GyroNoise(NOISE.yaw_rad_per_sqrt_m * math.sqrt(0.4), NOISE.yaw_rad_per_m * 0.4, 0)
+    wheels = replace(NOISE, yaw_rad_per_sqrt_m=1e-6, yaw_rad_per_m=1e-6, gyro=gyro)
+    team.graph.insert(team.chains[1], GraphEntry(9, RobotModel(wheels)))
+    by_gyro = build_problem(team.graph, group, None, BANDED)
+    assert by_gyro.problem.priors.yaw[1] == gyro.yaw_rad_per_s
+    assert (by_wheels.by_gyro, by_gyro.by_gyro) == (frozenset(), {1})
+    one, other = (banded_solver.solve(team.problem, team.start) for team in (by_wheels, by_gyro))
+    assert other.poses == pytest.approx(one.poses, abs=0.02)
+    of_path, of_time = one.calibration.yaw, other.calibration.yaw
+    assert of_time[1] == pytest.approx(0.4 * of_path[1], rel=0.1)
+    assert of_time[[0, 2]] == pytest.approx(of_path[[0, 2]], rel=0.1)
+    # what is learned of the wheels has another unit
+    estimate = solved(team.graph, group)
+    assert (set(estimate.yaw), set(estimate.gyro_rate)) == ({0, 2}, {1})
+    start = build_problem(team.graph, group, estimate, BANDED).start
+    assert start.yaw.tolist() == [
+        estimate.yaw[0].value,
+        estimate.gyro_rate[1].value,
+        estimate.yaw[2].value,
+    ]
 
 
 def test_the_next_solution_goes_on_from_the_last_one() -> None:
