@@ -160,6 +160,22 @@ def test_of_the_wheels_path_and_age_are_said() -> None:
     # the first packet starts the clock, the second the counters
     assert found["path_m"] == round(2 * 117 / 11_724.4, 3)
     assert found["counters"] == scene.robot.wheels.counters()
+    assert found["counters"]["gyro.slips"] == 0
+    # (one that was there in two packets, and not yet of any use)
+    assert found["gyro"] == {
+        "in_use": False,
+        "fault": None,
+        "bias_deg_per_s": 0.0,
+        "bias_sigma_deg_per_h": 60.0,
+        "turns_of_wheels": 1.0,
+        "slips_s": 0,
+    }
+
+
+def test_of_wheels_without_a_gyro_none_is_spoken_of() -> None:
+    found = section(RobotScene(), "wheels")
+    assert "gyro" not in found
+    assert not any(name.startswith("gyro") for name in found["counters"])
 
 
 # network, peers

@@ -31,12 +31,16 @@ FEWEST_S: Final = 5
 BIAS: Final = (math.radians(0.3), math.radians(4.0))
 """rad/s: less is no bias that matters, more is most often no bias but a wheel."""
 BIAS_SIGMAS: Final = 3.0
+LONG_S: Final = 30
+"""Seconds after which wheels that slip all the time must have done so by their ways ..."""
+MANY: Final = 25
+"""... if they slipped in so many of them; else the gyro says nothing that makes sense."""
 PASSES: Final = math.radians(0.5), 2.0
 """A bias that may be so large, with so many sigmas, passes no trial."""
 SIGMAS: Final = 4.0
 LEAST: Final = math.radians(1.5)
 """rad: a contradiction is above this and above so many sigmas of the wheels."""
-LIKELY, CLEARLY = 1.5, 4.0
+LIKELY, CLEARLY = 1.5, 20.0
 """Squares that are left by one explanation over those by another: what is likely before anything
 is measured stays so up to the first, and something else must be better by the second."""
 
@@ -70,6 +74,7 @@ class Comparison:
         self._per_m, self._per_sqrt_m = yaw_rad_per_m, yaw_rad_per_sqrt_m
         self._seconds: deque[Second] = deque(maxlen=SPAN_S)
         self._memory: deque[Second] = deque(maxlen=MEMORY_S)
+        self._slipped: deque[Second | None] = deque(maxlen=LONG_S)
         self._now: Second | None = None
         self._nothing = turn_fit([], yaw_rad_per_sqrt_m, yaw_rad_per_m, 1.0)
         self.known = self._nothing
@@ -91,6 +96,7 @@ class Comparison:
         """What comes is compared anew."""
         self._seconds.clear()
         self._memory.clear()
+        self._slipped.clear()
         self._now, self.known = None, self._nothing
 
     def since(self) -> int:
@@ -117,11 +123,13 @@ class Comparison:
         if self._is_biased():
             return GyroFault.BIASED
         newest = self._seconds[-1]
-        if self._contradicts([newest]):
+        is_slip = self._contradicts([newest])
+        self._slipped.append(newest if is_slip else None)
+        if is_slip:
             if is_live:
                 self.slips += 1
                 self.last_slip = newest.start
-            return None
+            return GyroFault.SCALED if self._is_senseless() else None
         self._memory.append(newest)
         return self._learned(bias_sigma)
 
@@ -129,6 +137,8 @@ class Comparison:
         """Has enough been turned to know that both tell of the same turns?"""
         turned = sum(abs(x.wheels) for x in self._memory)
         if turned <= TURNED or len(self._memory) < FEWEST_S:
+            return False
+        if not SIZES[0] < self.known.ratio < SIZES[1]:
             return False
         may_be = abs(self.known.bias_radps) + PASSES[1] * self.known.bias_sigma
         return may_be < PASSES[0] and not self._contradicts(self._seconds)
@@ -172,16 +182,27 @@ class Comparison:
             return False
         apart = [self.known.apart(x) for x in of]
         rate, by_time = _fitted(apart, [x.s for x in of])
-        # (of one wheel, or of both)
-        levers = (-self._half_track_m, 0.0, self._half_track_m)
-        ways = [[abs(x.path_m + lever * x.gyro) for x in of] for lever in levers]
-        by_path = min(_fitted(apart, way)[1] for way in ways)
+        by_path = self._left_by_path(of, apart)
         spread = math.sqrt(by_time / len(of))
         if abs(rate) < BIAS[0] or spread > max(abs(rate) / 2, math.radians(0.4)):
             return False
         noise = sum(self._per_sqrt_m**2 * x.path_m + PER_SECOND**2 for x in of)
         is_small = abs(rate) < BIAS[1] and by_time < LIKELY * by_path + noise
         return is_small or CLEARLY * (by_time + noise) < by_path
+
+    def _left_by_path(self, seconds: Sequence[Second], apart: Sequence[float]) -> float:
+        """Squares that are left of what both are apart, but for the way of one wheel or of both."""
+        levers = (-self._half_track_m, 0.0, self._half_track_m)
+        ways = [[abs(x.path_m + lever * x.gyro) for x in seconds] for lever in levers]
+        return min(_fitted(apart, way)[1] for way in ways)
+
+    def _is_senseless(self) -> bool:
+        """Do both contradict each other nearly always, and the way of no wheel explains it?"""
+        slips = [second for second in self._slipped if second is not None]
+        if len(slips) < MANY:
+            return False
+        apart = [self.known.apart(second) for second in slips]
+        return self._left_by_path(slips, apart) > sum(a * a for a in apart) / 2
 
 
 def _fitted(apart: Sequence[float], by: Sequence[float]) -> tuple[float, float]:

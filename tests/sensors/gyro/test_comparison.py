@@ -146,3 +146,30 @@ def test_what_is_forgotten_counts_no_more() -> None:
     drive.comparison.forget()
     assert drive.comparison.known.ratio == 1.0
     assert not drive.comparison.is_passed()
+
+
+def test_a_gyro_that_makes_no_sense_for_long_is_let_go() -> None:
+    """Neither always by as much nor as much as a wheel drives."""
+    rng = np.random.default_rng(2)
+    drive = Drive()
+    drive.on(driven(60), right, in_use=True)
+
+    def wild(k: int, path: float, turn: float) -> tuple[float, float]:
+        return turn, turn + float(rng.choice([-0.5, 0.5])) * float(rng.uniform(0.5, 1))
+
+    found = drive.on(driven(40, 60), wild, in_use=True)
+    first = next(k for k, fault in enumerate(found) if fault)
+    assert found[first] is GyroFault.SCALED
+    assert first in range(24, 32)
+
+
+def test_an_encoder_that_is_dead_for_long_is_the_wheels() -> None:
+    """The left wheel stands; the right one tells a turn of what it drives."""
+    drive = Drive()
+    drive.on(driven(60), right, in_use=True)
+
+    def dead(k: int, path: float, turn: float) -> tuple[float, float]:
+        return (path + turn * 0.115) / 0.23, turn
+
+    assert not any(drive.on(driven(60, 60), dead, in_use=True))
+    assert drive.comparison.slips > 50
