@@ -65,7 +65,7 @@ class _Tracked:
             turn = float(step[2])
             self.speed_mps = float(np.copysign(np.hypot(step[0], step[1]), step[0])) / seconds
             self.turn_radps = turn / seconds
-            self.leg.go(self.pose.tolist(), row[2:].tolist())
+            self.leg.go(self.pose.tolist(), row[2:].tolist(), seconds)
             self.n, self.pose = int(row[0]), row[2:]
         return True
 

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from drslamd.config import Config
-from drslamd.conventions import MILLISECOND_US, SECOND_US, Chain
+from drslamd.conventions import GRID_US, MILLISECOND_US, SECOND_US, Chain
 from drslamd.events import Send
 from drslamd.gossip.team import Team
 from drslamd.near.leg import Leg
@@ -95,8 +95,8 @@ class Surroundings:
             self._is_lost = self._is_lost or self._leg is not None
             self._leg, self._began = None, reckoning.track.end
             self._late.clear()
-        elif self._leg is not None:
-            self._leg.go(self._odom, (x, y, theta))
+        elif self._leg is not None and self.utime is not None:
+            self._leg.go(self._odom, (x, y, theta), (utime - self.utime) / SECOND_US)
         self._odom, self.utime = (x, y, theta), utime
         self._path_m += motion.distance_m
         self._late.append((utime, self._path_m, theta))
@@ -197,7 +197,8 @@ class Surroundings:
         leg = Leg.of(estimate, self.own.robot, self._front.model.noise)
         way = track.poses[last - track.n0 : now - track.n0 + 1]
         leg.along(way)
-        leg.go(way[-1].tolist(), self._odom)
+        seconds = ((self.utime or 0) - now * GRID_US) / SECOND_US
+        leg.go(way[-1].tolist(), self._odom, max(seconds, 0.0))
         return leg
 
 
