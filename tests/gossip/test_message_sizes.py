@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from acquainted import introduce
@@ -12,10 +14,12 @@ from drslamd.conventions import Chain
 from drslamd.events import ChannelMessage, Send
 from drslamd.gossip import lc02, messages
 from drslamd.gossip.envelopes.splitting import MEASUREMENTS_PER_ENTRY
+from drslamd.gossip.lc02 import MAX_PAYLOAD
 from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose, PoseState
 from drslamd.gossip.team import Team
 from drslamd.slam.graph.measurements import ClosureMeasurement, Keyframe, RangeMeasurement
 from drslamd.slam.graph.public_poses import PublicPoses
+from drslamd.slam.odometry.gyro_noise import GyroNoise
 from drslamd.slam.robot_model import UNTOLD
 
 
@@ -87,6 +91,12 @@ def test_twenty_closures_with_twenty_peers_and_the_traits_have_1366_bytes() -> N
     team = Team(a_seal(3))
     (entry,) = team.entries(UNTOLD, (), (), CLOSURES[:MEASUREMENTS_PER_ENTRY])
     assert len(messages.encode(HEADER, entry)) == 54 + 32 + 20 * (10 + 54) == 1366
+
+
+def test_of_a_robot_with_a_gyro_they_have_24_bytes_more_and_still_fit() -> None:
+    turned = replace(UNTOLD, noise=replace(UNTOLD.noise, gyro=GyroNoise(0.25, 0.5, 70)))
+    (entry,) = Team(a_seal(3)).entries(turned, (), (), CLOSURES[:MEASUREMENTS_PER_ENTRY])
+    assert len(messages.encode(HEADER, entry)) == 1366 + 24 <= MAX_PAYLOAD
 
 
 def test_the_largest_rank_that_can_be_configured_is_20() -> None:

@@ -38,6 +38,8 @@ MANY: Final = 25
 PASSES: Final = math.radians(0.5), 2.0
 """A bias that may be so large, with so many sigmas, passes no trial."""
 SIGMAS: Final = 4.0
+MOST_SPUN: Final = 0.3
+"""Of a way: wheels of which one stands or is blocked contradict a gyro by more."""
 LEAST: Final = math.radians(1.5)
 """rad: a contradiction is above this and above so many sigmas of the wheels."""
 LIKELY, CLEARLY = 1.5, 20.0
@@ -65,6 +67,7 @@ class Comparison:
     Attributes:
         known: how both go together, by the seconds before those that are looked at.
         slips: seconds in which the wheels said another turn than the gyro; last_slip: when.
+        spun_m: by how much the way of the newest second is too long, where a wheel spun in it.
     """
 
     def __init__(
@@ -79,6 +82,7 @@ class Comparison:
         self._nothing = turn_fit([], yaw_rad_per_sqrt_m, yaw_rad_per_m, 1.0)
         self.known = self._nothing
         self.slips = 0
+        self.spun_m = 0.0
         self.last_slip: int | None = None
 
     def add(self, utime: int, s: float, path_m: float, wheels: float, gyro: float) -> bool:
@@ -124,6 +128,7 @@ class Comparison:
             return GyroFault.BIASED
         newest = self._seconds[-1]
         is_slip = self._contradicts([newest])
+        self.spun_m = self._spun_m(newest) if is_slip and is_live else 0.0
         self._slipped.append(newest if is_slip else None)
         if is_slip:
             if is_live:
@@ -189,6 +194,11 @@ class Comparison:
         noise = sum(self._per_sqrt_m**2 * x.path_m + PER_SECOND**2 for x in of)
         is_small = abs(rate) < BIAS[1] and by_time < LIKELY * by_path + noise
         return is_small or CLEARLY * (by_time + noise) < by_path
+
+    def _spun_m(self, second: Second) -> float:
+        """A wheel that loses its hold turns too far, and the middle goes half of that too far."""
+        excess = abs(self.known.apart(second)) * self._half_track_m
+        return excess if excess < MOST_SPUN * second.path_m else 0.0
 
     def _left_by_path(self, seconds: Sequence[Second], apart: Sequence[float]) -> float:
         """Squares that are left of what both are apart, but for the way of one wheel or of both."""

@@ -81,6 +81,7 @@ class GyroHeading:
         self._steps: deque[_Step] = deque(maxlen=MOST_REMEMBERED)
         self._still_since: int | None = None
         self._apart_equal = 0.0
+        self._spun_m = 0.0
         self._shown: tuple[GyroFault, int] | None = None
 
     @property
@@ -113,7 +114,14 @@ class GyroHeading:
         fault = self._fault(motion, s, turn)
         if fault is not None:
             return self._given_back(motion, *fault)
-        return replace(motion, turn_rad=used, gyro=self._stated())
+        distance = self._shortened(motion.distance_m)
+        return replace(motion, distance_m=distance, turn_rad=used, gyro=self._stated())
+
+    def _shortened(self, distance: float) -> float:
+        """Without what wheels spun in the second before."""
+        spun = min(self._spun_m, abs(distance) / 2)
+        self._spun_m -= spun
+        return distance - math.copysign(spun, distance)
 
     def fault(self, utime: int) -> GyroFault | None:
         """What is wrong with the gyro, or was a moment ago."""
@@ -184,6 +192,7 @@ class GyroHeading:
         sigma = self.rest.told.yaw_rad_per_s if self.rest.is_known else UNTOLD_BIAS
         if self.is_in_use:
             fault = comparison.watch(sigma, is_live=track.equal < LIVE_READINGS)
+            self._spun_m += comparison.spun_m
         else:
             fault = comparison.try_out(sigma)
         if fault is not None:
@@ -211,4 +220,4 @@ class GyroHeading:
         self.is_in_use = False
         self._shown = (fault, utime)
         self.comparison.forget()
-        self._apart_equal = 0.0
+        self._apart_equal = self._spun_m = 0.0

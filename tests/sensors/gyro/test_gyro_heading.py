@@ -207,3 +207,34 @@ def test_a_bias_that_comes_after_a_rest_is_not_believed_to_be_a_wheel() -> None:
     ).on(140)
     assert not drive.gyro.is_in_use
     assert abs(drive.error_deg()) < 8
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_what_a_wheel_spun_is_taken_out_of_the_way(sign: int) -> None:
+    """The right wheel goes a fifth too far for ten seconds, ahead or back."""
+    gyro = GyroHeading(SIGMAS, WHEELS, 0.115)
+    went, heading, said = 0.0, 0.0, []
+    for k in range(1, 90 * HZ):
+        t = k / HZ
+        path, turn = sign * 0.3 / HZ, math.radians(20) * math.sin(t / 2) / HZ
+        spun = 0.2 * (path + turn * 0.115) if 60 < t <= 70 else 0.0
+        went, heading, utime = went + path, heading + turn, T0 + round(t * 1e6)
+        gyro.add(GyroAngle(utime, heading))
+        said.append(gyro.turned(Motion(utime, path + spun / 2, turn + spun / 0.23, gap=k == 1)))
+    # without that it would be 0.3 m
+    assert sum(m.distance_m for m in said) == pytest.approx(went, abs=0.05)
+
+
+def test_a_wheel_that_stands_is_not_taken_for_one_that_spins() -> None:
+    """Its encoder is dead: half of the way is lost, and no more."""
+    gyro = GyroHeading(SIGMAS, WHEELS, 0.115)
+    heading, said = 0.0, []
+    for k in range(1, 70 * HZ):
+        t = k / HZ
+        path, turn = 0.3 / HZ, math.radians(20) * math.sin(t / 2) / HZ
+        heading, utime = heading + turn, T0 + round(t * 1e6)
+        right = path + turn * 0.115
+        wheels = (right / 2, right / 0.23) if t > 60 else (path, turn)
+        gyro.add(GyroAngle(utime, heading))
+        said.append(gyro.turned(Motion(utime, *wheels, gap=k == 1)))
+    assert sum(m.distance_m for m in said[-5 * HZ :]) == pytest.approx(0.75, abs=0.1)

@@ -106,7 +106,7 @@ def _parser() -> argparse.ArgumentParser:
         "--rbcd", type=Path, metavar="DATA", help="hold module 3 against its centralised optimum"
     )
     parser.add_argument(
-        "--gyro", action="store_true", help="the experiment with gyros, 20 minutes a seed"
+        "--gyro", action="store_true", help="the experiment with gyros, 10 minutes a seed"
     )
     parser.add_argument("--calibrate", action="store_true", help="print the noise and end")
     return parser
