@@ -88,14 +88,14 @@ class Released:
 def released(equations: Equations, nominal: Point) -> Released:
     """The solution without the links that are not worth having."""
     best = Released(equations, nominal, np.zeros(len(equations.problem.odometry), dtype=bool))
-    test = tests(equations, nominal)
+    test = gains(equations, nominal)
     for _ in range(MOST_ROUNDS):
         if test is None or (test.max(initial=0.0) < WORTH / 2 and not _has_runs(best)):
             break
         better = _better(equations, best, test)
         if better is None:
             break
-        best, test = better, tests(better.equations, better.point)
+        best, test = better, gains(better.equations, better.point)
     return _kept(equations, best)
 
 
@@ -114,7 +114,7 @@ def _is_all(found: Released) -> bool:
     """Is nothing left to explain? Of two robots alone the other one may be as good a reason."""
     if found.other is not None or len(found.equations.problem.priors.scale) == 2:
         return False
-    left = tests(found.equations, found.point)
+    left = gains(found.equations, found.point)
     return left is not None and left.max(initial=0.0) < WORTH / 2 and not _has_runs(found)
 
 
@@ -171,7 +171,7 @@ def _choices(
 
     Args:
         equations: with all links as configured.
-        test: (m,) see `tests`.
+        test: (m,) see `gains`.
     """
     problem = equations.problem
     odometry, n = problem.odometry, problem.n
@@ -277,9 +277,9 @@ def without(problem: Problem, lost: NDArray[np.bool_]) -> Problem:
     )
 
 
-def tests(equations: Equations, point: Point) -> Array | None:
+def gains(equations: Equations, point: Point) -> Array | None:
     """(m,) Baarda's test of each link; None of a system that cannot be solved."""
-    problem: Problem = equations.problem
+    problem = equations.problem
     factor = BandFactor.of(equations.weighed(point))
     if factor is None:
         return None

@@ -19,17 +19,16 @@ from drslamd.slam.optimizer.banded.slips.releases import (
     LOST_MPS,
     LOST_RADPS,
     Released,
+    gains,
     lately,
     released,
     seen,
     squares,
-    tests,
     without,
 )
 from drslamd.slam.optimizer.problem import OdometryFactors, Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
 
-tests.__test__ = False  # type: ignore[attr-defined]
 ROBOTS, COUNT = 3, 45
 FAULT = (28, 33)
 """Keyframes between which something happens to robot 1."""
@@ -130,7 +129,7 @@ def test_baarda_says_by_how_much_the_cost_falls_without_a_link() -> None:
     problem, _ = a_team(5)
     problem = moment(problem, 1, 22, (0.03, 0.0, 0.0))
     equations, point = Equations(problem), nominal(problem)
-    found = tests(equations, point)
+    found = gains(equations, point)
     assert found is not None
     before = equations.cost(point, point.threshold)
     for link in (int(np.argmax(found)), *links_of(problem, 1, 22, 23)):
