@@ -61,7 +61,7 @@ class Starts:
         """By robot: up to where its epochs are believed, where that is more than at first."""
         self._claims: dict[int, _Claim] = {}
         """By the peer that says so."""
-        self._was_silent = False
+        self._was_silent = True
 
     def judge(self, origin: Chain, peer: Peer | None, utime: int) -> StartFault | None:
         """A proven message of a start that is not past: may it speak?
