@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from joining_scene import COUNT, NODES, A, B, graph_of
+from lab.play import virtual_team
+from lab.recordings import world
 from passing_scene import SENSORS
+from slam_scenes import angle_between, inverted, product
+from teams import EASY
 
 from drslamd.conventions import Segment
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
@@ -72,3 +78,25 @@ def test_nobody_is_asked_about_who_is_in_the_group_or_has_a_lower_id() -> None:
     assert asked(Joiner(B, SENSORS), EVERY_US) is None
     assert asked(Joiner(A, SENSORS), EVERY_US - 1) is None
     assert asked(Joiner(A, SENSORS), EVERY_US) is not None
+
+
+@pytest.mark.slow
+def test_two_out_of_each_others_reach_are_one_team_once_they_have_passed_two_modules() -> None:
+    rng = np.random.default_rng(3)
+    scene = world.Scene(**{**EASY.__dict__, "robots": 4, "seconds": 46.0})
+    drives = [world.drive(rng, scene) for _ in range(2)]
+    stand = [np.tile(at, (len(drives[0]), 1)) for at in ((2.0, 9.0, 0.0), (8.0, 3.0, 0.0))]
+    whole = world.recorded("two modules", rng, scene, [*drives, *stand])
+    trails = {robot: whole.trails[robot] for robot in range(2)}
+    heard = (whole.ranges[:, 1] < 2) & (whole.ranges[:, 2] >= 2)
+    simulator = virtual_team.play(replace(whole, trails=trails, ranges=whole.ranges[heard]), 3)
+    first, second = (simulator.members[robot].robot.back.estimate for robot in range(2))
+    assert first is not None
+    assert second is not None
+    assert first.frame == second.frame
+    found = first.relative(0, 1)
+    assert found is not None
+    true = [trails[robot].truth[-1] for robot in range(2)]
+    off = found[0] - product(inverted(true[0]), true[1])
+    assert np.hypot(*off[:2]) < 0.5
+    assert abs(angle_between(off[2], 0.0)) < 0.15
