@@ -31,7 +31,7 @@ FEWEST = 10
 """Ranges, where there is only one common thing."""
 
 
-class Side(NamedTuple):
+class Passerby(NamedTuple):
     """One of the two: its keyframes of late, the last of which counts, the noise of its wheels, and
     its ways past what stands."""
 
@@ -59,15 +59,15 @@ def points_told(graph: PoseGraph, chain: Chain) -> set[Segment]:
     }
 
 
-class Question(NamedTuple):
+class JoinQuestion(NamedTuple):
     """All that is needed for an answer, whatever becomes of the graph meanwhile.
 
     Attributes:
         rows: (k, 7) ranges between both, see `_ends`.
     """
 
-    a: Side
-    b: Side
+    a: Passerby
+    b: Passerby
     rows: Array
     sensors: Sensors
 
@@ -106,7 +106,7 @@ class Question(NamedTuple):
         )
 
 
-def ask(graph: PoseGraph, a: Chain, b: Chain, sensors: Sensors) -> Question | None:
+def join_question(graph: PoseGraph, a: Chain, b: Chain, sensors: Sensors) -> JoinQuestion | None:
     """The question of how b lies to a, by up to `MOST_THINGS` that both have told; None where one
     of them has no log."""
     things = sorted(points_told(graph, a) & points_told(graph, b))[:MOST_THINGS]
@@ -120,16 +120,16 @@ def ask(graph: PoseGraph, a: Chain, b: Chain, sensors: Sensors) -> Question | No
     inside = np.isin(rows[:, 0], one.keyframes.n) & np.isin(rows[:, 1], other.keyframes.n)
     rows = rows[inside]
     rows = rows[np.argsort(rows[:, 0], kind="stable")][-MOST_RANGES:]
-    return Question(one, other, rows, sensors)
+    return JoinQuestion(one, other, rows, sensors)
 
 
-def _side(graph: PoseGraph, chain: Chain, things: list[Segment]) -> Side | None:
+def _side(graph: PoseGraph, chain: Chain, things: list[Segment]) -> Passerby | None:
     data = graph.chains.get(chain.robot)
     if data is None or data.chain != chain or not len(data.keyframes):
         return None
     passings = {thing: _passing(graph, data, thing) for thing in things}
     known = {thing: passing for thing, passing in passings.items() if passing is not None}
-    return Side(chain, _recent(data), data.model.noise, known)
+    return Passerby(chain, _recent(data), data.model.noise, known)
 
 
 def _recent(data: ChainData) -> KeyframeTable:

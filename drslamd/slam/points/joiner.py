@@ -18,7 +18,7 @@ from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import ClosureMeasurement
 from drslamd.slam.graph.pose_graph import PoseGraph
-from drslamd.slam.points.join_question import Question, ask, points_told
+from drslamd.slam.points.join_question import JoinQuestion, join_question, points_told
 from drslamd.slam.points.joining import Joined
 from drslamd.slam.points.point_tracker import Sensors
 
@@ -81,7 +81,7 @@ class Joiner:
         others.sort()
         peer = next((chain for chain in others if chain.robot > self._latest), others[0])
         self._latest = peer.robot
-        question = ask(graph, self._own, peer, self._sensors)
+        question = join_question(graph, self._own, peer, self._sensors)
         return None if question is None else partial(_answer, peer, question)
 
     def on_found(self, answer: JoinAnswer, utime: int) -> bool:
@@ -113,7 +113,7 @@ class Joiner:
         return out
 
 
-def _answer(peer: Chain, question: Question) -> JoinAnswer:
+def _answer(peer: Chain, question: JoinQuestion) -> JoinAnswer:
     return JoinAnswer(peer, question.answer())
 
 

@@ -11,12 +11,12 @@ from slam_scenes import angle_between, inverted, product, range_item
 from drslamd.conventions import Chain, Segment, node_chain
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
-from drslamd.slam.points.join_question import FEWEST, ask, points_told
+from drslamd.slam.points.join_question import FEWEST, join_question, points_told
 from drslamd.slam.points.joining import Joined
 
 
 def joined(graph: PoseGraph) -> Joined | str:
-    question = ask(graph, A, B, SENSORS)
+    question = join_question(graph, A, B, SENSORS)
     assert question is not None
     return question.answer()
 
@@ -65,5 +65,5 @@ def test_a_thing_that_was_moved_between_them_does_not_fit() -> None:
 
 def test_a_robot_without_a_log_has_no_side() -> None:
     graph = graph_of(5, list(NODES), 0)
-    assert ask(graph, A, Chain(5, 1), SENSORS) is None
+    assert join_question(graph, A, Chain(5, 1), SENSORS) is None
     assert points_told(graph, A) == {Segment(*node, 0) for node in NODES}
