@@ -43,11 +43,15 @@ class Passerby(NamedTuple):
     def places(self, sensors: Sensors) -> dict[Segment, PlaceCandidate]:
         """Of which it knows one place alone."""
         found = {
-            thing: search(passing, self.noise, sensors.noise, sensors.model).candidates
+            thing: search(passing, self.noise, sensors.noise, sensors.model)
             for thing, passing in self.passings.items()
         }
         # (a place that is vague from here says the less, and with others still enough)
-        return {thing: places[0] for thing, places in found.items() if len(places) == 1}
+        return {
+            thing: answer.candidates[0]
+            for thing, answer in found.items()
+            if len(answer.candidates) == 1 and answer.verdict != "ambiguous"
+        }
 
 
 def points_told(graph: PoseGraph, chain: Chain) -> set[Segment]:
