@@ -24,6 +24,7 @@ OPTIMIZER = "optimizer"
 WHAT_IF = "what_if"
 RELOCATION = "relocation"
 POINTS = "points"
+JOINING = "joining"
 
 REST = 4
 """How many times as long as it computed a module rests."""

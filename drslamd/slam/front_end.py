@@ -21,6 +21,7 @@ from drslamd.slam.keyframe_selector import KeyframeSelector
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.dead_reckoning import DeadReckoning
 from drslamd.slam.peer_in_range import PeerInRange
+from drslamd.slam.points.joiner import Joiner
 from drslamd.slam.points.point_tracker import Sensors
 from drslamd.slam.points.points import Points
 from drslamd.slam.range_model import RangeNoise
@@ -93,9 +94,8 @@ class FrontEnd:
         self.relocation = Relocation(
             Own(own.robot, self.model, section.range_sigma_m, tuning.ranges)
         )
-        self.points = Points(
-            own, Sensors(RangeNoise(section.range_sigma_m, self._bias_sigma), tuning.ranges)
-        )
+        sensors = Sensors(RangeNoise(section.range_sigma_m, self._bias_sigma), tuning.ranges)
+        self.points, self.joiner = Points(own, sensors), Joiner(own, sensors)
         self._keyframes = KeyframeSelector()
 
     # sensors
@@ -327,4 +327,4 @@ class FrontEnd:
         """Closures to tell the team, and to withdraw."""
         every = not self._has_ranges_in_graph
         told = [c for pair in self.pairs.values() for c in pair.tell(every)]
-        return [*told, *self.relocation.tell(), *self.points.tell()]
+        return [*told, *self.relocation.tell(), *self.points.tell(), *self.joiner.tell()]
