@@ -72,7 +72,7 @@ FLOOD = 2.0
 """Times as much as may be said: somebody does not keep to it."""
 
 
-class Said(Enum):
+class Speech(Enum):
     """What a message is to the others."""
 
     NEW = 1
@@ -80,11 +80,11 @@ class Said(Enum):
     AGAIN = 3
 
 
-NEWS = {Said.NEW: 1.0, Said.STATUS: 1 / ASKING, Said.AGAIN: 0.0}
+NEWS = {Speech.NEW: 1.0, Speech.STATUS: 1 / ASKING, Speech.AGAIN: 0.0}
 """Share of each kind that is said when nobody lacks anything."""
 
 
-def said_of(message: object, counter: int = 0, latest: int | None = 0) -> Said:
+def said_of(message: object, counter: int = 0, latest: int | None = 0) -> Speech:
     """What a message is.
 
     Args:
@@ -93,9 +93,9 @@ def said_of(message: object, counter: int = 0, latest: int | None = 0) -> Said:
             entry made before that is said again; chapters are said late.
     """
     if not isinstance(message, GraphEntry):
-        return Said.STATUS if isinstance(message, Status) else Said.NEW
+        return Speech.STATUS if isinstance(message, Status) else Speech.NEW
     is_again = latest is None or counter < latest or message.chapter is not None
-    return Said.AGAIN if is_again else Said.NEW
+    return Speech.AGAIN if is_again else Speech.NEW
 
 
 class Allowance:
@@ -132,14 +132,16 @@ class Allowance:
         self._robots = 1 + len(losses)
         self.loss = min(sorted(losses)[len(losses) // 2], MOST_LOSS) if losses else 0.0
 
-    def on_air(self, size: int, utime: int, kind: Said = Said.NEW, *, heard: bool = False) -> None:
+    def on_air(
+        self, size: int, utime: int, kind: Speech = Speech.NEW, *, heard: bool = False
+    ) -> None:
         """A message of so many bytes; of what is heard others were not."""
         self._pass(utime)
         bytes_sent = size / (1 - self.loss) if heard else size
-        if kind is Said.AGAIN and not heard:
+        if kind is Speech.AGAIN and not heard:
             self._own_utime = utime
         self._rate += NEWS[kind] * bytes_sent / LOOK_BACK_S
-        asked = (1 - NEWS[kind]) * bytes_sent if kind is Said.STATUS else 0.0
+        asked = (1 - NEWS[kind]) * bytes_sent if kind is Speech.STATUS else 0.0
         self._last_second.append((utime, bytes_sent, asked))
         self._said, self._asked = self._said + bytes_sent, self._asked + asked
 
@@ -331,6 +333,6 @@ class LogRepeats:
             del self._planned[place]
             log.aired[place.seq] = utime
             self.repeated += 1
-            self.pace.on_air(size, utime, Said.AGAIN)
+            self.pace.on_air(size, utime, Speech.AGAIN)
             out.append((place.robot, log.sealed[place.seq]))
         return out

@@ -8,7 +8,7 @@ log; `log_repeats` says who then repeats what is missing.
 from __future__ import annotations
 
 from drslamd.conventions import MILLISECOND_US, SECOND_US, Chain
-from drslamd.gossip.log_repeats import REPEATS_AT_ONCE, LogRepeats, Said, holdings
+from drslamd.gossip.log_repeats import REPEATS_AT_ONCE, LogRepeats, Speech, holdings
 from drslamd.gossip.message_types import MAX_LOGS, MAX_STRETCHES, LogState
 from drslamd.gossip.replicated_log import AHEAD, ReplicatedLog
 from drslamd.slam.graph.measurements import Chapter, GraphEntry
@@ -81,7 +81,7 @@ class LogSync:
             return
         seq, size = came[0].seq, len(came[1])
         if utime - log.aired[seq] > ECHO_US:
-            self.repeats.pace.on_air(size, utime, Said.AGAIN, heard=True)
+            self.repeats.pace.on_air(size, utime, Speech.AGAIN, heard=True)
         log.aired[seq] = utime
 
     def next_states(self) -> tuple[LogState, ...]:

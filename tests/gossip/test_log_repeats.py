@@ -7,7 +7,7 @@ from log_scenes import OTHER, OWNER, PEER, T0, holding, repeated, said, state
 from message_builders import MS, SECOND, a_status, an_entry
 
 from drslamd.conventions import Chain
-from drslamd.gossip.log_repeats import Allowance, Holding, Said, holdings, said_of
+from drslamd.gossip.log_repeats import Allowance, Holding, Speech, holdings, said_of
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.message_types import LogState
 from drslamd.slam.graph.measurements import Chapter, GraphEntry
@@ -292,7 +292,7 @@ def repeated_in(seconds: int, pace: Allowance, size: int = 500, said_ms: int = 0
         if said_ms and ms % said_ms == 0:
             pace.on_air(100, T0 + ms * MS)
         if pace.has_room(T0 + ms * MS, size):
-            pace.on_air(size, T0 + ms * MS, Said.AGAIN)
+            pace.on_air(size, T0 + ms * MS, Speech.AGAIN)
             sent += size if ms >= 1000 * (seconds - 10) else 0
     return sent
 
@@ -321,7 +321,7 @@ def test_in_no_second_is_much_more_than_twice_as_much_on_the_air() -> None:
             pace.on_air(20, T0 + ms * MS)
             said_at.append((ms, 20))
         if ms >= 10_000 and pace.has_room(T0 + ms * MS, 500):
-            pace.on_air(500, T0 + ms * MS, Said.AGAIN)
+            pace.on_air(500, T0 + ms * MS, Speech.AGAIN)
             said_at.append((ms, 500))
     for begin in range(10_000, 29_000, 100):
         assert (
@@ -332,7 +332,7 @@ def test_in_no_second_is_much_more_than_twice_as_much_on_the_air() -> None:
 def test_statuses_that_ask_are_no_reason_to_say_more() -> None:
     pace = Allowance()
     for ms in range(0, 20_000, 10):
-        pace.on_air(100, T0 + ms * MS, Said.STATUS)
+        pace.on_air(100, T0 + ms * MS, Speech.STATUS)
     same = Allowance()
     for ms in range(0, 20_000, 30):
         same.on_air(100, T0 + ms * MS)
@@ -341,14 +341,14 @@ def test_statuses_that_ask_are_no_reason_to_say_more() -> None:
 
 @pytest.mark.parametrize(
     ("counter", "latest", "said_as"),
-    [(7, 7, Said.NEW), (6, 7, Said.AGAIN), (7, None, Said.AGAIN)],
+    [(7, 7, Speech.NEW), (6, 7, Speech.AGAIN), (7, None, Speech.AGAIN)],
 )
 def test_an_entry_from_before_the_last_status_of_its_robot_is_said_again(
-    counter: int, latest: int | None, said_as: Said
+    counter: int, latest: int | None, said_as: Speech
 ) -> None:
     assert said_of(an_entry(3, 30), counter, latest) is said_as
-    assert said_of(GraphEntry(3, chapter=Chapter(0, 0, (0, 0, 1))), counter, latest) is Said.AGAIN
-    assert said_of(a_status(), counter, latest) is Said.STATUS
+    assert said_of(GraphEntry(3, chapter=Chapter(0, 0, (0, 0, 1))), counter, latest) is Speech.AGAIN
+    assert said_of(a_status(), counter, latest) is Speech.STATUS
 
 
 def test_one_of_many_leaves_a_tenth_of_the_room() -> None:
@@ -371,9 +371,9 @@ def test_they_may_be_more_where_messages_are_lost() -> None:
 def test_whoever_floods_the_channel_with_repeats_leaves_each_robot_one_a_second() -> None:
     pace, sent = Allowance(), 0
     for ms in range(0, 10_000, 10):
-        pace.on_air(1_000, T0 + ms * MS, Said.AGAIN, heard=True)
+        pace.on_air(1_000, T0 + ms * MS, Speech.AGAIN, heard=True)
         if pace.has_room(T0 + ms * MS, 500):
-            pace.on_air(500, T0 + ms * MS, Said.AGAIN)
+            pace.on_air(500, T0 + ms * MS, Speech.AGAIN)
             sent += 1
     assert 9 <= sent <= 13
     assert pace.has_room(T0 + 12 * SECOND, 500)
