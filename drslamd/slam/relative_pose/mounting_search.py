@@ -63,7 +63,7 @@ ways none is."""
 
 QUICKLY_US = SECOND_US * 9 // 10
 """Between two windows that are asked quickly, while a pair waits for nothing else."""
-SURELY = 12.0
+SURELY = 10.0
 """Evidence (`chi_squared.evidence`) of one window against wheels that run backwards. A world whose
 wheels do is the mirror image of one whose do not: of 153 healthy pairs one ever has 11 for the
 mirror image, all others less than 5."""
