@@ -70,11 +70,11 @@ def test_who_says_nothing_and_lives_stood_there_until_we_would_know(
     steered: Steered, seconds: float, is_silent: bool
 ) -> None:
     """It may have turned since, so that its pose is not of now."""
-    introduce(steered.robot.team, Chain(1, 1), utime=steered.utime)
+    team = introduce(steered.robot.team, Chain(1, 1), utime=steered.utime)
     n = add(steered, 1, 0.3)
     late = n * GRID_US - steered.utime
     steered.drive(round(50 * seconds) + late // STEP_US, 0.0, 0.0)
-    introduce(steered.robot.team, Chain(1, 1), utime=steered.utime)
+    team.peers[1].last_heard = steered.utime
     near = steered.look()
     assert near.peers.utimes[0] == (near.utime - STANDS_US if is_silent else n * GRID_US)
     assert (near.peers.speeds[0] == 0.0) is is_silent
