@@ -46,6 +46,11 @@ class Team:
         return f"efficiency/{self.robots}/{self.loss:g}"
 
     @property
+    def seconds(self) -> float:
+        """Of one core, for one seed."""
+        return 4.0 * self.robots**2
+
+    @property
     def scene(self) -> Scene:
         """Ranges of large teams come more seldom, as on the radio."""
         return (
