@@ -198,7 +198,8 @@ class FrontEnd:
         estimate: TeamEstimate | None,
         utime: int,
     ) -> list[WindowJob]:
-        """Begin the relative poses to be computed now; windows that are none are counted.
+        """Begin the relative poses to be computed now; windows that are none are counted, and one
+        that ends where the last one did is not asked again.
 
         Args:
             estimate: the team's last solution, for what it learned of the sensors.
@@ -210,7 +211,7 @@ class FrontEnd:
             window = request(pair.ranges, a, b, self._method.rule, self._range_model)
             if isinstance(window, str):
                 pair.count(window)
-            else:
+            elif not pair.history or pair.history[-1].utime != window.utime:
                 known = self._calibration(pair, estimate)
                 given = PairWindow(window.window, self._noise(pair, b), known)
                 out.append(WindowJob(pair, window, given))
