@@ -1,7 +1,8 @@
 """Computations under way, and how much of a core the three modules may take.
 
 A module rests several times as long as it computed, so no team is so large that one of the three
-takes more than a fifth of a core. What it then says comes later and is the same.
+takes more than a fifth of a core; module 3 may take a third to renew its solution every second.
+What a module that rests then says comes later and is the same.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
+from drslamd.conventions import SECOND_US
 from drslamd.events import JobDone, Solve
 from drslamd.slam.closure_method import PairWindow
 from drslamd.slam.consistency.pair import PairTracker
@@ -24,9 +26,13 @@ OPTIMIZER = "optimizer"
 WHAT_IF = "what_if"
 RELOCATION = "relocation"
 POINTS = "points"
+JOINING = "joining"
 
 REST = 4
 """How many times as long as it computed a module rests."""
+LIGHT_US = SECOND_US // 3
+"""A solution of the team that takes no longer may be renewed every second: where everybody is
+matters more than a third of a core."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +106,7 @@ class Jobs:
         since, until = self.cycles.get(job.module, DutyCycle(began, began))
         if until <= began:
             since, until = began, event.utime
-        rested = max(until, event.utime) + REST * event.elapsed_us
+        rested = max(until, event.utime) + _rest_us(job.module, event.elapsed_us)
         self.cycles[job.module] = DutyCycle(since, rested)
         return job
 
@@ -117,3 +123,10 @@ class Jobs:
 
     def is_resting(self, module: str, utime: int) -> bool:
         return utime < self.cycles.get(module, DutyCycle()).until
+
+
+def _rest_us(module: str, elapsed_us: int) -> int:
+    """How long a module rests that has computed for so long."""
+    rest = REST * elapsed_us
+    is_light = module == OPTIMIZER and elapsed_us <= LIGHT_US
+    return min(rest, SECOND_US - elapsed_us) if is_light else rest

@@ -6,6 +6,8 @@ what module 1 found goes to module 2 at once, a pair that is connected to the te
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from drslamd.events import Effect
 from drslamd.gossip.team import Team
 from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, WHAT_IF, Job, Jobs
@@ -19,22 +21,48 @@ from drslamd.standing import Standing
 class Modules:
     """Of one robot."""
 
-    def __init__(self, front: FrontEnd, back: BackEnd, team: Team, jobs: Jobs) -> None:
+    def __init__(
+        self,
+        front: FrontEnd,
+        back: BackEnd,
+        team: Team,
+        jobs: Jobs,
+        neighbours: Callable[[int], list[PeerInRange]],
+    ) -> None:
         self._front, self._back, self._team, self._jobs = front, back, team, jobs
+        self._neighbours = neighbours
 
-    def relative_poses(self, neighbours: list[PeerInRange], utime: int) -> list[Effect]:
-        """Module 1: a window of ranges and both odometries, for all pairs that we own."""
+    def on_odometry(self, robot: int, utime: int) -> list[Effect]:
+        """A peer said where its wheels went: the next window of a pair that nobody knows of."""
+        pair = self._front.pairs.get(robot)
+        if pair is None or pair.is_told:
+            return []
+        return [*self.relative_poses(utime, robot), *self.what_if(utime, robot)]
+
+    def _peers(self, utime: int, only: int | None) -> list[PeerInRange]:
+        return [p for p in self._neighbours(utime) if only in (None, p.chain.robot)]
+
+    def relative_poses(self, utime: int, only: int | None = None) -> list[Effect]:
+        """Module 1: a window of ranges and both odometries, for all pairs that we own.
+
+        Args:
+            only: with this robot.
+        """
         if self._jobs.is_resting(RELATIVE_POSE, utime):
             return []
-        graph, estimate = self._back.graph, self._back.estimate
-        found = self._front.module1(neighbours, graph, estimate, utime)
+        peers, graph = self._peers(utime, only), self._back.graph
+        found = self._front.module1(peers, graph, self._back.estimate, utime)
         return list(self._jobs.begin_windows(found, self._front.solve))
 
-    def what_if(self, neighbours: list[PeerInRange], utime: int) -> list[Effect]:
-        """Is a pair mounted as configured? Where windows disagree: which mistake explains it?"""
+    def what_if(self, utime: int, only: int | None = None) -> list[Effect]:
+        """Is a pair mounted as configured? Where windows disagree: which mistake explains it?
+
+        Args:
+            only: as in `relative_poses`.
+        """
         if not self._jobs.is_free(WHAT_IF, utime):
             return []
-        asked = self._front.what_if(neighbours, self._back.graph, utime)
+        asked = self._front.what_if(self._peers(utime, only), self._back.graph, utime)
         return [self._jobs.begin(Job(WHAT_IF, (w.pair,), (w.request,)), w.run) for w in asked]
 
     def consistency(self, utime: int, only: PairTracker | None = None) -> list[Effect]:

@@ -43,6 +43,7 @@ from drslamd.events import (
     Write,
 )
 from drslamd.gossip.bounds import is_sayable
+from drslamd.gossip.message_types import OdometryBatch
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.seal import Seal
 from drslamd.gossip.team import Team
@@ -111,7 +112,7 @@ class Robot:
         self.network: NetworkState | None = None
         self.slept: Slept | None = None
         self.jobs = Jobs()
-        self.modules = Modules(self.front, self.back, self.team, self.jobs)
+        self.modules = Modules(self.front, self.back, self.team, self.jobs, self.neighbours)
         self.timers = Timers(self._periods())
         self.memory = Memory(self.own, self.team.seal, self.calibration)
         self._speaking = {self._repeat, self._send_status, self._send_odometry, self._extend_log}
@@ -138,8 +139,8 @@ class Robot:
             self._send_odometry: SECOND_US,
             self._place: PLACE_US,
             self._extend_log: SECOND_US,
-            self._relative_poses: round(SECOND_US / config.relative_pose.rate_hz),
-            self._what_if: SECOND_US,
+            self.modules.relative_poses: round(SECOND_US / config.relative_pose.rate_hz),
+            self.modules.what_if: SECOND_US,
             self.modules.consistency: round(SECOND_US / config.consistency.rate_hz),
             self.modules.optimize: round(SECOND_US / config.optimizer.rate_hz),
             self._check_health: SECOND_US,
@@ -202,6 +203,8 @@ class Robot:
             self.back.insert(received.origin, received.message)
             if received.message.closures and self.back.estimate is None:
                 return self.modules.optimize(event.utime)
+        elif isinstance(received.message, OdometryBatch):
+            return self.modules.on_odometry(received.origin.robot, event.utime)
         elif isinstance(received.message, PublicPoses):
             self.back.hear(received.origin, received.message)
             return self._take_turn(event.utime)
@@ -251,12 +254,6 @@ class Robot:
 
     # the three modules
 
-    def _relative_poses(self, utime: int) -> list[Effect]:
-        return self.modules.relative_poses(self.neighbours(utime), utime)
-
-    def _what_if(self, utime: int) -> list[Effect]:
-        return self.modules.what_if(self.neighbours(utime), utime)
-
     def _place(self, utime: int) -> list[Effect]:
         return self.modules.place(self.standing, self.neighbours(utime), utime)
 
@@ -273,8 +270,7 @@ class Robot:
         job = self.jobs.finish(event)
         if job.told is not None:
             is_news = job.told(event.result, event.utime)
-            tell = (self._extend_log, self.modules.optimize) if is_news else ()
-            return [effect for action in tell for effect in action(event.utime)]
+            return self._tell_at_once(event.utime) if is_news else []
         if job.tell_pairs(event.result):
             return [e for pair in job.pairs for e in self._hurry(job.module, pair, event.utime)]
         said = self.back.on_solution(event.result, event.utime)
@@ -287,8 +283,12 @@ class Robot:
         if pair.is_told:
             return []
         if pair.connected and not pair.is_refused:
-            return [*self._extend_log(utime), *self.modules.optimize(utime)]
-        return self.modules.consistency(utime, pair) if module == RELATIVE_POSE else []
+            return self._tell_at_once(utime)
+        is_answered = module == RELATIVE_POSE
+        return self.modules.consistency(utime, pair) if is_answered else []
+
+    def _tell_at_once(self, utime: int) -> list[Effect]:
+        return [*self._extend_log(utime), *self.modules.optimize(utime)]
 
     # what we know of ourselves
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from drslamd.config import Config
 from drslamd.gossip.team import Team
-from drslamd.jobs import POINTS, RELOCATION
+from drslamd.jobs import JOINING, POINTS, RELOCATION
 from drslamd.slam import settings
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.doubt import Doubt, Partners, doubt_of, doubted_partners
@@ -88,6 +88,11 @@ class Standing:
         )
         if found and is_free(RELOCATION, utime):
             yield Asked(RELOCATION, found, self.on_relocated)
+        if is_free(JOINING, utime):
+            connected = [robot for robot, pair in front.pairs.items() if pair.connected]
+            joined = front.joiner.look(back.graph, back.estimate, connected, utime)
+            if joined:
+                yield Asked(JOINING, joined, front.joiner.on_found)
         own = self._own_end()
         if own is None or not is_free(POINTS, utime):
             return

@@ -7,7 +7,16 @@ from pair_scenes import asked_at, tracker
 
 from drslamd.conventions import SECOND_US, Chain
 from drslamd.events import JobDone
-from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, REST, DutyCycle, Job, Jobs
+from drslamd.jobs import (
+    CONSISTENCY,
+    LIGHT_US,
+    OPTIMIZER,
+    RELATIVE_POSE,
+    REST,
+    DutyCycle,
+    Job,
+    Jobs,
+)
 from drslamd.slam.consistency.pair import Agreement, PairTracker
 
 T0 = 100 * SECOND_US
@@ -77,6 +86,23 @@ def test_so_it_takes_a_fifth_of_a_core_at_most() -> None:
         computed += TOOK
         done(jobs, Job(OPTIMIZER), ended=utime)
     assert computed / (utime - T0) == pytest.approx(1 / (1 + REST), abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("took", "every"),
+    [(100_000, 500_000), (200_000, SECOND_US), (LIGHT_US, SECOND_US), (LIGHT_US + 1, 1_666_670)],
+)
+def test_the_team_is_solved_every_second_where_that_takes_a_third_of_it(
+    took: int, every: int
+) -> None:
+    jobs = Jobs()
+    done(jobs, Job(OPTIMIZER), took=took)
+    since, until = jobs.cycles[OPTIMIZER]
+    assert until - since == every
+    # of the other modules none has such a right
+    done(jobs, Job(CONSISTENCY), took=took)
+    since, until = jobs.cycles[CONSISTENCY]
+    assert until - since == (1 + REST) * took
 
 
 def test_a_cycle_is_from_the_begin_of_a_computation_to_the_end_of_its_rest() -> None:

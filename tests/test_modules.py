@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
+import pytest
 from pair_scenes import BESIDE, asked_at, estimate_of
 from robot_scenes import RobotScene, solves
 
@@ -13,6 +15,7 @@ from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, Job, Jobs
 from drslamd.slam.consistency.pair import PairTracker
 from drslamd.slam.graph.measurements import ClosureMeasurement, GraphEntry, Keyframe
 from drslamd.slam.odometry.mounting import SIDES
+from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.relative_pose.what_if import Case
 
 
@@ -84,3 +87,32 @@ def test_the_first_closure_that_is_heard_is_solved_at_once_and_later_ones_wait()
     scene.robot.modules._jobs = scene.robot.jobs
     later = replace(closure, number=1)
     assert not solves(scene.hear(2, GraphEntry(1, closures=(later,))), OPTIMIZER)
+
+
+@pytest.mark.parametrize("is_told", [False, True])
+def test_odometry_of_a_peer_is_a_reason_to_look_at_its_window_until_the_pair_is_told(
+    is_told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At that of the pair alone, and whether it is mounted as configured."""
+    scene = Waiting()
+    scene.own_pair(2)
+    if is_told:
+        scene.checked(last_answer(scene))
+    asked: list[tuple[str, list[int]]] = []
+
+    def note(module: str) -> Callable[..., list[object]]:
+        def ask(neighbours: list[PeerInRange], *_: object) -> list[object]:
+            asked.append((module, [peer.chain.robot for peer in neighbours]))
+            return []
+
+        return ask
+
+    for robot in (1, 2):
+        scene.meet(robot)
+        scene.range_to(robot)
+    monkeypatch.setattr(scene.robot.front, "module1", note("module 1"))
+    monkeypatch.setattr(scene.robot.front, "what_if", note("what if"))
+    scene.follow(1, [[0.0, 0.0, 0.0]] * 10)
+    assert asked == ([] if is_told else [("module 1", [1]), ("what if", [1])])
+    scene.follow(3, [[0.0, 0.0, 0.0]] * 10)
+    assert len(asked) == (0 if is_told else 2)

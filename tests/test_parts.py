@@ -17,6 +17,7 @@ from drslamd.io.recording.recorder import NoRecorder, Recorder
 from drslamd.io.serial_port import SerialPort
 from drslamd.parts import (
     dbc_text,
+    make_ports,
     make_recorder,
     make_transport,
     make_wheels,
@@ -95,6 +96,33 @@ def test_wheels_on_a_serial_line_have_the_port_and_the_speed_of_their_section() 
     port = told(make_wheels, configured(KOBUKI + "baud = 57_600\n"))
     assert isinstance(port, SerialPort)
     assert (port._port, port._path, port._baud) == ("wheels", "/dev/none", 57_600)
+
+
+ROBOTEQ = 'source = "roboteq"\nport = "/dev/none"\ntrack_m = 0.4\ncounts_per_metre = 100.0\n'
+ASCII = ROBOTEQ.replace("roboteq", "ascii")
+
+
+@pytest.mark.parametrize(("wheels", "in_rounds"), [(KOBUKI, True), (ASCII, True), (ROBOTEQ, False)])
+def test_only_ports_of_devices_that_stamp_what_they_send_are_read_in_rounds(
+    wheels: str, in_rounds: bool
+) -> None:
+    uwb, base = make_ports(configured(wheels), Stepped(), print, lambda: False)
+    assert isinstance(base, SerialPort)
+    assert (uwb._port, uwb._path) == ("uwb", configured().uwb.port)
+    assert uwb._rounds is not None
+    assert (base._rounds is uwb._rounds) is in_rounds
+    assert (base._rounds is None) is not in_rounds
+
+
+@pytest.mark.parametrize(
+    ("more", "read"), [("", False), ("", True), ("[near]\nlcm_hz = 10\n", False)]
+)
+def test_no_port_waits_for_a_round_while_poses_are_taken_as_they_come(
+    more: str, read: bool
+) -> None:
+    uwb, _ = make_ports(configured(more=more), Stepped(), print, lambda: read)
+    assert uwb._rounds is not None
+    assert uwb._rounds.has_time() is not (read or bool(more))
 
 
 def test_wheels_on_a_can_bus_have_the_bus_of_their_section() -> None:

@@ -44,6 +44,8 @@ def test_the_whole_picture_begins_with_who_it_is_and_what_is_wrong() -> None:
         "network",
         "peers",
         "pairs",
+        "points",
+        "site",
         "graph",
     ]
     assert (status["robot"], status["epoch"], status["insecure"]) == (3, 9, True)
@@ -57,7 +59,8 @@ def test_of_a_robot_that_has_just_begun_there_is_nothing_yet() -> None:
     scene = RobotScene()
     assert section(scene, "pose") == {"state": "not localised"}
     assert section(scene, "peers") == section(scene, "pairs") == {}
-    assert section(scene, "graph") == {"group": [], "keyframes": {}}
+    assert section(scene, "graph") == {"group": [], "keyframes": {}, "modules": {}}
+    assert (section(scene, "points"), section(scene, "site")) == ({}, None)
     assert section(scene, "uwb")["port"] == section(scene, "wheels")["port"] == "not tried yet"
     assert section(scene, "network")["detail"] == "not tried yet"
     assert section(scene, "uwb")["age_s"] is section(scene, "wheels")["age_s"] is None
@@ -302,6 +305,7 @@ def test_of_the_graph_the_group_its_keyframes_and_what_was_learned_are_said() ->
     assert section(scene, "graph") == {
         "group": [1, 4],
         "keyframes": {"1": 2, "4": 3},
+        "modules": {},
         "frame": 1,
         "iterations": 7,
         "converged": False,

@@ -37,6 +37,8 @@ SLEEP_TOLD_US = 60 * SECOND_US
 LATE = 2
 """A module that runs half as often as it should is worth a word."""
 
+SITE = "drive past two of its modules, or measure their coordinates in [[beacon]] anew"
+
 ANSWERS = {Verdict.UNIQUE.value, Verdict.AMBIGUOUS.value}
 """Verdicts of windows that named a pose."""
 
@@ -81,7 +83,7 @@ def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
     yield "partners", contradictions.partners(_doubted_partners(robot) if not doubt else ())
     yield "mounting", _mountings(robot)
     site = robot.standing.site()
-    yield "site", f"no frame of the site: {site}" if isinstance(site, str) else None
+    yield "site", f"no frame of the site: {site}; {SITE}" if isinstance(site, str) else None
     yield "load", _load(robot, utime)
     yield "budget", robot.outbox.condition(utime)
     yield "state", _state(robot, utime)

@@ -2,25 +2,30 @@
 
 Each status names how far its sender has got with every log. Whoever holds what it lacks sends it
 again, sealed as it came: the owner at once, and once a second until the next status comes; the
-others a little later, in groups by their ids, and only if nobody else did.
+others a little later, in groups by their ids, and only if nobody else did. Where most messages are
+lost, requests are too: then an owner says each new entry again before it is asked, until everybody
+says that it is there.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
+from enum import Enum
 from typing import NamedTuple
 
 from drslamd.conventions import MILLISECOND_US, SECOND_US
-from drslamd.gossip.message_types import LogState
+from drslamd.gossip.message_types import LogState, Status
 from drslamd.gossip.replicated_log import ReplicatedLog
 from drslamd.slam.graph.chapters import SPAN
+from drslamd.slam.graph.measurements import GraphEntry
 
 REPEATS_AT_ONCE = 12
 """Entries of one log that one status of a lagging peer asks for, and all that one call of
 `take_due` hands out: a robot that comes back after an hour catches up in five minutes without
 crowding the channel."""
-FAR = 2 * SPAN
+FAR = SPAN
 """A peer that lags by more entries is first told the latest chapter."""
 MAX_PLANNED = 20 * REPEATS_AT_ONCE
 """Repeats that wait for their time; what finds no room is asked for by the next status."""
@@ -39,58 +44,138 @@ BELIEVED_US = 5 * SECOND_US
 """... for so long."""
 
 
-LEAST_RATE = 1_500
-"""Bytes a second that repeats may have where hardly anything else is said."""
+PUSH_LOSS = 0.4
+"""From such a loss on entries are said again unasked ..."""
+PUSH_EVERY_US = 500 * MILLISECOND_US
+"""... so often ..."""
+PUSH_US = 20 * SECOND_US
+"""... for so long, until everybody says that it has it: at a loss of 0.7 one robot in 600 lacks an
+entry after half of that."""
+PRESENT_US = 30 * SECOND_US
+"""Whose last status is not older may lack something."""
+
+
+LEAST_RATE, LEAST_EACH = 1_500, 400
+"""Bytes a second that repeats may have where hardly anything else is said; for each robot."""
+SHARE = 1.15
+"""Of what else is said, asking left out, that may be repeats and requests: all together stays below
+twice as much as is said when nobody lacks anything."""
+ASKING = 3
+"""Statuses for one that says nothing new; all beyond that ask for something."""
+RESERVE = 0.1
+"""Of repeats, for those who have few of them: what is lacked by few is there soon."""
 MOST_LOSS = 0.8
 """That is reckoned with."""
 LOOK_BACK_S = 5.0
 """Over which it is counted what else is said."""
+FLOOD = 2.0
+"""Times as much as may be said: somebody does not keep to it."""
+
+
+class Speech(Enum):
+    """What a message is to the others."""
+
+    NEW = 1
+    STATUS = 2
+    AGAIN = 3
+
+
+NEWS = {Speech.NEW: 1.0, Speech.STATUS: 1 / ASKING, Speech.AGAIN: 0.0}
+"""Share of each kind that is said when nobody lacks anything."""
+
+
+def said_of(message: object, counter: int = 0, latest: int | None = 0) -> Speech:
+    """What a message is.
+
+    Args:
+        counter: of the message.
+        latest: counter of the last status or pose that was heard of its robot, None if none was. An
+            entry made before that is said again; chapters are said late.
+    """
+    if not isinstance(message, GraphEntry):
+        return Speech.STATUS if isinstance(message, Status) else Speech.NEW
+    is_again = latest is None or counter < latest or message.chapter is not None
+    return Speech.AGAIN if is_again else Speech.NEW
 
 
 class Allowance:
-    """How many bytes of repeats a team sends together: as many as it says anyhow.
+    """How many bytes of repeats a team sends together: hardly more than it says anyhow.
 
     Everybody counts what is on the air, its own messages and what it hears, so that those who heal
-    a partition or fill a newcomer share one allowance. Where messages are lost it grows: entries
-    then need several repeats.
+    a partition or fill a newcomer share one allowance: in no second is more said than it allows.
+    Where messages are lost it grows: entries then need several repeats.
 
     Attributes:
         loss: share of the messages that are lost, 0 to 1.
     """
 
     def __init__(self) -> None:
-        self.loss = 0.0
-        self._rate, self._level, self._utime = 0.0, 0.0, 0
+        self.loss, self._robots = 0.0, 1
+        self._rate, self._utime = 0.0, 0
+        """Bytes a second of late that were no repeats."""
+        self._last_second: deque[tuple[int, float, float]] = deque()
+        """When each message came, its bytes, and how many of them ask."""
+        self._said = self._asked = 0.0
         self._own_utime = 0
         """When a repeat of ours went out last."""
 
     def _pass(self, utime: int) -> None:
         passed = max(0, utime - self._utime) / SECOND_US
         self._utime = max(utime, self._utime)
-        allowed = max(self._rate, LEAST_RATE) * (1 + 3 * self.loss) / (1 - self.loss)
-        # the debt ends: whoever floods the channel with repeats silences nobody for long
-        self._level = min(max(self._level, -allowed) + allowed * passed, allowed / 4)
         self._rate *= max(0.0, 1 - passed / LOOK_BACK_S)
+        while self._last_second and utime - self._last_second[0][0] >= SECOND_US:
+            _, said, asked = self._last_second.popleft()
+            self._said, self._asked = self._said - said, self._asked - asked
 
     def reckon(self, losses: Sequence[float]) -> None:
-        """How much of what each peer says is lost."""
-        self.loss = min(sum(losses) / max(1, len(losses)), MOST_LOSS)
+        """How much of what each peer says is lost; of a newcomer little is known."""
+        self._robots = 1 + len(losses)
+        self.loss = min(sorted(losses)[len(losses) // 2], MOST_LOSS) if losses else 0.0
 
-    def on_air(self, size: int, utime: int, *, repeated: bool = False, heard: bool = False) -> None:
+    def on_air(
+        self, size: int, utime: int, kind: Speech = Speech.NEW, *, heard: bool = False
+    ) -> None:
         """A message of so many bytes; of what is heard others were not."""
         self._pass(utime)
         bytes_sent = size / (1 - self.loss) if heard else size
-        if repeated and not heard:
+        if kind is Speech.AGAIN and not heard:
             self._own_utime = utime
-        if repeated:
-            self._level -= bytes_sent
-        else:
-            self._rate += bytes_sent / LOOK_BACK_S
+        self._rate += NEWS[kind] * bytes_sent / LOOK_BACK_S
+        asked = (1 - NEWS[kind]) * bytes_sent if kind is Speech.STATUS else 0.0
+        self._last_second.append((utime, bytes_sent, asked))
+        self._said, self._asked = self._said + bytes_sent, self._asked + asked
 
-    def has_room(self, utime: int) -> bool:
-        """May another repeat go out? One of ours each second always may."""
+    def has_room(self, utime: int, size: int = 0, *, is_one_of_many: bool = False) -> bool:
+        """May a repeat of so many bytes go out? Where others flood the channel, one each second."""
         self._pass(utime)
-        return self._level > 0 or utime - self._own_utime >= SECOND_US
+        needed = 1 / (1 - self.loss) ** 2
+        least = max(LEAST_RATE, LEAST_EACH * self._robots)
+        repeats = max(SHARE * self._rate * needed - self._asked, least * needed)
+        most = self._rate + self._asked + repeats
+        room = most - RESERVE * repeats if is_one_of_many else most
+        is_flooded = self._said > FLOOD * most
+        return self._said + size <= room or (is_flooded and utime - self._own_utime >= SECOND_US)
+
+
+class Holding(NamedTuple):
+    """What a peer says it holds of one log: all before `complete`, and what lies beyond a gap."""
+
+    epoch: int
+    complete: int
+    beyond: tuple[tuple[int, int], ...] = ()
+
+    def has(self, seq: int) -> bool:
+        return seq < self.complete or any(first <= seq < end for first, end in self.beyond)
+
+
+def holdings(states: Iterable[LogState]) -> dict[int, Holding]:
+    """By robot, of the rows of a status: the first one of a log says where its first gap is."""
+    out: dict[int, Holding] = {}
+    for row in states:
+        known = out.setdefault(row.id, Holding(row.epoch, row.complete))
+        if row.epoch == known.epoch and row.first > known.complete:
+            out[row.id] = known._replace(beyond=(*known.beyond, (row.first, row.complete)))
+    return out
 
 
 class Place(NamedTuple):
@@ -136,11 +221,15 @@ class LogRepeats:
         self._planned: dict[Place, _Repeat] = {}
         self._questions: dict[int, _Question] = {}
         """By the peer that asks."""
+        self._present: dict[int, tuple[int, Holding | None]] = {}
+        """When each peer said last what it holds of our log, and what that is."""
+        self._pushed: deque[tuple[int, int]] = deque(maxlen=MAX_PLANNED)
+        """Our latest entries, and when they were said."""
         self.repeated = 0
         self.pace = Allowance()
 
     def on_status(
-        self, sender: int, named: Mapping[int, LogState], left_out: Set[int], utime: int
+        self, sender: int, named: Mapping[int, Holding], left_out: Set[int], utime: int
     ) -> None:
         """A peer said what it holds: plan to repeat what it lacks.
 
@@ -148,6 +237,8 @@ class LogRepeats:
             named: the logs of its status, by robot.
             left_out: robots whose logs had no room in it.
         """
+        if self._robot not in left_out:
+            self._present[sender] = utime, named.get(self._robot)
         last = self._questions.get(sender)
         asked = last.lacking if last else {}
         lacking = {
@@ -161,7 +252,7 @@ class LogRepeats:
             self._plan(place, times, utime)
 
     def _lacking(
-        self, sender: int, named: Mapping[int, LogState], left_out: Set[int]
+        self, sender: int, named: Mapping[int, Holding], left_out: Set[int]
     ) -> Iterable[Place]:
         """What a peer lacks and we hold, a few entries of each log."""
         for robot, log in self._logs.items():
@@ -174,8 +265,11 @@ class LogRepeats:
                 start = max(log.first, theirs.complete)
             else:
                 continue
-            lacked = log.held_from(start)[:REPEATS_AT_ONCE]
-            if log.latest > start + FAR and log.is_held(log.latest):
+            held = log.held_from(start)
+            if theirs is not None and theirs.beyond and theirs.epoch == log.epoch:
+                held = [seq for seq in held if not theirs.has(seq)]
+            lacked = held[:REPEATS_AT_ONCE]
+            if log.latest > start + FAR and log.latest in held:
                 # by this one a peer knows what it need not wait for
                 lacked = [log.latest, *lacked[: REPEATS_AT_ONCE - 1]]
             for seq in lacked:
@@ -188,8 +282,24 @@ class LogRepeats:
             self._planned.setdefault(place, _Repeat(utime, utime + wait))
 
     def say_when_there_is_room(self, place: Place, utime: int) -> None:
-        """An entry of ours that nobody waits for: said in its turn, as if it was asked for."""
-        self._planned[place] = _Repeat(utime + QUIET_US, utime)
+        """An entry of ours, before anybody asks for it: until it is said, all others see a gap."""
+        self._planned = {place: _Repeat(utime + QUIET_US, utime), **self._planned}
+
+    def push(self, seq: int, utime: int) -> None:
+        """A new entry of ours: said again unasked where most messages are lost."""
+        self._pushed.append((seq, utime))
+
+    def _push(self, utime: int) -> None:
+        while self._pushed and utime - self._pushed[0][1] > PUSH_US:
+            self._pushed.popleft()
+        log = self._logs.get(self._robot)
+        if self.pace.loss < PUSH_LOSS or log is None:
+            return
+        present = [held for heard, held in self._present.values() if utime - heard < PRESENT_US]
+        for seq, _ in self._pushed:
+            is_there = all(h is not None and h.epoch == log.epoch and h.has(seq) for h in present)
+            if not is_there and log.is_held(seq) and utime - log.aired[seq] >= PUSH_EVERY_US:
+                self.say_when_there_is_room(Place(self._robot, log.epoch, seq), utime)
 
     def _answer_again(self, utime: int) -> None:
         """Our own entries to those whose next status is overdue."""
@@ -205,19 +315,24 @@ class LogRepeats:
     def take_due(self, utime: int) -> list[tuple[int, bytes]]:
         """What to repeat now: owner's id and sealed message."""
         self._answer_again(utime)
+        self._push(utime)
         out: list[tuple[int, bytes]] = []
         for place, repeat in list(self._planned.items()):
-            if len(out) == REPEATS_AT_ONCE or not self.pace.has_room(utime):
-                break
             if repeat.due > utime:
                 continue
-            del self._planned[place]
             log = self._logs[place.robot]
-            if log.epoch != place.epoch or not log.is_held(place.seq):
+            is_there = log.epoch == place.epoch and log.is_held(place.seq)
+            if not is_there or log.aired[place.seq] > repeat.asked - QUIET_US:
+                del self._planned[place]
                 continue
-            if log.aired[place.seq] <= repeat.asked - QUIET_US:
-                log.aired[place.seq] = utime
-                self.repeated += 1
-                self.pace.on_air(len(log.sealed[place.seq]), utime, repeated=True)
-                out.append((place.robot, log.sealed[place.seq]))
+            size, is_one_of_many = len(log.sealed[place.seq]), len(self._planned) > REPEATS_AT_ONCE
+            if len(out) == REPEATS_AT_ONCE or not self.pace.has_room(
+                utime, size, is_one_of_many=is_one_of_many
+            ):
+                break
+            del self._planned[place]
+            log.aired[place.seq] = utime
+            self.repeated += 1
+            self.pace.on_air(size, utime, Speech.AGAIN)
+            out.append((place.robot, log.sealed[place.seq]))
         return out

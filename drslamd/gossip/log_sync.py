@@ -7,11 +7,14 @@ log; `log_repeats` says who then repeats what is missing.
 
 from __future__ import annotations
 
-from drslamd.conventions import Chain
-from drslamd.gossip.log_repeats import LogRepeats
-from drslamd.gossip.message_types import MAX_LOGS, LogState
+from drslamd.conventions import MILLISECOND_US, SECOND_US, Chain
+from drslamd.gossip.log_repeats import REPEATS_AT_ONCE, LogRepeats, Speech, holdings
+from drslamd.gossip.message_types import MAX_LOGS, MAX_STRETCHES, LogState
 from drslamd.gossip.replicated_log import AHEAD, ReplicatedLog
 from drslamd.slam.graph.measurements import Chapter, GraphEntry
+
+ECHO_US = 200 * MILLISECOND_US
+"""So late at most we hear ourselves."""
 
 
 class LogSync:
@@ -21,6 +24,8 @@ class LogSync:
         self._robot = robot
         self._logs: dict[int, ReplicatedLog] = {}
         self._turn = 0
+        self._asked, self._came, self._came_utime = 0, 0, -(1 << 62)
+        """Entries that our last status asked for, those that came since, and when the last did."""
         self.repeats = LogRepeats(robot, self._logs)
 
     def begin(self, origin: Chain) -> bool:
@@ -54,6 +59,8 @@ class LogSync:
             return False
         new = not log.is_known(seq)
         if new:
+            if seq < log.newest:
+                self._came, self._came_utime = self._came + 1, utime
             log.put(seq, sealed, chapter)
         if log.is_held(seq):
             log.aired[seq] = utime
@@ -64,9 +71,22 @@ class LogSync:
         self.add(own, entry.seq, sealed, utime, entry.chapter)
         if entry.chapter is None:
             self.repeats.pace.on_air(len(sealed), utime)
+            self.repeats.push(entry.seq, utime)
+
+    def on_echo(self, own: Chain, came: tuple[GraphEntry, bytes] | None, utime: int) -> None:
+        """Something came back that says it is of ours: an entry that somebody said again need not
+        be said by us; what we did not say changes nothing."""
+        log = self._logs.get(own.robot)
+        if came is None or log is None or log.sealed.get(came[0].seq) != came[1]:
+            return
+        seq, size = came[0].seq, len(came[1])
+        if utime - log.aired[seq] > ECHO_US:
+            self.repeats.pace.on_air(size, utime, Speech.AGAIN, heard=True)
+        log.aired[seq] = utime
 
     def next_states(self) -> tuple[LogState, ...]:
-        """For our status: our own log, and those of the others, in turn when they are too many."""
+        """For our status: our own log, and those of the others, in turn when they are too many.
+        Where there is room, what is held beyond a gap follows in rows of its own."""
         others = sorted(robot for robot in self._logs if robot != self._robot)
         named = [self._robot] if self._robot in self._logs else []
         room = MAX_LOGS - len(named)
@@ -74,10 +94,21 @@ class LogSync:
             start = self._turn % len(others)
             others = (others[start:] + others[:start])[:room]
             self._turn = start + room
-        return tuple(
+        logs = {robot: self._logs[robot] for robot in named + others}
+        lacking = {robot: log for robot, log in logs.items() if log.complete < log.newest}
+        few = [min(log.newest - log.complete, REPEATS_AT_ONCE) for log in lacking.values()]
+        self._asked, self._came = sum(few), 0
+        states = [
             LogState(robot, log.epoch, log.start, log.complete, log.newest)
-            for robot, log in ((robot, self._logs[robot]) for robot in named + others)
-        )
+            for robot, log in logs.items()
+        ]
+        # (a status that is full leaves logs out)
+        room = MAX_LOGS - 1 - len(states)
+        most = min(MAX_STRETCHES, room // max(1, len(lacking)))
+        for robot, log in lacking.items() if most > 0 else ():
+            rows = log.stretches(most)
+            states += [LogState(robot, log.epoch, *row, log.newest) for row in rows]
+        return tuple(states)
 
     def epoch(self, robot: int) -> int | None:
         log = self._logs.get(robot)
@@ -93,6 +124,11 @@ class LogSync:
         log = self._logs.get(origin.robot)
         return log.complete if log is not None and log.epoch == origin.epoch else 0
 
+    def is_known(self, origin: Chain, seq: int) -> bool:
+        """Is an entry of a start here, or what a chapter says of it?"""
+        log = self._logs.get(origin.robot)
+        return log is not None and log.epoch == origin.epoch and log.is_known(seq)
+
     @property
     def bytes_held(self) -> int:
         """Of all logs."""
@@ -107,15 +143,24 @@ class LogSync:
         """Do we know of entries, of anybody's, that we do not hold?"""
         return any(log.complete < log.newest for log in self._logs.values())
 
+    def is_filling(self, utime: int) -> bool:
+        """Are the entries that our last status asked for on their way?"""
+        return 2 * self._came < self._asked and utime - self._came_utime < 2 * SECOND_US
+
+    def is_asking(self, utime: int) -> bool:
+        """Do we lack entries that are not on their way, and has the channel room for them?"""
+        is_waiting = self.lacks_any() and not self.is_filling(utime)
+        return is_waiting and self.repeats.pace.has_room(utime, is_one_of_many=True)
+
     def on_states(self, states: tuple[LogState, ...], sender: int, utime: int) -> None:
         """A peer said what it holds: learn what we lack, plan to repeat what it lacks."""
-        for theirs in states:
+        first_rows = {state.id: state for state in reversed(states)}
+        for theirs in first_rows.values():
             log = self._logs.get(theirs.id)
             if log is not None and theirs.epoch == log.epoch:
                 self._learn(log, theirs, is_owner=theirs.id == sender)
-        named = {state.id: state for state in states}
-        left_out = self._logs.keys() - named if len(states) == MAX_LOGS else set()
-        self.repeats.on_status(sender, named, left_out, utime)
+        left_out = self._logs.keys() - first_rows if len(states) == MAX_LOGS else set()
+        self.repeats.on_status(sender, holdings(states), left_out, utime)
 
     def _learn(self, log: ReplicatedLog, theirs: LogState, is_owner: bool) -> None:
         if theirs.id == self._robot:

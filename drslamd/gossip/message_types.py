@@ -28,6 +28,8 @@ MAX_HEARD = 28
 in turn."""
 MAX_LOGS = 28
 """Logs named in one status; whoever holds more names them in turn."""
+MAX_STRETCHES = 6
+"""Of one log, in one status."""
 MAX_BATCH = 150
 """Odometry samples in one message: 15 s, 955 bytes."""
 
@@ -66,7 +68,10 @@ class Heard:
 
 @dataclass(frozen=True)
 class LogState:
-    """Of one log: held from `first` to `complete`, heard of below `newest`."""
+    """Of one log: held from `first` to `complete`, heard of below `newest`.
+
+    A status that names a log again says what its sender holds beyond that.
+    """
 
     id: int
     epoch: int

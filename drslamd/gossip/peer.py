@@ -42,6 +42,8 @@ LOSS_STATUSES = 30
 """Heartbeats over which the loss is counted: the last half minute or so."""
 LATEST_STATUSES = 10
 """Of which it is taken how much is usually lost."""
+FEW_GAPS = 2
+"""Between statuses: of so few none is an exception."""
 NOT_KNOWN = -(1 << 40)
 """As the newest entry of a log: no entry lies near it."""
 REMEMBERED_US = 40 * SECOND_US
@@ -104,12 +106,13 @@ class Peer:
 
     @property
     def usual_loss(self) -> float:
-        """The same between most of its latest statuses: silence that has ended does not count."""
+        """The same over its latest statuses but for the longest gap: a silence that has ended does
+        not count."""
         latest = list(self._tallies)[-LATEST_STATUSES:]
-        losses = sorted(
-            1 - (b.came - a.came) / max(1, b.sent - a.sent) for a, b in pairwise(latest)
-        )
-        return max(0.0, losses[len(losses) // 2]) if losses else 0.0
+        gaps = sorted((b.sent - a.sent, b.came - a.came) for a, b in pairwise(latest))
+        gaps = gaps[:-1] if len(gaps) > FEW_GAPS else gaps
+        sent, came = sum(gap[0] for gap in gaps), sum(gap[1] for gap in gaps)
+        return max(0.0, 1 - came / sent) if sent > 0 else 0.0
 
     def newest_of(self, origin: Chain) -> int:
         """How far its latest status knows a log; far below any entry where it does not."""
@@ -129,6 +132,11 @@ class Peer:
     def is_past(self, counter: int) -> bool:
         """Was a message made before its robot answered us?"""
         return self._answered is None or counter < self._answered
+
+    @property
+    def latest_counter(self) -> int:
+        """Of its statuses and poses."""
+        return max(self._status_counter, self._pose_counter)
 
     def holds(self, origin: Chain) -> bool:
         """Has it said that it holds this log?"""

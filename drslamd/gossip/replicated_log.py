@@ -160,6 +160,22 @@ class ReplicatedLog:
         """Is it here, or what a chapter says of it?"""
         return seq in self.sealed or self._covered_to(seq) is not None
 
+    def stretches(self, most: int) -> list[tuple[int, int]]:
+        """What is known beyond `complete`: from where to where, the first ones."""
+        if self.complete >= self.end:
+            return []
+        pieces = [(seq, seq + 1) for seq in self.sealed if seq > self.complete]
+        pieces += [(c.first, c.last + 1) for c in self._covers if c.first > self.complete]
+        out: list[tuple[int, int]] = []
+        for first, end in sorted(pieces):
+            if out and first <= out[-1][1]:
+                out[-1] = out[-1][0], max(end, out[-1][1])
+            elif len(out) == most:
+                break
+            else:
+                out.append((first, end))
+        return out
+
     def held_from(self, start: int) -> list[int]:
         """Numbers of what is held from `start` on, in order."""
         return sorted(seq for seq in self.sealed if seq >= start) if start < self.end else []

@@ -6,9 +6,10 @@ What one message can do is bounded, whoever made it:
   refused until the robot was silent for `SPEAKS_US`. A robot that really began again loses at most
   that long; one that said goodbye loses nothing.
 * An epoch above all clocks is believed in steps (`drslamd.gossip.epochs`).
-* That a later start of ours is known counts only when one peer says so twice, `CONFIRM_US` apart,
-  and does not say that it hears us. Then our memory was lost, or a lie is believed: we begin again
-  above it, and are heard again. Likewise when it holds entries of our log that we never made.
+* That a later start of ours is known counts only when one peer says the very same twice,
+  `CONFIRM_US` apart, and does not say that it hears us. Then our memory was lost, or a lie is
+  believed: we begin again above it, and are heard again. Likewise when it holds entries of our log
+  that we never made.
 """
 
 from __future__ import annotations
@@ -34,8 +35,14 @@ class StartFault(Enum):
 
 
 class _Claim(NamedTuple):
-    """What a peer says that it knows of us, since when without a break, and when it last did."""
+    """What a peer says that it knows of us, since when the very same, and when it last did.
 
+    Attributes:
+        said: the start, and up to where it holds a log of ours that we did not say.
+        epoch: the start above which we would have to begin again.
+    """
+
+    said: tuple[int, int]
     epoch: int
     since: int
     latest: int
@@ -54,7 +61,7 @@ class Starts:
         """By robot: up to where its epochs are believed, where that is more than at first."""
         self._claims: dict[int, _Claim] = {}
         """By the peer that says so."""
-        self._was_silent = False
+        self._was_silent = True
 
     def judge(self, origin: Chain, peer: Peer | None, utime: int) -> StartFault | None:
         """A proven message of a start that is not past: may it speak?
@@ -91,16 +98,22 @@ class Starts:
         named = set() if own.epoch in heard else {e for e in later if e > own.epoch}
         if said is None:
             named = {e for e in later if e >= own.epoch}
-        elif any(log.epoch == own.epoch and log.first < log.complete > said for log in logs):
+        unsaid = [
+            log.complete
+            for log in logs
+            if log.epoch == own.epoch and log.first < log.complete > (said or 0)
+        ]
+        if unsaid:
             named.add(own.epoch)  # it holds what we never said: this epoch was used before
         # whoever was lied high and lost its memory comes back there step by step
         most = min(highest_believed(own.epoch), LAST_KEPT_EPOCH - 2 * SECOND_US)
-        claim = min(max(named, default=-1), most)
-        if claim < own.epoch:
+        latest = max(named, default=-1)
+        if min(latest, most) < own.epoch:
             self._claims.pop(sender, None)
             return
-        known = self._claims.get(sender)
-        self._claims[sender] = _Claim(claim, known.since if known else utime, utime)
+        claim, known = (latest, max(unsaid, default=0)), self._claims.get(sender)
+        since = known.since if known is not None and known.said == claim else utime
+        self._claims[sender] = _Claim(claim, min(latest, most), since, utime)
 
     def superseded_by(self) -> int | None:
         """The epoch above which we have to begin again to be heard by all; None as it should be."""

@@ -10,9 +10,9 @@ from drslamd.events import ChannelMessage, Datagram, Send
 from drslamd.gossip import messages
 from drslamd.gossip.bounds import LAST_SEQ, Measurement, is_sayable
 from drslamd.gossip.entries.chapter_writer import ChapterWriter
-from drslamd.gossip.envelopes.opening import Opened, opened
+from drslamd.gossip.envelopes.opening import Opened, entry_of, opened
 from drslamd.gossip.envelopes.splitting import entries_of, parts_of
-from drslamd.gossip.log_repeats import Place
+from drslamd.gossip.log_repeats import Place, said_of
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.membership.acquaintance import Acquaintance, vouched
 from drslamd.gossip.membership.flood import BUDGET, Flood
@@ -80,7 +80,7 @@ class Team:
         """Seal a message."""
         channel = messages.channel(messages.kind_of(message), self.own.robot)
         payload = messages.encode(self.seal.header(utime), message)
-        self.logs.repeats.pace.on_air(len(payload), utime)
+        self.logs.repeats.pace.on_air(len(payload), utime, said_of(message))
         return Send(channel, self.seal.close(channel, payload))
 
     def send_public(self, public: PublicPoses, utime: int) -> list[Send]:
@@ -122,9 +122,9 @@ class Team:
         return entries
 
     def is_asking(self, utime: int) -> bool:
-        """Do we lack odometry that may still come, or entries that the channel has room for?"""
-        lacks_entries = self.logs.lacks_any() and self.logs.repeats.pace.has_room(utime)
-        return lacks_entries or any(peer.lacks_odometry for peer in self.peers.values())
+        """Do we lack odometry that may still come, or entries that are not on their way?"""
+        lacks_odometry = any(peer.lacks_odometry for peer in self.peers.values())
+        return lacks_odometry or self.logs.is_asking(utime)
 
     def send_sealed(self, owner: int, sealed: bytes) -> Send:
         """A log entry as it was sealed, ours or another's."""
@@ -252,13 +252,15 @@ class Team:
         if fault is SealFault.OWN:
             self.own_echoes += 1
             self.last_echo = event.utime
+            self.logs.on_echo(self.own, entry_of(event), event.utime)
             return
         self.refusals.add(fault, event.utime, event.sender)
 
     def _sort(self, header: Header, message: Message, sealed: bytes, utime: int) -> Received | None:
         origin = Chain(header.origin, header.epoch)
-        is_late = isinstance(message, GraphEntry) and message.seq < self.logs.end(origin)
-        self.logs.repeats.pace.on_air(len(sealed), utime, repeated=is_late, heard=True)
+        latest = self.peers[origin.robot].latest_counter if self._is_peer(origin) else None
+        said = said_of(message, header.counter, latest)
+        self.logs.repeats.pace.on_air(len(sealed), utime, said, heard=True)
         if isinstance(message, GraphEntry):
             # may come from a relay and long after it was made: says nothing about its origin's
             # clock or whether it lives

@@ -1,7 +1,9 @@
 """The peers of one robot: where each was when it last said where its wheels went.
 
 A peer says so once a second, so what is told of it is half a second old in the mean, and bears its
-time. Who has said nothing for two and a half seconds, and lives, stands where it stood.
+time. Who has said nothing for two and a half seconds, and lives, stood where it stood until two and
+a half seconds ago: had it gone from there we would know. Where it is now nobody knows, for who has
+just begun to turn is half a radian off before it says so.
 """
 
 from __future__ import annotations
@@ -28,7 +30,8 @@ from drslamd.slam.se2 import Array
 LOOK_US = 200 * MILLISECOND_US
 """Between two looks for news."""
 STANDS_US = 2_500 * MILLISECOND_US
-"""So long after its last keyframe a robot stands; who drives makes one each second."""
+"""So long after its last keyframe a robot stood; who drives makes one each second, and what is lost
+of that is said again by then."""
 UNHEARD_CLOCK_US = 2 * SECOND_US
 """How wrong a clock may be of which only measurements tell (`reports.clock_report`)."""
 
@@ -140,7 +143,8 @@ class PeersAround:
             return NOBODY
         seen, covariance = self._relatives.seen_from(leg.end, added)
         stands, states, thens, unsure, speeds, turns = self._rows
-        utimes = tuple(utime if still else then for still, then in zip(stands, thens, strict=True))
+        stood = utime - STANDS_US
+        utimes = tuple(stood if still else then for still, then in zip(stands, thens, strict=True))
         return Neighbours(
             tuple(self._tracked), states, utimes, unsure, seen, covariance, speeds, turns
         )
@@ -155,7 +159,7 @@ class PeersAround:
         unsure = UNHEARD_CLOCK_US if offset is None else min(offset.uncertainty_us, LONGEST_US)
         then = tracked.n * GRID_US - ahead_us
         lives = peer is not None and peer.is_alive(utime)
-        if lives and utime - then > STANDS_US:
+        if lives and utime - then > STANDS_US + LOOK_US:
             return True, _state(peer), then, unsure, 0.0, 0.0
         state = _state(peer) if lives else PoseState.STALE
         return False, state, then, unsure, tracked.speed_mps, tracked.turn_radps

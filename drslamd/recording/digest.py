@@ -52,7 +52,9 @@ def of_result(result: Any, digest: int = 0) -> int:
     if isinstance(result, Checked):
         return of_result(result.consistency.kept_vertices(), digest)
     if dataclasses.is_dataclass(result) and not isinstance(result, type):
-        return of_result([getattr(result, f.name) for f in dataclasses.fields(result)], digest)
+        # (what two results are not compared by is how they were found)
+        said = [f.name for f in dataclasses.fields(result) if f.compare]
+        return of_result([getattr(result, name) for name in said], digest)
     if isinstance(result, Enum):
         return of_result(result.name, digest)
     if isinstance(result, Mapping):

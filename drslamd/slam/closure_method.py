@@ -23,7 +23,7 @@ POINTS = 60
 """Measurements of one window after binning; more would only repeat the slow range bias."""
 CONFIRM_US = 2 * SECOND_US
 """See `WindowRule.confirm_us`."""
-AGREEMENT = Agreement(least=5, outnumber=2, confirms=True, decides=12.0)
+AGREEMENT = Agreement(least=5, outnumber=2, confirms=True, decides=10.0)
 PAPER_AGREEMENT = Agreement(least=2, outnumber=0, confirms=False)
 
 

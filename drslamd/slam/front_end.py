@@ -21,6 +21,7 @@ from drslamd.slam.keyframe_selector import KeyframeSelector
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.dead_reckoning import DeadReckoning
 from drslamd.slam.peer_in_range import PeerInRange
+from drslamd.slam.points.joiner import Joiner
 from drslamd.slam.points.point_tracker import Sensors
 from drslamd.slam.points.points import Points
 from drslamd.slam.range_model import RangeNoise
@@ -94,9 +95,8 @@ class FrontEnd:
         self.relocation = Relocation(
             Own(own.robot, self.model, section.range_sigma_m, tuning.ranges)
         )
-        self.points = Points(
-            own, Sensors(RangeNoise(section.range_sigma_m, self._bias_sigma), tuning.ranges)
-        )
+        sensors = Sensors(RangeNoise(section.range_sigma_m, self._bias_sigma), tuning.ranges)
+        self.points, self.joiner = Points(own, sensors), Joiner(own, sensors)
         self._keyframes = KeyframeSelector()
 
     # sensors
@@ -200,7 +200,8 @@ class FrontEnd:
         estimate: TeamEstimate | None,
         utime: int,
     ) -> list[WindowJob]:
-        """Begin the relative poses to be computed now; windows that are none are counted.
+        """Begin the relative poses to be computed now; windows that are none are counted, and one
+        that ends where the last one did is not asked again.
 
         Args:
             estimate: the team's last solution, for what it learned of the sensors.
@@ -212,7 +213,7 @@ class FrontEnd:
             window = request(pair.ranges, a, b, self._method.rule, self._range_model)
             if isinstance(window, str):
                 pair.count(window)
-            else:
+            elif not pair.history or pair.history[-1].utime != window.utime:
                 known = self._calibration(pair, estimate)
                 given = PairWindow(window.window, self._noise(pair, b), known)
                 out.append(WindowJob(pair, window, given))
@@ -329,4 +330,4 @@ class FrontEnd:
         """Closures to tell the team, and to withdraw."""
         every = not self._has_ranges_in_graph
         told = [c for pair in self.pairs.values() for c in pair.tell(every)]
-        return [*told, *self.relocation.tell(), *self.points.tell()]
+        return [*told, *self.relocation.tell(), *self.points.tell(), *self.joiner.tell()]

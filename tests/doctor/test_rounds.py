@@ -42,7 +42,7 @@ def test_everything_that_the_daemon_says_is_told_by_a_check_causes_first() -> No
     told = [finding.cause for finding in of_daemon(case.patient)]
     assert sorted(told) == sorted(CAUSES_FIRST)
     assert told[0] == "team.own_id_used"
-    assert told[-2:] == ["pose", "state"]
+    assert told[-3:] == ["pose", "site", "state"]
 
 
 def test_that_a_daemon_runs_is_no_finding(tmp_path: Path) -> None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 from log_scenes import OTHER, OWNER, PEER, T0, holding, repeated, said, state
-from message_builders import MS, SECOND
+from message_builders import MS, SECOND, a_status, an_entry
 
 from drslamd.conventions import Chain
-from drslamd.gossip.log_repeats import Allowance
+from drslamd.gossip.log_repeats import Allowance, Holding, Speech, holdings, said_of
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.message_types import LogState
-from drslamd.slam.graph.measurements import Chapter
+from drslamd.slam.graph.measurements import Chapter, GraphEntry
 
 
 def test_the_owner_repeats_what_a_peer_lacks_at_once_and_in_order() -> None:
@@ -215,37 +215,154 @@ def test_no_more_than_240_repeats_are_planned() -> None:
     assert sum(len(logs.repeats.take_due(T0 + ms * MS)) for ms in range(0, 10_000, 100)) == 240
 
 
+# what is held beyond a gap
+
+
+def test_what_a_peer_holds_beyond_a_gap_is_not_repeated() -> None:
+    logs = holding(3, OWNER, *range(10))
+    rows = state(OWNER, 2, newest=9) + state(OWNER, 5, first=3) + state(OWNER, 8, first=7)
+    logs.on_states(rows, PEER.robot, T0)
+    assert repeated(logs, T0) == [said(OWNER, seq) for seq in (2, 5, 6, 8, 9)]
+
+
+def test_rows_of_another_start_say_nothing_of_this_one() -> None:
+    rows = state(OWNER, 2) + state(Chain(3, 2), 9, first=5) + state(OWNER, 1, first=0)
+    assert holdings(rows) == {3: Holding(1, 2)}
+
+
+# entries that are said again unasked
+
+
+def present(logs: LogSync, loss: float, utime: int, *peers: int) -> None:
+    """Peers say that they hold the first entry of robot 3."""
+    for peer in peers:
+        logs.on_states(state(OWNER, 1), peer, utime)
+    logs.repeats.pace.reckon([loss])
+
+
+def pushed(loss: float, seconds: int, acknowledged_ms: int | None = None) -> list[int]:
+    """When entry 1 of robot 3 is said again, ms; one of two peers says soon that it has it."""
+    logs = holding(3, OWNER, 0)
+    present(logs, loss, T0, 5, 6)
+    logs.add(OWNER, 1, said(OWNER, 1), T0)
+    logs.repeats.push(1, T0)
+    out = []
+    for ms in range(0, 1000 * seconds, 100):
+        if ms == 200:
+            logs.on_states(state(OWNER, 2), 5, T0 + ms * MS)
+        if ms == acknowledged_ms:
+            logs.on_states(state(OWNER, 2), 6, T0 + ms * MS)
+        if logs.repeats.take_due(T0 + ms * MS):
+            out.append(ms)
+    return out
+
+
+@pytest.mark.parametrize(("loss", "count"), [(0.39, 0), (0.4, 40)])
+def test_where_most_is_lost_an_entry_is_said_twice_a_second_for_twenty_seconds(
+    loss: float, count: int
+) -> None:
+    assert pushed(loss, 25) == list(range(500, 500 * count + 1, 500))
+
+
+def test_what_everybody_has_is_not_said_again() -> None:
+    assert pushed(0.7, 12, acknowledged_ms=1_600) == [500, 1_000, 1_500]
+
+
+def test_for_those_who_were_silent_for_half_a_minute_nothing_is_said_again() -> None:
+    for seconds, is_said in ((29, True), (30, False)):
+        logs = holding(3, OWNER, 0)
+        present(logs, 0.7, T0, 6)
+        later = T0 + seconds * SECOND
+        logs.add(OWNER, 1, said(OWNER, 1), later)
+        logs.repeats.push(1, later)
+        assert bool(repeated(logs, later + 500 * MS)) is is_said
+
+
 # their pace
 
 
-def repeated_in(seconds: int, pace: Allowance, size: int = 500) -> int:
-    """Bytes of repeats that go out when somebody always has one."""
+def repeated_in(seconds: int, pace: Allowance, size: int = 500, said_ms: int = 0) -> int:
+    """Bytes of repeats that go out in the last ten seconds, when somebody always has one.
+
+    Args:
+        said_ms: how often 100 new bytes are said, 0 never.
+    """
     sent = 0
     for ms in range(0, 1000 * seconds, 10):
-        if pace.has_room(T0 + ms * MS):
-            pace.on_air(size, T0 + ms * MS, repeated=True)
-            sent += size
+        if said_ms and ms % said_ms == 0:
+            pace.on_air(100, T0 + ms * MS)
+        if pace.has_room(T0 + ms * MS, size):
+            pace.on_air(size, T0 + ms * MS, Speech.AGAIN)
+            sent += size if ms >= 1000 * (seconds - 10) else 0
     return sent
 
 
 def test_repeats_have_a_least_rate_where_nothing_else_is_said() -> None:
-    assert 14_500 <= repeated_in(10, Allowance()) <= 16_500
+    assert repeated_in(10, Allowance()) == 15_000
 
 
-def test_repeats_have_as_many_bytes_as_everything_else() -> None:
-    pace, sent = Allowance(), 0
+@pytest.mark.parametrize(("others", "least"), [(2, 15_000), (9, 40_000)])
+def test_a_large_team_has_more_of_them(others: int, least: int) -> None:
+    pace = Allowance()
+    pace.reckon([0.0] * others)
+    assert repeated_in(10, pace) == least
+
+
+def test_repeats_have_about_as_many_bytes_as_everything_else() -> None:
+    assert 20_000 <= repeated_in(30, Allowance(), said_ms=50) <= 23_000
+
+
+def test_in_no_second_is_much_more_than_twice_as_much_on_the_air() -> None:
+    """Of what is said when nobody lacks anything, of which a fifth are statuses, it is twice."""
+    pace, said_at = Allowance(), []
     for ms in range(0, 30_000, 10):
-        pace.on_air(40, T0 + ms * MS)
-        if ms >= 20_000 and pace.has_room(T0 + ms * MS):
-            pace.on_air(500, T0 + ms * MS, repeated=True)
-            sent += 500
-    assert 36_000 <= sent <= 44_000
+        # in one half of each second three times as much is said as in the other
+        for _ in range(3 if ms % 1000 < 500 else 1):
+            pace.on_air(20, T0 + ms * MS)
+            said_at.append((ms, 20))
+        if ms >= 10_000 and pace.has_room(T0 + ms * MS, 500):
+            pace.on_air(500, T0 + ms * MS, Speech.AGAIN)
+            said_at.append((ms, 500))
+    for begin in range(10_000, 29_000, 100):
+        assert (
+            sum(size for ms, size in said_at if begin <= ms < begin + 1000) <= 2.15 * 4_000 * 1.08
+        )
+
+
+def test_statuses_that_ask_are_no_reason_to_say_more() -> None:
+    pace = Allowance()
+    for ms in range(0, 20_000, 10):
+        pace.on_air(100, T0 + ms * MS, Speech.STATUS)
+    same = Allowance()
+    for ms in range(0, 20_000, 30):
+        same.on_air(100, T0 + ms * MS)
+    assert pace._rate == pytest.approx(same._rate, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("counter", "latest", "said_as"),
+    [(7, 7, Speech.NEW), (6, 7, Speech.AGAIN), (7, None, Speech.AGAIN)],
+)
+def test_an_entry_from_before_the_last_status_of_its_robot_is_said_again(
+    counter: int, latest: int | None, said_as: Speech
+) -> None:
+    assert said_of(an_entry(3, 30), counter, latest) is said_as
+    assert said_of(GraphEntry(3, chapter=Chapter(0, 0, (0, 0, 1))), counter, latest) is Speech.AGAIN
+    assert said_of(a_status(), counter, latest) is Speech.STATUS
+
+
+def test_one_of_many_leaves_a_tenth_of_the_room() -> None:
+    few, many = Allowance(), Allowance()
+    assert few.has_room(T0, 1_500)
+    assert not few.has_room(T0, 1_501)
+    assert many.has_room(T0, 1_350, is_one_of_many=True)
+    assert not many.has_room(T0, 1_351, is_one_of_many=True)
 
 
 def test_they_may_be_more_where_messages_are_lost() -> None:
     lossy = Allowance()
-    lossy.reckon([0.5, 0.5])
-    assert repeated_in(10, lossy) > 3 * repeated_in(10, Allowance())
+    lossy.reckon([0.5, 0.5, 0.0])
+    assert repeated_in(10, lossy) == 4 * repeated_in(10, Allowance())
     hopeless = Allowance()
     hopeless.reckon([1.0])
     assert hopeless.loss == 0.8
@@ -254,27 +371,31 @@ def test_they_may_be_more_where_messages_are_lost() -> None:
 def test_whoever_floods_the_channel_with_repeats_leaves_each_robot_one_a_second() -> None:
     pace, sent = Allowance(), 0
     for ms in range(0, 10_000, 10):
-        pace.on_air(1_000, T0 + ms * MS, repeated=True, heard=True)
-        if pace.has_room(T0 + ms * MS):
-            pace.on_air(500, T0 + ms * MS, repeated=True)
+        pace.on_air(1_000, T0 + ms * MS, Speech.AGAIN, heard=True)
+        if pace.has_room(T0 + ms * MS, 500):
+            pace.on_air(500, T0 + ms * MS, Speech.AGAIN)
             sent += 1
-    assert 9 <= sent <= 11
-    assert pace.has_room(T0 + 12 * SECOND)
+    assert 9 <= sent <= 13
+    assert pace.has_room(T0 + 12 * SECOND, 500)
 
 
 # chapters
 
 
 def test_a_peer_that_lags_far_is_first_told_the_latest_chapter() -> None:
+    for complete, first in ((143, 400), (144, 144)):
+        logs = LogSync(3)
+        for seq in range(400):
+            logs.add(OWNER, seq, said(OWNER, seq), 0)
+        logs.add(OWNER, 400, said(OWNER, 400), 0, Chapter(0, 390, (0, 0, 1)))
+        logs.on_states(state(OWNER, complete), PEER.robot, T0)
+        assert repeated(logs, T0)[0] == said(OWNER, first)
+
+
+def test_a_peer_that_has_the_latest_chapter_beyond_a_gap_is_not_told_it_again() -> None:
     logs = LogSync(3)
-    for seq in range(200):
+    for seq in range(400):
         logs.add(OWNER, seq, said(OWNER, seq), 0)
-    logs.add(OWNER, 200, said(OWNER, 200), 0, Chapter(0, 190, (0, 0, 1)))
-    logs.on_states(state(OWNER, 71), PEER.robot, T0)
-    assert repeated(logs, T0)[:2] == [said(OWNER, 200), said(OWNER, 71)]
-    logs = LogSync(3)
-    for seq in range(200):
-        logs.add(OWNER, seq, said(OWNER, seq), 0)
-    logs.add(OWNER, 200, said(OWNER, 200), 0, Chapter(0, 190, (0, 0, 1)))
-    logs.on_states(state(OWNER, 72), PEER.robot, T0)
-    assert repeated(logs, T0)[0] == said(OWNER, 72)
+    logs.add(OWNER, 400, said(OWNER, 400), 0, Chapter(0, 390, (0, 0, 1)))
+    logs.on_states(state(OWNER, 71) + state(OWNER, 401, first=400), PEER.robot, T0)
+    assert repeated(logs, T0)[0] == said(OWNER, 71)

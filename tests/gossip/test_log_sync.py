@@ -12,6 +12,7 @@ from drslamd.conventions import Chain
 from drslamd.gossip import replicated_log
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.message_types import LogState
+from drslamd.slam.graph.measurements import GraphEntry
 
 
 def test_an_entry_is_new_once() -> None:
@@ -37,7 +38,7 @@ def test_two_hundred_orders_of_arrival_give_the_same_log() -> None:
 
 def test_a_missing_entry_keeps_the_log_incomplete_until_it_comes() -> None:
     logs = holding(5, OWNER, 0, 1, 3, 4)
-    assert logs.next_states() == state(OWNER, 2, newest=5)
+    assert logs.next_states() == state(OWNER, 2, newest=5) + state(OWNER, 5, first=3)
     assert logs.lacking(3) == 1
     logs.add(OWNER, 2, b"", T0)
     assert logs.next_states() == state(OWNER, 5)
@@ -48,9 +49,9 @@ def test_a_new_epoch_replaces_the_log_of_the_old_one() -> None:
     logs = holding(5, OWNER, 0, 1, 2)
     again = Chain(3, 2)
     assert logs.add(again, 1, b"new", T0)
-    assert logs.next_states() == state(again, 0, newest=2)
+    assert logs.next_states() == state(again, 0, newest=2) + state(again, 2, first=1)
     assert not logs.add(OWNER, 3, b"late", T0)
-    assert logs.next_states() == state(again, 0, newest=2)
+    assert logs.next_states() == state(again, 0, newest=2) + state(again, 2, first=1)
 
 
 def test_a_start_that_was_only_heard_of_replaces_the_old_log_too() -> None:
@@ -89,11 +90,11 @@ def test_the_oldest_entries_go_when_a_log_is_full(monkeypatch: pytest.MonkeyPatc
 def test_a_full_log_with_holes_gives_them_up(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(replicated_log, "MAX_ENTRIES", 10)
     logs = holding(5, OWNER, *range(1, 10))
-    assert logs.next_states() == state(OWNER, 0, newest=10)
+    assert logs.next_states() == state(OWNER, 0, newest=10) + state(OWNER, 10, first=1)
     logs.add(OWNER, 10, b"", T0)
     assert logs.next_states() == state(OWNER, 11, first=1)
     logs.add(OWNER, 15, b"", T0)
-    assert logs.next_states() == state(OWNER, 11, newest=16, first=6)
+    assert logs.next_states() == state(OWNER, 11, 16, first=6) + state(OWNER, 16, first=15)
     assert logs.lacking(3) == 4
 
 
@@ -115,7 +116,8 @@ def test_the_largest_number_there_is_costs_only_the_log_that_has_it() -> None:
     last = 2**31 - 2
     assert logs.add(OWNER, last, b"", T0)
     first = last + 1 - replicated_log.MAX_ENTRIES
-    assert logs.next_states() == (*state(PEER, 1), *state(OWNER, first, last + 1, first))
+    lacked = state(OWNER, first, last + 1, first) + state(OWNER, last + 1, first=last)
+    assert logs.next_states() == state(PEER, 1) + lacked
 
 
 def test_what_the_owner_no_longer_holds_is_not_waited_for() -> None:
@@ -128,7 +130,7 @@ def test_what_the_owner_no_longer_holds_is_not_waited_for() -> None:
 def test_what_another_peer_no_longer_holds_is_waited_for() -> None:
     logs = holding(5, OWNER, 0, 4, 5)
     logs.on_states(state(OWNER, 6, first=4), OTHER.robot, T0)
-    assert logs.next_states() == state(OWNER, 1, newest=6)
+    assert logs.next_states() == state(OWNER, 1, newest=6) + state(OWNER, 6, first=4)
     assert logs.lacking(3) == 3
 
 
@@ -177,7 +179,7 @@ def test_an_owner_that_takes_back_that_it_forgot_everything_is_believed() -> Non
     assert logs.next_states() == state(OWNER, LAST, first=LAST)
     assert logs.add(OWNER, 4, said(OWNER, 4), T0)
     logs.on_states(state(OWNER, 5), OWNER.robot, T0 + SECOND)
-    assert logs.next_states() == state(OWNER, 2, newest=5)
+    assert logs.next_states() == state(OWNER, 2, newest=5) + state(OWNER, 5, first=3)
     assert logs.lacking(3) == 1
     assert logs.add(OWNER, 2, said(OWNER, 2), T0)
     assert logs.next_states() == state(OWNER, 5)
@@ -246,6 +248,61 @@ def test_logs_that_do_not_fit_one_status_take_turns(others: int, statuses: int) 
         assert named != set(range(others + 1))
         named |= set(ids)
     assert named == set(range(others + 1))
+
+
+def test_what_is_held_beyond_gaps_is_said_in_six_rows_of_a_log_at_most() -> None:
+    logs = holding(5, OWNER, *range(1, 30, 2), 30)
+    rows = logs.next_states()
+    assert rows[0] == LogState(*OWNER, 0, 0, 31)
+    assert rows[1:] == tuple(LogState(*OWNER, k, k + 1, 31) for k in range(1, 13, 2))
+
+
+def test_rows_of_what_lies_beyond_gaps_never_fill_a_status() -> None:
+    """A full one would leave logs out."""
+    for others in (1, 5, 20, 26, 27, 28):
+        logs = LogSync(0)
+        for robot in range(1, others + 1):
+            for seq in range(1, 20, 2):
+                logs.add(Chain(robot, 1), seq, b"", T0)
+        rows = logs.next_states()
+        assert [row.id for row in rows[:others]] == list(range(1, min(others, 28) + 1))
+        assert len(rows) <= (27 if others < 28 else 28)
+
+
+def test_whoever_gets_what_it_asked_for_does_not_ask_again_at_once() -> None:
+    logs = holding(5, OWNER, 0, 5)
+    logs.next_states()
+    assert not logs.is_filling(T0)
+    logs.add(OWNER, 1, b"", T0)
+    assert logs.is_filling(T0 + SECOND)
+    assert not logs.is_filling(T0 + 2 * SECOND)
+    logs.add(OWNER, 2, b"", T0 + SECOND)
+    assert logs.is_filling(T0 + 2 * SECOND)
+    logs.add(OWNER, 3, b"", T0 + 2 * SECOND)
+    assert not logs.is_filling(T0 + 2 * SECOND)
+
+
+def test_an_owner_does_not_say_again_what_somebody_else_just_did() -> None:
+    logs, entry = holding(3, OWNER, 0, 1), GraphEntry(0)
+    logs.on_states(state(OWNER, 0), PEER.robot, T0)
+    logs.on_echo(OWNER, (entry, said(OWNER, 0)), T0)
+    assert repeated(logs, T0 + MS) == [said(OWNER, 1)]
+
+
+def test_what_an_owner_never_said_keeps_it_from_nothing() -> None:
+    for came in (None, (GraphEntry(0), b"forged"), (GraphEntry(7), b"forged")):
+        logs = holding(3, OWNER, 0)
+        logs.on_states(state(OWNER, 0), PEER.robot, T0)
+        logs.on_echo(OWNER, came, T0)
+        assert logs.end(OWNER) == 1
+        assert repeated(logs, T0 + MS) == [said(OWNER, 0)]
+
+
+def test_what_comes_in_its_turn_was_not_asked_for() -> None:
+    logs = holding(5, OWNER, 0, 9)
+    logs.next_states()
+    logs.add(OWNER, 10, b"", T0)
+    assert not logs.is_filling(T0)
 
 
 def test_a_log_that_a_full_status_leaves_out_may_be_held() -> None:

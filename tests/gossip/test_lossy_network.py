@@ -34,7 +34,7 @@ def test_two_robots_alone_hold_the_same_soon_after_the_last_word(
 
 @pytest.mark.parametrize(
     ("loss", "mean", "worst"),
-    [(0.0, 0.0, 0), (0.1, 1.2, 5), (0.3, 2.8, 8), (0.5, 5.2, 13), (0.7, 8.2, 17)],
+    [(0.0, 0.0, 0), (0.1, 1.2, 5), (0.3, 2.8, 8), (0.5, 5.2, 13), (0.7, 6.6, 19)],
 )
 def test_one_entry_reaches_a_team_of_five(loss: float, mean: float, worst: int) -> None:
     rounds = []
@@ -45,6 +45,19 @@ def test_one_entry_reaches_a_team_of_five(loss: float, mean: float, worst: int) 
         rounds.append(air.rounds_until_equal(worst))
     assert np.mean(rounds) <= mean
     assert max(rounds) <= worst
+
+
+@pytest.mark.row("N1")
+def test_at_70_percent_loss_an_entry_reaches_a_team_that_knows_its_loss_within_ten_rounds() -> None:
+    """`lab.healing` counts thousands; of these few the worst."""
+    rounds = []
+    for seed in range(12):
+        air = Air(5, 0.7, seed).meet()
+        air.seconds(15)
+        air.say(0)
+        rounds.append(air.rounds_until_equal(11))
+    assert max(rounds) <= 10
+    assert np.mean(rounds) <= 4
 
 
 @pytest.mark.row("N1")
@@ -82,7 +95,7 @@ def test_a_partition_heals(loss: float) -> None:
     assert air.rounds_until_equal(10, robots=(2, 3, 4)) <= 10
     assert not air.is_equal()
     air.hears = lambda a, b: True
-    assert air.rounds_until_equal(40) <= 40
+    assert air.rounds_until_equal(20) <= 20
 
 
 @pytest.mark.row("N5")
@@ -131,7 +144,7 @@ def test_nobody_repeats_the_old_log_of_a_robot_that_started_again() -> None:
     air.seconds(8)
     # an entry for which a relay waited its turn may be on its way before they have met
     assert set(air.teams[1].refused) <= {"of a robot that has not answered this start"}
-    assert 30 <= air.entries_sent - sent <= 36
+    assert air.entries_sent - sent == 30
 
 
 def test_a_robot_catches_up_an_hour_in_five_minutes() -> None:

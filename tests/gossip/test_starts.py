@@ -231,6 +231,20 @@ def test_what_was_claimed_before_our_first_word_counts_no_more_after_it() -> Non
     assert team.superseded_by is None
 
 
+@pytest.mark.row("S9")
+@pytest.mark.parametrize("twice", [True, False])
+def test_a_peer_must_say_the_very_same_twice(twice: bool) -> None:
+    for first, other in (((Heard(1, 12, 0),), (Heard(1, 13, 0),)), (log(10, 5), log(10, 6))):
+        team, seal = a_team(), a_seal(3)
+        team.send(a_status(), T0)
+        for k, said in enumerate((first, first if twice else other)):
+            utime = T0 + 2 * k * SECOND
+            is_heard = isinstance(said[0], Heard)
+            status = a_status(said, ()) if is_heard else a_status((), said)  # type: ignore[arg-type]
+            team.receive(ChannelMessage(utime, *sealed(seal, status, utime)))
+        assert (team.superseded_by is not None) == twice
+
+
 def test_who_holds_none_of_our_entries_proves_nothing_by_where_it_waits() -> None:
     assert claims(logs=log(10, complete=2**31 - 1, first=2**31 - 1)) is None
 

@@ -28,9 +28,11 @@ def test_a_reader_gets_one_message_for_each_sample(tmp_path: Path) -> None:
     async def scene() -> None:
         robot, near = steered(), NearSocket(tmp_path / "near", Stepped())
         assert near.open() == ""
+        assert not near.has_readers
         with connected(tmp_path / "near") as reader:
             await asyncio.sleep(0)
             await asyncio.sleep(0)
+            assert near.has_readers
             for _ in range(3):
                 robot.drive(1)
                 near.tell(robot.robot.near)
@@ -38,6 +40,7 @@ def test_a_reader_gets_one_message_for_each_sample(tmp_path: Path) -> None:
             found = [near_message.decode(reader.recv(1 << 16)) for _ in range(3)]
             near.close()
             assert reader.recv(1) == b""
+            assert not near.has_readers
         assert [f.utime for f in found if isinstance(f, near_message.Near)] == [
             robot.utime - 40_000,
             robot.utime - 20_000,

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from near_scenes import Steered
+from acquainted import introduce
+from near_scenes import STEP_US, Steered
 
-from drslamd.conventions import GRID_US
+from drslamd.conventions import GRID_US, Chain
 from drslamd.gossip.message_types import PoseState
-from drslamd.near.peers_around import UNHEARD_CLOCK_US
+from drslamd.near.peers_around import STANDS_US, UNHEARD_CLOCK_US
 from drslamd.slam.graph.measurements import Keyframe
 
 
@@ -62,6 +63,21 @@ def test_who_is_not_heard_is_stale_and_its_clock_unsure(steered: Steered) -> Non
     peers = steered.look().peers
     assert set(peers.states) == {PoseState.STALE}
     assert set(peers.uncertainties) == {UNHEARD_CLOCK_US}
+
+
+@pytest.mark.parametrize(("seconds", "is_silent"), [(2.5, False), (2.8, True)])
+def test_who_says_nothing_and_lives_stood_there_until_we_would_know(
+    steered: Steered, seconds: float, is_silent: bool
+) -> None:
+    """It may have turned since, so that its pose is not of now."""
+    team = introduce(steered.robot.team, Chain(1, 1), utime=steered.utime)
+    n = add(steered, 1, 0.3)
+    late = n * GRID_US - steered.utime
+    steered.drive(round(50 * seconds) + late // STEP_US, 0.0, 0.0)
+    team.peers[1].last_heard = steered.utime
+    near = steered.look()
+    assert near.peers.utimes[0] == (near.utime - STANDS_US if is_silent else n * GRID_US)
+    assert (near.peers.speeds[0] == 0.0) is is_silent
 
 
 def test_of_robots_beyond_those_that_are_claimed_nothing_is_told(steered: Steered) -> None:

@@ -86,3 +86,10 @@ def test_equal_results_have_equal_digests() -> None:
 def test_a_result_that_was_never_thought_of_is_our_mistake() -> None:
     with pytest.raises(TypeError, match="a computation found a bytearray"):
         digest.of_result(bytearray())
+
+
+def test_what_a_solver_keeps_for_the_next_solution_is_no_part_of_this_one() -> None:
+    found = TeamEstimate(Segment(1, 2, 0), {})
+    kept = replace(found, kept=(slice(0, 3), object()))
+    assert digest.of_result(kept) == digest.of_result(found)
+    assert kept == found

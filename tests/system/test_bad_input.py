@@ -232,24 +232,35 @@ def test_no_member_can_end_it_by_what_it_says(epoch: int) -> None:
 
 
 @pytest.mark.row("N8")
-def test_a_flood_of_junk_does_not_keep_it_from_reading_its_sensors() -> None:
+def test_ten_thousand_junk_datagrams_a_second_keep_nobody_from_being_heard() -> None:
+    """Neither its sensors nor a peer, which here has the same address as the junk."""
+
     async def test(team: RealTeam, robot: RealRobot) -> None:
+        epoch = (await status(robot))["epoch"]
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
             out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
             out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton("127.0.0.1"))
             junk = b"LC02\0\0\0\1DRSLAM_STATUS_001\0" + os.urandom(300)
 
             async def flood() -> None:
-                for _ in range(300):
-                    for _ in range(30):
+                for k in range(300):
+                    for _ in range(100):
                         out.sendto(junk, (GROUP, team.port))
+                    if k % 3 == 0:
+                        said = a_status((Heard(0, epoch, 0),))
+                        true = forged(said, robot=7, counter=k + 1, secret=team_key(None))
+                        out.sendto(lc02.encode(k, *true), (GROUP, team.port))
                     await asyncio.sleep(0.01)
 
             await asyncio.gather(flood(), print_frames(robot, 300))
         await asyncio.sleep(0.3)
         answer = await status(robot)
         assert answer["uwb"]["counters"]["frames.accepted"] >= 298
-        assert sum(answer["network"]["refused"].values()) > 3_000
+        assert answer["peers"]["7"]["received"] >= 95
+        refused, flooded = sum(answer["network"]["refused"].values()), answer["network"]["flooded"]
+        assert refused < 10_000
+        assert flooded > 10_000
+        assert says("127.0.0.1 floods ")(answer)
 
     with_daemon(test)
 

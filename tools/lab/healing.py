@@ -14,7 +14,7 @@ import argparse
 import random
 import sys
 from collections import Counter, deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Set
 from typing import NamedTuple
 
 import numpy as np
@@ -51,6 +51,7 @@ class Mate:
         self.team, self.graph = Team(Seal(team_key(None), robot, epoch, {})), PoseGraph()
         self.place = np.zeros(3)
         self.numbers: Counter[int] = Counter()
+        self.heard: Set[Chain] = set()
 
 
 class Conversation:
@@ -65,6 +66,8 @@ class Conversation:
         self.mates = {robot: Mate(robot, 1) for robot in range(robots)}
         self.hears: Link = lambda a, b: True
         self.utime, self.loss, self.bytes = 100 * SECOND, loss, [0]
+        self.said: list[tuple[Chain, int, int]] = []
+        """Entries, and when they were made."""
         self._chance = random.Random(seed)
         self._phase = {robot: self._chance.randrange(10) for robot in range(robots)}
         self._ends: deque[dict[int, tuple[int, int]]] = deque(maxlen=FRESH_S + 1)
@@ -79,7 +82,7 @@ class Conversation:
         for _ in range(count):
             self.bytes.append(0)
             for robot, mate in list(self.mates.items()):
-                self._drive(robot, mate)
+                self.drive(robot, mate, self._partners(robot, mate))
             for step in range(10):
                 self.utime += STEP
                 for robot, mate in list(self.mates.items()):
@@ -99,13 +102,13 @@ class Conversation:
             if received and isinstance(received.message, GraphEntry):
                 mate.graph.insert(received.origin, received.message)
 
-    def _drive(self, robot: int, mate: Mate) -> None:
-        """A keyframe, a range to each peer of a higher id, a closure now and then."""
+    def drive(self, robot: int, mate: Mate, partners: Iterable[Chain]) -> None:
+        """A keyframe, a range to each partner, a closure now and then."""
         chance, n = self._chance, self.utime // STEP
         mate.place += [chance.gauss(3_000, 500), chance.gauss(0, 500), chance.gauss(100, 300)]
         x, y, theta = (int(v) for v in mate.place)
         ranges, closures = [], []
-        for peer in self._partners(robot, mate):
+        for peer in partners:
             metres = float(np.hypot(*(mate.place - self.mates[peer.robot].place)[:2])) * 1e-4
             metres = round(min(metres % 60 + chance.gauss(0, 0.1), 90.0), 4)
             ends = tuple((round(chance.gauss(0.1, 0.05), 3), 0.0) for _ in "ab")
@@ -123,6 +126,7 @@ class Conversation:
         team = mate.team
         for entry in team.entries(UNTOLD, [keyframe], ranges, closures):
             decoded, sealed = team.append(entry, self.utime)
+            self.said.append((team.own, decoded.seq, self.utime))
             mate.graph.insert(team.own, decoded)
             self._carry(robot, team.send_sealed(robot, sealed))
         for entry in team.write_chapter(self.utime, aloud=True):
@@ -141,7 +145,9 @@ class Conversation:
         second = self.utime // SECOND
         if step != self._phase[robot]:
             return
-        if team.is_asking(self.utime) or second % QUIET_S == robot % QUIET_S:
+        news, mate.heard = mate.heard, team.audible(self.utime)
+        is_news = news != mate.heard
+        if is_news or team.is_asking(self.utime) or second % QUIET_S == robot % QUIET_S:
             heard = team.next_heard(self.utime, range(robot + 1, 255))
             status = Status(
                 PoseState.LOCALISED, 0, False, robot, UNKNOWN_CLOCK, 0, heard, (),
@@ -152,7 +158,9 @@ class Conversation:
         self._carry(robot, team.send(pose, self.utime))
         if robot:
             steps = np.cumsum(np.full((11, 3), 300.0), axis=0)
-            batch = OdometryBatch(0, self.utime // STEP - 10, steps)
+            begin = self.utime // STEP - 10
+            # (each is whole by itself: nobody here says odometry again)
+            batch = OdometryBatch(begin, begin, steps)
             self._carry(robot, team.send(batch, self.utime))
 
     def is_healed(self) -> bool:

@@ -10,4 +10,5 @@ from drslamd.machine.finding import Finding
 
 def localisation(patient: Patient) -> Iterator[Finding]:
     yield from patient.told("pose", "pose")
+    yield from patient.told("site", "site")
     yield from patient.told("state", "state")

@@ -1,27 +1,26 @@
-"""A chapter as few bytes: columns of whole numbers, of which only the differences are kept.
+"""A chapter as few bytes: a head, peers, models, then columns of whole numbers (`number_tables`).
 
-What a robot says from second to second is alike, so the columns of a minute deflate to a sixth of
-the entries: about six bytes a keyframe and nine a range.
-
-A head (`_HEAD`), peers, models, then all columns: of each number the difference from the one above
-it, the sign in the lowest bit, the four bytes of all rows one plane after the other; all of it
-deflated. Whatever could not have been packed is refused.
+What a robot says from second to second is alike, so a minute has an eighth of the bytes of its
+entries: about five bytes a keyframe and four a range, most of it noise. What follows from something
+else is said as the difference: the other sample from ours, the entry from the time. Whatever could
+not have been packed is refused.
 """
 
 from __future__ import annotations
 
 import struct
-import zlib
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from drslamd import lcmtypes
-from drslamd.conventions import Chain
+from drslamd.conventions import GRID_HZ, Chain
 from drslamd.gossip.bounds import bounded
+from drslamd.gossip.entries import number_tables
 from drslamd.gossip.entries.measurement_codecs import (
     filled_closure,
     filled_range,
@@ -33,75 +32,81 @@ from drslamd.gossip.entries.measurement_codecs import (
     said_peer,
     traits_of,
 )
+from drslamd.gossip.entries.number_tables import Shape, Table
 from drslamd.slam.graph.chapters import COUNTS_FOR, PER_ENTRY
-from drslamd.slam.graph.measurements import Chapter
+from drslamd.slam.graph.measurements import (
+    Chapter,
+    ClosureMeasurement,
+    Placed,
+    RangeMeasurement,
+)
 from drslamd.slam.robot_model import BY_GYRO
 from drslamd.slam.se2 import Index
 
-MAX_UNPACKED = 1 << 16
-"""Bytes; what fits one datagram has far less unless it was made to swell."""
-LONGEST_SPAN = 256
-"""Entries from the first that a chapter says again to its last part: 64, and its parts."""
+Item = TypeVar("Item", RangeMeasurement, ClosureMeasurement)
+LONGEST_SPAN = 512
+"""Entries from the first that a chapter says again to its last part: 256, and its parts."""
 MOST_PARTS = 127
 SHORT = 2**15 - 1
 """Of what has 16 bits in an entry."""
-_HEAD = struct.Struct(">b3bi5H")
-"""Layer, parts, first, then how many peers, models, keyframes, ranges and closures."""
-_PEER = struct.Struct(">hq")
+_HEAD = struct.Struct(">b3bi3H")
+"""Layer, parts, first, then how many peers, models and keyframes."""
+_PEER = struct.Struct(">hq2H")
+"""Robot, epoch, how many ranges and closures."""
 _MODEL = struct.Struct(">ib")
 """Entry and number of traits, which follow."""
-_KEYFRAME, _RANGE, _CLOSURE = 5, 12, 19
-"""Columns of each."""
+_COLUMNS = _KEYFRAME, _RANGE, _CLOSURE = 5, 12, 19
+"""Of each."""
 
 
 def packed(chapter: Chapter) -> bytes:
     """The bytes of a chapter."""
-    named = {item.peer for _, item in chapter.ranges}
-    peers = sorted(named | {item.peer for _, item in chapter.closures})
-    number = {peer: k for k, peer in enumerate(peers)}
-    begin = chapter.first * PER_ENTRY
+    ranged = Counter(item.peer for _, item in chapter.ranges)
+    seen = Counter(item.peer for _, item in chapter.closures)
+    peers = sorted(ranged.keys() | seen.keys())
     keyframes = [[k.n, k.segment, k.x, k.y, k.theta] for k in chapter.keyframes]
     ranges = []
     for place, item in chapter.ranges:
-        r = filled_range(item, number[item.peer])
+        r = filled_range(item, 0)
         ends = [*r.qa, *r.qb, r.range, r.sigma, *r.turn]
-        ranges.append([place - begin, r.peer, r.a_n, r.b_n, *ends])
+        ranges.append([*_when(place, r, chapter.first), *ends])
     closures = []
-    for place, seen in chapter.closures:
-        c = filled_closure(seen, number[seen.peer])
+    for place, closure in chapter.closures:
+        c = filled_closure(closure, 0)
         doubt = np.array(c.covariance, dtype="<f4").view("<i4").tolist()
-        ends = [c.number, c.kept, c.x, c.y, c.theta, *c.corrected]
-        closures.append([place - begin, c.peer, c.a_n, c.b_n, *ends, *doubt])
-    counts = map(len, (peers, chapter.models, keyframes, ranges, closures))
+        ends = [c.number, c.kept, c.x, c.y, c.theta, *c.corrected, *doubt]
+        closures.append([*_when(place, c, chapter.first), *ends])
+    counts = map(len, (peers, chapter.models, keyframes))
     out = [_HEAD.pack(chapter.layer, *chapter.parts, chapter.first, *counts)]
-    out += [_PEER.pack(*said_peer(peer)) for peer in peers]
+    out += [_PEER.pack(*said_peer(peer), ranged[peer], seen[peer]) for peer in peers]
     out += [_model(seq, traits_of(model)) for seq, model in chapter.models]
-    out += [_planes(keyframes), _planes(ranges), _planes(closures)]
-    return zlib.compress(b"".join(out), 9)
+    tables = [
+        _table(keyframes, _KEYFRAME, [len(keyframes)]),
+        _table(ranges, _RANGE, [ranged[peer] for peer in peers]),
+        _table(closures, _CLOSURE, [seen[peer] for peer in peers]),
+    ]
+    return b"".join([*out, number_tables.packed(tables)])
 
 
 def _model(seq: int, traits: Sequence[float]) -> bytes:
     return _MODEL.pack(seq, len(traits)) + struct.pack(f">{len(traits)}f", *traits)
 
 
-def _planes(rows: Sequence[Sequence[int]]) -> bytes:
-    if not rows:
-        return b""
-    table = np.array(rows, dtype=np.int64)
-    step = np.diff(table, axis=0, prepend=0).astype("<u4")
-    signed = step.view("<i4")
-    folded = (step << np.uint32(1)) ^ (signed >> 31).view("<u4")
-    planes = np.ascontiguousarray(folded.T).view(np.uint8).reshape(table.shape[1], -1, 4)
-    return np.ascontiguousarray(planes.transpose(0, 2, 1)).tobytes()
+def _when(place: int, item: Any, first: int) -> list[int]:
+    """Of a measurement: entry, place in there, both samples; what follows from others is near 0."""
+    seq, at = divmod(place, PER_ENTRY)
+    return [seq - first - item.a_n // GRID_HZ, at, item.a_n, item.b_n - item.a_n]
 
 
-def _rows(planes: bytes, count: int, columns: int) -> Index:
-    """What `_planes` was made of, (count, columns) within 32 bits."""
-    bytes_of = np.frombuffer(planes, np.uint8).reshape(columns, 4, count)
-    folded = np.ascontiguousarray(bytes_of.transpose(0, 2, 1)).view("<u4")[..., 0]
-    step = (folded >> np.uint32(1)) ^ (np.uint32(0) - (folded & np.uint32(1)))
-    table = np.cumsum(step, axis=1, dtype=np.uint32).view(np.int32)
-    return np.asarray(table.T.astype(np.int64))
+def _table(rows: Sequence[Sequence[int]], columns: int, groups: Iterable[int]) -> Table:
+    said = np.array(rows, dtype=np.int64).reshape(-1, columns)
+    return Table(said, tuple(count for count in groups if count))
+
+
+def numbers_in(chapter: Chapter) -> int:
+    """How many a chapter holds in its tables."""
+    counts = len(chapter.keyframes), len(chapter.ranges), len(chapter.closures)
+    return sum(n * columns for n, columns in zip(counts, _COLUMNS, strict=True))
 
 
 class _Reader:
@@ -129,13 +134,8 @@ class _Reader:
         traits = struct.Struct(f">{bounded('number of traits', count, 0, BY_GYRO)}f")
         return seq, traits.unpack(self.take(traits.size))
 
-    def rows(self, count: int, columns: int) -> list[list[int]]:
-        rows: list[list[int]] = _rows(self.take(4 * count * columns), count, columns).tolist()
-        return rows
-
-    @property
-    def is_at_end(self) -> bool:
-        return self._at == len(self._data)
+    def rest(self) -> bytes:
+        return self._data[self._at :]
 
 
 def unpacked(data: bytes, seq: int) -> Chapter:
@@ -144,69 +144,77 @@ def unpacked(data: bytes, seq: int) -> Chapter:
     Raises:
         ValueError, IndexError: no chapter has such bytes.
     """
-    reader = _Reader(_inflated(data))
+    reader = _Reader(data)
     layer, two, one, lasting, first, *counts = _HEAD.unpack(reader.take(_HEAD.size))
-    n_peers, n_models, n_keyframes, n_ranges, n_closures = counts
+    n_peers, n_models, n_keyframes = counts
     parts = two, one, lasting
     bounded("layer", layer, 0, len(COUNTS_FOR) - 1)
     bounded("first entry of a chapter", first, max(0, seq - LONGEST_SPAN), seq)
     if any(parts) and (layer or min(parts) < 0 or not lasting or sum(parts) > seq - first):
         raise ValueError("parts that a chapter cannot have")
-    peers = [
-        read_peer(SimpleNamespace(id=robot, epoch=epoch))
-        for robot, epoch in reader.structs(_PEER, n_peers)
-    ]
+    peers, ranged, seen = list[Chain](), list[int](), list[int]()
+    for robot, epoch, n_ranges, n_closures in reader.structs(_PEER, n_peers):
+        peers.append(read_peer(SimpleNamespace(id=robot, epoch=epoch)))
+        ranged.append(n_ranges)
+        seen.append(n_closures)
+        if not n_ranges and not n_closures:
+            raise ValueError("peer of whom nothing is said")
+    if any(before >= after for before, after in pairwise(peers)):
+        raise ValueError("peers out of order")
     models = [
         (bounded("entry", at, first, seq), read_model(traits))
         for at, traits in (reader.model() for _ in range(n_models))
     ]
+    groups = ([n_keyframes] if n_keyframes else []), ranged, seen
+    shapes = [
+        Shape(columns, tuple(count for count in counts if count))
+        for columns, counts in zip(_COLUMNS, groups, strict=True)
+    ]
+    of_keyframes, of_ranges, of_closures = number_tables.unpacked(reader.rest(), shapes)
     names = lcmtypes.keyframe_t.__slots__
     keyframes = [
         read_keyframe(SimpleNamespace(**dict(zip(names, row, strict=True))))
-        for row in reader.rows(n_keyframes, _KEYFRAME)
+        for row in of_keyframes.tolist()
     ]
-    start, end = first * PER_ENTRY, (seq + 1) * PER_ENTRY
-
-    def place_of(row: list[int]) -> int:
-        return bounded("place in the log", start + row[0], start, end - 1)
-
-    ranges = [(place_of(row), _range(row, peers)) for row in reader.rows(n_ranges, _RANGE)]
-    closures = [(place_of(row), _closure(row, peers)) for row in reader.rows(n_closures, _CLOSURE)]
-    said = {item.peer for _, item in [*ranges, *closures]}
-    if not reader.is_at_end or peers != sorted(said):
-        raise ValueError("bytes or peers left over")
-    for placed in (ranges, closures):
-        order = [(item.peer, place) for place, item in placed]
-        if any(before >= after for before, after in pairwise(order)):
-            raise ValueError("measurements out of order")
+    span = range(first, seq + 1)
+    ranges = list(_placed(of_ranges, _each_of(peers, ranged), span, _range))
+    closures = list(_placed(of_closures, _each_of(peers, seen), span, _closure))
     return Chapter(
         layer, first, parts, tuple(models), tuple(keyframes), tuple(ranges), tuple(closures)
     )
 
 
-def _inflated(data: bytes) -> bytes:
-    inflate = zlib.decompressobj()
-    try:
-        out = inflate.decompress(data, MAX_UNPACKED)
-    except zlib.error as error:
-        raise ValueError(str(error)) from None
-    if not inflate.eof or inflate.unused_data:
-        raise ValueError("chapter that does not end where its bytes do")
-    return out
+def _each_of(peers: list[Chain], counts: list[int]) -> list[Chain]:
+    return [peer for peer, count in zip(peers, counts, strict=True) for _ in range(count)]
+
+
+def _placed(
+    rows: Index, peers: list[Chain], span: range, read: Callable[[list[int], Chain], Item]
+) -> Iterator[Placed[Item]]:
+    """Measurements with their places, which ascend with each peer."""
+    before: tuple[Chain, int] | None = None
+    for (of_seq, at, a_n, to_b, *ends), peer in zip(rows.tolist(), peers, strict=True):
+        seq = of_seq + span.start + a_n // GRID_HZ
+        bounded("entry", seq, span.start, span.stop - 1)
+        place = seq * PER_ENTRY + bounded("place in an entry", at, 0, PER_ENTRY - 1)
+        if before is not None and before >= (peer, place):
+            raise ValueError("measurements out of order")
+        before = peer, place
+        yield place, read([a_n, a_n + to_b, *ends], peer)
 
 
 def _fits_short(values: Iterable[int]) -> bool:
     return all(-SHORT - 1 <= value <= SHORT for value in values)
 
 
-def _range(row: list[int], peers: list[Chain]) -> Any:
-    _, peer, a_n, b_n, qa0, qa1, qb0, qb1, metres, sigma, turn_a, turn_b = row
+def _range(row: list[int], peer: Chain) -> RangeMeasurement:
+    a_n, b_n, qa0, qa1, qb0, qb1, metres, sigma, turn_a, turn_b = row
     if not _fits_short((qa0, qa1, qb0, qb1, sigma, turn_a, turn_b)):
         raise ValueError("range beyond its 16 bits")
     return read_range(
         SimpleNamespace(
             a_n=a_n,
-            peer=peer,
+            peer=0,
             b_n=b_n,
             qa=(qa0, qa1),
             qb=(qb0, qb1),
@@ -214,18 +222,18 @@ def _range(row: list[int], peers: list[Chain]) -> Any:
             sigma=sigma,
             turn=(turn_a, turn_b),
         ),
-        peers,
+        [peer],
     )
 
 
-def _closure(row: list[int], peers: list[Chain]) -> Any:
-    _, peer, a_n, b_n, number, kept, x, y, theta, *rest = row
+def _closure(row: list[int], peer: Chain) -> ClosureMeasurement:
+    a_n, b_n, number, kept, x, y, theta, *rest = row
     return read_closure(
         SimpleNamespace(
             number=number,
             kept=kept,
             a_n=a_n,
-            peer=peer,
+            peer=0,
             b_n=b_n,
             x=x,
             y=y,
@@ -233,5 +241,5 @@ def _closure(row: list[int], peers: list[Chain]) -> Any:
             covariance=np.array(rest[4:], dtype="<i4").view("<f4").tolist(),
             corrected=rest[:4],
         ),
-        peers,
+        [peer],
     )

@@ -1,11 +1,12 @@
-"""A robot makes chapters of its own log: of 64 entries one, in as many messages as it takes."""
+"""A robot makes chapters of its own log: of 256 entries one, in as many messages as it takes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
 from drslamd.conventions import Chain
-from drslamd.gossip.entries.chapter_packing import packed
+from drslamd.gossip.entries.chapter_packing import numbers_in, packed
+from drslamd.gossip.entries.number_tables import MAX_NUMBERS
 from drslamd.gossip.lc02 import MAX_PAYLOAD
 from drslamd.gossip.message_types import LogState
 from drslamd.slam.graph.chapters import SPAN, Layer, Sorter, part
@@ -14,8 +15,10 @@ from drslamd.slam.graph.measurements import Chapter, GraphEntry
 ENVELOPE_BYTES = 64
 """What a graph_t needs besides what it packs."""
 FEWEST = 16
-"""Entries of which a chapter is made early when somebody lacks them: it has a third of their
+"""Entries of which a chapter is made early when somebody lacks them: it has a fifth of their
 bytes."""
+MOST_MEASUREMENTS = 1_280
+"""Of which a chapter is made early: 64 full entries, 30 parts of noise at most."""
 NOT_LAST = (0, 0, 0)
 
 
@@ -25,12 +28,15 @@ class ChapterWriter:
     def __init__(self) -> None:
         self._entries: list[GraphEntry] = []
         self._sorter = Sorter()
+        self._measurements = 0
+        """In these entries."""
         self._is_asked = False
 
     def take(self, entry: GraphEntry) -> None:
         """An entry that was said, in order."""
         if entry.chapter is None:
             self._entries.append(entry)
+            self._measurements += len(entry.keyframes) + len(entry.ranges) + len(entry.closures)
 
     def on_states(self, own: Chain, states: Iterable[LogState]) -> None:
         """A peer says how much of our log it has."""
@@ -49,10 +55,11 @@ class ChapterWriter:
         Their layers come in the order in which they cease to count; the last one says how many
         there are.
         """
-        if len(self._entries) < (FEWEST if self._is_asked else SPAN):
+        is_full = self._measurements >= MOST_MEASUREMENTS
+        if not is_full and len(self._entries) < (FEWEST if self._is_asked else SPAN):
             return []
         self._is_asked = False
-        entries, self._entries = self._entries, []
+        entries, self._entries, self._measurements = self._entries, [], 0
         first = entries[0].seq
         lasting, longer, rest = self._sorter.layers(entries)
         chapters: list[Chapter] = []
@@ -77,8 +84,9 @@ class ChapterWriter:
 
 def _pieces(layer: Layer, number: int, first: int) -> Iterator[Layer]:
     """A layer in pieces that each fit a message."""
-    size = len(packed(part(layer, number, first, NOT_LAST)))
-    if size <= MAX_PAYLOAD - ENVELOPE_BYTES:
+    chapter = part(layer, number, first, NOT_LAST)
+    is_short = numbers_in(chapter) <= MAX_NUMBERS
+    if is_short and len(packed(chapter)) <= MAX_PAYLOAD - ENVELOPE_BYTES:
         yield layer
         return
     for half in layer.halves():

@@ -8,6 +8,7 @@ from drslamd.events import ChannelMessage, Datagram
 from drslamd.gossip import lc02, messages
 from drslamd.gossip.messages import Message
 from drslamd.gossip.seal import Header, Seal, SealFault, header_of
+from drslamd.slam.graph.measurements import GraphEntry
 
 _FINGERPRINTS = {kind: frozenset([value]) for kind, value in messages.FINGERPRINTS.items()}
 _OF_ANOTHER_START = (SealFault.OLD_EPOCH, SealFault.OWN_ID_USED)
@@ -62,6 +63,20 @@ def opened(seal: Seal, event: Datagram | ChannelMessage) -> Outcome:
     if channel != messages.channel(kind, verdict.origin):
         return "channel of another robot"
     return Opened(verdict, message, payload, fault)
+
+
+def entry_of(event: Datagram | ChannelMessage) -> tuple[GraphEntry, bytes] | None:
+    """The entry of a log that it says it is, and as it was sealed; nothing of it is proven."""
+    if isinstance(event, Datagram):
+        framed = lc02.decode(event.data)
+        if isinstance(framed, lc02.FramingFault):
+            return None
+        channel, payload = framed
+    else:
+        channel, payload = event.channel, event.payload
+    is_entry = messages.kind_of_channel(channel) == "GRAPH"
+    entry = messages.decode("GRAPH", payload) if is_entry else None
+    return (entry, payload) if isinstance(entry, GraphEntry) else None
 
 
 def is_news_of_a_member(seal: Seal, data: bytes) -> bool:

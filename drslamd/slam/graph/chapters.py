@@ -31,15 +31,19 @@ from drslamd.slam.robot_model import RobotModel
 
 PER_ENTRY = 4_096
 """Above the number of measurements that any one entry of a log can hold."""
-SPAN = 64
-"""Entries of which one chapter is made: a minute."""
+SPAN = 256
+"""Entries of which one chapter is made: four minutes. Shorter ones have more bytes: each message
+has a hundred of its own, and each column of numbers two."""
 COUNTS_FOR = (1 << 31, 2_688, 704)
 """Entries after which each layer counts no more: cells of time are 256 s long after forty minutes,
 16 s after ten (`thinning.time_cells`), and there may be a little more than one entry a second."""
 RAW = len(COUNTS_FOR) - 1
 """Layer of what no chapter has said yet."""
+MINUTE, QUARTER = 64, 16
+"""Entries of which few last, and of which few more count for forty minutes."""
 FEW_RANGES = (1, 4)
-"""Of one pair: so many last of a span, so many more of a quarter of it count for forty minutes."""
+"""Of one pair: so many of a minute last, so many more of a quarter of it count for forty
+minutes."""
 FEW_CLOSURES = (1, 2)
 """The same of closures."""
 GOLDEN = 2_654_435_769
@@ -114,27 +118,27 @@ class Sorter:
                 self._told[seen.peer] = max(seen.number, highest)
                 is_first = seen.kept and seen.number > highest
                 (first_words if is_first else out[0].closures).append((start + k, seen))
-        quarter = max(1, len(entries) // 4)
         begin = entries[0].seq
-
-        def place(placed: Placed[Item]) -> int:
-            return (placed[0] // PER_ENTRY - begin) // quarter
-
-        for layer, few in zip(out, _layered(ranges, FEW_RANGES, place), strict=True):
+        for layer, few in zip(out, _layered(ranges, FEW_RANGES, begin), strict=True):
             layer.ranges += few
-        for layer, fewer in zip(out, _layered(first_words, FEW_CLOSURES, place), strict=True):
+        for layer, fewer in zip(out, _layered(first_words, FEW_CLOSURES, begin), strict=True):
             layer.closures += fewer
         return out
 
 
 def _layered(
-    items: list[Placed[Item]], few: tuple[int, int], quarter: Callable[[Placed[Item]], int]
+    items: list[Placed[Item]], few: tuple[int, int], begin: int
 ) -> list[list[Placed[Item]]]:
+    """Items of a chapter that begins with entry `begin`, by the layer that says them."""
+
+    def stretch(placed: Placed[Item], entries: int) -> tuple[Chain, int]:
+        return placed[1].peer, (placed[0] // PER_ENTRY - begin) // entries
+
     ranked = sorted(items, key=_rank)
-    lasting = _first_of_each(ranked, few[0], lambda placed: placed[1].peer)
+    lasting = _first_of_each(ranked, few[0], lambda placed: stretch(placed, MINUTE))
     taken = {place for place, _ in lasting}
     rest = [placed for placed in ranked if placed[0] not in taken]
-    longer = _first_of_each(rest, few[1], lambda placed: (placed[1].peer, quarter(placed)))
+    longer = _first_of_each(rest, few[1], lambda placed: stretch(placed, QUARTER))
     taken |= {place for place, _ in longer}
     return [lasting, longer, [placed for placed in rest if placed[0] not in taken]]
 

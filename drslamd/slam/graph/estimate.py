@@ -124,7 +124,7 @@ class TeamEstimate:
     nodes: dict[int, Trajectory] = field(default_factory=dict)
     points: frozenset[int] = frozenset()
     is_as_modelled: bool = True
-    kept: object = field(default=None, repr=False)
+    kept: object = field(default=None, repr=False, compare=False)
 
     @property
     def is_final(self) -> bool:

@@ -52,6 +52,12 @@ class PoseGraph:
             self._view = self._thinning.view(self.chains, self.nodes, self.usable())
         return self._view
 
+    def frozen(self) -> PoseGraph:
+        """The view as it is now and nothing else, for a thread that is not ours."""
+        still = PoseGraph()
+        still._view = self.view
+        return still
+
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
         """Take one entry of a robot's log."""
         self._view = None

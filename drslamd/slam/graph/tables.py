@@ -37,6 +37,11 @@ class KeyframeTable:
         """(k,) ascending."""
         return self.rows[:, 1].astype(np.int64)
 
+    @cached_property
+    def is_one_segment(self) -> bool:
+        """Segments ascend, so the first and the last tell."""
+        return len(self) > 0 and bool(self.rows[0, 1] == self.rows[-1, 1])
+
     @property
     def poses(self) -> Array:
         """(k, 3) o_T_k, m and rad."""

@@ -92,7 +92,13 @@ def joints(graph: PoseGraph) -> list[Joint]:
     """Segments that are joined by closures whose both keyframes are held."""
     out = []
     for pair in graph.view.pairs:
+        if not len(pair.closures):
+            continue
         a, b = (graph.view.chains[chain.robot].keyframes for chain in (pair.a, pair.b))
+        if a.is_one_segment and b.is_one_segment:
+            one, other = int(a.rows[0, 1]), int(b.rows[0, 1])
+            out.append(Joint(Segment(*pair.a, one), Segment(*pair.b, other), pair.closures))
+            continue
         at_a, _ = a.find(pair.closures.a_n)
         at_b, _ = b.find(pair.closures.b_n)
         ends = np.stack([a.segment[at_a], b.segment[at_b]], axis=-1)

@@ -12,7 +12,13 @@ from drslamd.conventions import Segment
 from drslamd.slam.graph import standing_points, team_frame
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.pose_graph import PoseGraph
-from drslamd.slam.graph.tables import CLOSURE_COLUMNS, RANGE_COLUMNS, ClosureTable, RangeTable
+from drslamd.slam.graph.tables import (
+    CLOSURE_COLUMNS,
+    RANGE_COLUMNS,
+    ClosureTable,
+    RangeTable,
+    positions,
+)
 from drslamd.slam.graph.team_frame import NO_CORRECTIONS, Group
 from drslamd.slam.graph.thinning.chain_view import ChainView
 from drslamd.slam.graph.thinning.pair_view import PairView
@@ -33,6 +39,8 @@ LINK_FLOOR_RAD = 5e-4
 """Likewise of angles."""
 FAR = 128
 """So many poses lie between the ends of a factor that joins different times."""
+FAR_APART = 2**42
+"""Between the numbers by which keyframes of two robots are looked for; no robot has so many."""
 STANDING = 64
 """So many poses may have such factors: those of robots that stood while the others drove on. What
 is beyond is nonsense, and would make the team's problem too wide to be solved."""
@@ -179,38 +187,37 @@ def chain_links(chain: ChainView, calibrated: bool) -> BetweenFactors:
 
 def closures(graph: PoseGraph, numbers: Numbering) -> BetweenFactors:
     """All kept closures between numbered poses."""
-    ends, tables = [np.zeros((2, 0), dtype=np.int64)], [np.zeros((0, CLOSURE_COLUMNS))]
-    for pair in graph.view.pairs:
-        both = _ends(graph, numbers, pair, pair.closures.a_n, pair.closures.b_n)
-        used = (both >= 0).all(axis=0)
-        ends.append(both[:, used])
-        tables.append(pair.closures.rows[used])
-    i, j = np.concatenate(ends, axis=1)
-    table = ClosureTable(np.concatenate(tables))
+    pairs = graph.view.pairs
+    rows = [np.zeros((0, CLOSURE_COLUMNS)), *(pair.closures.rows for pair in pairs)]
+    table = ClosureTable(np.concatenate(rows))
+    of_pair = _of_pairs([len(pair.closures) for pair in pairs])
+    ends = _ends(numbers, pairs, of_pair, table.a_n, table.b_n)
+    used = np.asarray((ends >= 0).all(axis=0))
+    i, j = ends[:, used]
+    table = table.chosen(used)
     return BetweenFactors(i, j, table.a_T_b, table.covariance)
 
 
 def ranges(graph: PoseGraph, numbers: Numbering) -> tuple[RangeFactors, list[tuple[int, int]]]:
     """All ranges between numbered poses, and the pairs of robots that `pair` numbers."""
     number = {robot: k for k, robot in enumerate(sorted(numbers.place))}
-    found: list[tuple[PairView, Index, NDArray[np.bool_]]] = []
-    for pair in graph.view.pairs:
-        ends = _ends(graph, numbers, pair, pair.ranges.a_n, pair.ranges.b_n)
-        used = np.asarray((ends >= 0).all(axis=0))
-        if used.any():
-            found.append((pair, ends[:, used], used))
-    names = sorted({_name(pair) for pair, _, _ in found})
-    none = np.zeros((2, 0), dtype=np.int64)
-    i, j = np.concatenate([none, *(ends for _, ends, _ in found)], axis=1)
-    rows = [pair.ranges.rows[used] for pair, _, used in found]
-    table = RangeTable(np.concatenate([np.zeros((0, RANGE_COLUMNS)), *rows]))
-    each = [np.full(len(part), k) for k, part in enumerate(rows)]
-    which = np.concatenate([none[0], *each])
-    robots = np.array(
-        [(number[p.a.robot], number[p.b.robot]) for p, _, _ in found], dtype=np.int64
-    ).reshape(-1, 2)
-    moves = np.concatenate([np.zeros((0, 2, 2, 2)), *(p.moves[used] for p, _, used in found)])
-    carried = np.flatnonzero(moves.any(axis=(1, 2, 3)))
+    pairs = [p for p in graph.view.pairs if p.a.robot in number and p.b.robot in number]
+    rows = [np.zeros((0, RANGE_COLUMNS)), *(pair.ranges.rows for pair in pairs)]
+    table = RangeTable(np.concatenate(rows))
+    of_pair = _of_pairs([len(pair.ranges) for pair in pairs])
+    ends = _ends(numbers, pairs, of_pair, table.a_n, table.b_n)
+    used = np.asarray((ends >= 0).all(axis=0))
+    (i, j), table, of_pair = ends[:, used], table.chosen(used), of_pair[used]
+    moves = np.concatenate([np.zeros((0, 2, 2, 2)), *(pair.moves for pair in pairs)])[used]
+    there = np.unique(of_pair)
+    names = sorted({_name(pairs[k]) for k in there.tolist()})
+    place = {name: k for k, name in enumerate(names)}
+    robots = np.zeros((len(pairs), 2), dtype=np.int64)
+    named = np.zeros(len(pairs), dtype=np.int64)
+    for k in there.tolist():
+        robots[k] = number[pairs[k].a.robot], number[pairs[k].b.robot]
+        named[k] = place[_name(pairs[k])]
+    carried = np.flatnonzero(moves.reshape(-1, 8).any(axis=1))
     factors = RangeFactors(
         i=i,
         j=j,
@@ -218,12 +225,17 @@ def ranges(graph: PoseGraph, numbers: Numbering) -> tuple[RangeFactors, list[tup
         q_j=table.q_b,
         measured=table.range_m,
         sigma=table.sigma_m,
-        robots=robots[which],
+        robots=robots[of_pair],
         turned=np.stack([table.turn_a, table.turn_b], axis=-1),
-        pair=np.array([names.index(_name(pair)) for pair, _, _ in found], dtype=np.int64)[which],
+        pair=named[of_pair],
         carried=CarriedEnds(carried, moves[carried]),
     )
     return factors, names
+
+
+def _of_pairs(counts: list[int]) -> Index:
+    """(m,) to which pair each measurement belongs."""
+    return np.repeat(np.arange(len(counts)), np.array(counts, dtype=np.int64))
 
 
 def sensible(i: Index, j: Index) -> NDArray[np.bool_]:
@@ -238,7 +250,22 @@ def _name(pair: PairView) -> tuple[int, int]:
     return low, high
 
 
-def _ends(graph: PoseGraph, numbers: Numbering, pair: PairView, a_n: Array, b_n: Array) -> Index:
-    """(2, m) places of the keyframes of both robots of a pair."""
-    a, b = graph.view.chains[pair.a.robot], graph.view.chains[pair.b.robot]
-    return np.stack([numbers.of(a, a_n), numbers.of(b, b_n)])
+def _ends(
+    numbers: Numbering, pairs: list[PairView], of_pair: Index, a_n: Array, b_n: Array
+) -> Index:
+    """(2, m) places of the keyframes of both robots of each measurement, -1 where there is none.
+
+    Args:
+        of_pair: (m,) which of the pairs measured it.
+    """
+    keys = numbers.robot * FAR_APART + numbers.n.astype(np.int64)
+    order = np.argsort(keys)
+    ascending = keys[order]
+    out = np.full((2, len(of_pair)), -1)
+    for end, (robots, n) in enumerate(
+        (([p.a.robot for p in pairs], a_n), ([p.b.robot for p in pairs], b_n))
+    ):
+        wanted = np.array(robots, dtype=np.int64)[of_pair] * FAR_APART + n.astype(np.int64)
+        at, there = positions(ascending, wanted)
+        out[end, there] = order[at[there]]
+    return out

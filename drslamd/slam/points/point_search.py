@@ -101,6 +101,10 @@ def search(
     is_poor = not first.chi2 <= POOR_FIT * len(seen) or problem.share_off(first.place) > MOST_OFF
     if is_poor:
         return PlaceFound((), "it moves, or ranges and odometry disagree")
+    # a burst that is taken for a slow error can speak for a wrong place, but not in both costs
+    robust = _place(problem.descended(np.append(first.place, 0.0)[None])[0])
+    if np.hypot(*(robust - x[0, :2])) > MERGE_M:
+        return PlaceFound(tuple(judged[:2]), "ambiguous")
     left = tuple(one for one in judged if one.chi2 < first.chi2 + EXCLUDED_CHI2)
     if len(left) > 1:
         return PlaceFound(left, "ambiguous")
@@ -180,9 +184,8 @@ class _Problem:
         """(k, k) of the residuals."""
         moment = moments(self._points[None], u[None, None])
         lower = odometry_covariance(self._twists[None], moment, self._all)[0]
-        beyond = np.maximum(
-            e**2 - (self._model.cauchy_sigmas * np.hypot(self._sigma, self._bias)) ** 2, 0
-        )
+        around = e - np.median(e)
+        beyond = np.maximum(around**2 - (self._model.cauchy_sigmas * self._sigma) ** 2, 0.0)
         both = np.tril(lower) + np.tril(lower, -1).T
         return np.asarray(both + self._of_ranges + np.diag(beyond))
 

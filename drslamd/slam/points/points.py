@@ -95,11 +95,19 @@ class Points:
                 # it has driven to another place; what was told of the old one stays true
                 self._let_go += known.tell()
                 del self.trackers[uwb_id]
+            if uwb_id not in self.trackers and len(self.trackers) >= MOST:
+                self._make_room(targets)
             if uwb_id not in self.trackers and len(self.trackers) < MOST:
                 self.trackers[uwb_id] = PointTracker(target, self._sensors)
         for uwb_id in [u for u in self.trackers if u not in targets]:
             if self.trackers[uwb_id].told is None:
                 del self.trackers[uwb_id]
+
+    def _make_room(self, heard: Mapping[int, Target]) -> None:
+        """Forget one that is not heard; what was told of it stays told."""
+        away = next((uwb_id for uwb_id in self.trackers if uwb_id not in heard), None)
+        if away is not None:
+            self._let_go += self.trackers.pop(away).tell()
 
     def on_found(
         self,

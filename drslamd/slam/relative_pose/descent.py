@@ -25,6 +25,7 @@ HOPELESS = 5.0
 ranges count as correlated."""
 HOPELESS_CHI2 = 60.0
 """See `HOPELESS`."""
+FIRST_DAMPING = 1e-3
 LEAST_DAMPING = 1e-12
 """Relative to the diagonal: above rounding, so that no step meets a singular matrix however little
 a window says."""
@@ -100,14 +101,15 @@ class Descent:
             noises: of the ranges of each window.
             of: (k,) the window of each seed, ascending; where there is only one nobody need say so.
         """
-        self._of = np.zeros(len(seeds), dtype=np.int64) if of is None else of
+        k = len(seeds)
+        self._of = np.zeros(k, dtype=np.int64) if of is None else of
         self._fit = fit
         self._all_weights = _Weights.of(noises, model.huber_sigmas).rows(self._of)
-        self._at = np.arange(len(seeds))
+        self._at = np.arange(k)
         self._attend()
-        bias = np.zeros(len(seeds))
+        bias = np.zeros(k)
         cost, normal = _normal_equations(self._live_fit, seeds, bias, self._weights)
-        self._live = self._all = _State(seeds, bias, np.full(len(seeds), 1e-3), cost, normal)
+        self._live = self._all = _State(seeds, bias, np.zeros(k) + FIRST_DAMPING, cost, normal)
 
     def run(self, steps: int) -> None:
         """At most so many steps, until all that may still count are settled."""
@@ -156,6 +158,8 @@ class Descent:
             normal = np.where(better[:, None, None], normal, before.normal)
         damping = before.damping * np.where(better, 0.2, 8.0)
         self._live = _State(x, bias, damping, cost, normal)
+        if not settled.any():
+            return  # nor is the best of any window
         done = self._groups.where_all(settled | ~_may_count(cost, self._groups))
         if done.any():
             self._keep()
@@ -187,25 +191,24 @@ def _damped_step(normal: Array, damping: Array) -> tuple[Array, Array]:
     """Steps (k, 4), and (k,) what they promise to take off the cost: at most that much."""
     hessian, gradient = normal[:, :4, :4].copy(), normal[:, :4, 4:]
     hessian.reshape(-1, 16)[:, ::5] *= 1 + np.maximum(damping, LEAST_DAMPING)[:, None]
-    step = np.linalg.solve(hessian, gradient)[..., 0]
-    return -step, (step * gradient[..., 0]).sum(axis=1)
+    step = np.linalg.solve(hessian, gradient)
+    return -step[..., 0], (step.transpose(0, 2, 1) @ gradient)[:, 0, 0]
 
 
 def _normal_equations(
     fit: RangeFit, x: Array, bias: Array, weights: _Weights
 ) -> tuple[Array, Array]:
     """Huber's cost (k,), and (k, 5, 5): Gauss-Newton Hessian, gradient in the last column."""
-    _, rows = fit.linear(x)
-    e = rows[:, 4]
-    e += rows[:, 3] * bias[:, None]
-    weight = np.abs(e)
+    _, rows = fit.linear(x, bias)
+    weight = np.abs(rows[:, 4])
     np.maximum(weight, weights.beyond, out=weight)
     np.divide(weights.slope, weight, out=weight)
     weighted = rows * weight[:, None]
     normal = weighted @ rows.transpose(0, 2, 1)
     # e^2 within the threshold, 2 c |e| - c^2 beyond it
-    shrunk = weighted[:, 4]
-    cost = 2 * normal[:, 4, 4] - np.einsum("kn,kn->k", shrunk, shrunk) * weights.variance
+    shrunk = weighted[:, 4:]
+    square = (shrunk @ shrunk.transpose(0, 2, 1))[:, 0, 0]
+    cost = 2 * normal[:, 4, 4] - square * weights.variance
     cost += bias * bias * weights.prior
     normal[:, 3, 4] += bias * weights.prior
     normal[:, 3, 3] += weights.prior

@@ -161,8 +161,11 @@ class RangeFit:
         out[:, 0] -= 2 * (centred[:, 0] + centred[:, 1] * self._b[at] - self._a[at])
         return out
 
-    def linear(self, centred: Array) -> tuple[Array, Array]:
+    def linear(self, centred: Array, bias: Array | None = None) -> tuple[Array, Array]:
         """Equation (1) about centred poses.
+
+        Args:
+            bias: (k,) that predicted ranges are longer by, m.
 
         Returns:
             Unit lines of sight from a to b in frame a, complex (k, n); and (k, 5, n): derivatives
@@ -179,7 +182,7 @@ class RangeFit:
         np.multiply(turned, u.conj(), out=turned)
         rows[:, 2] = -turned.imag
         rows[:, 3] = 1.0
-        rows[:, 4] = e
+        rows[:, 4] = e if bias is None else e + bias[:, None]
         if self._held is not None:
             rows *= self._held[:, None]
             u *= self._held

@@ -2,7 +2,8 @@
 
     x_ab = argmin sum_i (r_i - | p_a,i - x_ab p_b,i |)^2                             eq. (1)
 
-All minima of the coarse search are refined together and judged under the full noise of the window.
+All minima of the coarse search are refined together, those of the windows of several pairs too, and
+judged under the full noise of their window.
 Every pose that the data cannot exclude is kept as a hypothesis. The paper's own version, one seed
 and white noise, is in `algorithm_1`.
 """
@@ -88,9 +89,12 @@ def solve_all(
     return answers
 
 
-def least_chi2(windows: Sequence[Window], noises: Sequence[PairNoise], delta: float) -> list[float]:
-    """How badly windows fit at their best: 2 log-likelihood, also where they are vague."""
-    found: list[float] = []
+def least_chi2(windows: Sequence[Window], noises: Sequence[PairNoise], delta: float) -> Array:
+    """(w,) how badly windows fit at their best: 2 log-likelihood, also where they are vague.
+
+    Infinite where nothing fits.
+    """
+    found = np.full(len(windows), np.inf)
     for first in range(0, len(windows), MOST_AT_ONCE):
         at_once = slice(first, first + MOST_AT_ONCE)
         stack = WindowStack.of(windows[at_once])
@@ -101,7 +105,7 @@ def least_chi2(windows: Sequence[Window], noises: Sequence[PairNoise], delta: fl
         noise, best = WindowNoise(stack, noises[at_once]), groups.starts
         best_groups = Groups(groups.of[best])
         refined = refine(fit, noise, minima.centred[best], best_groups, wants_vague=True)
-        found += refined.minima.chi2.tolist()
+        found[first + refined.groups.of] = refined.minima.chi2
     return found
 
 

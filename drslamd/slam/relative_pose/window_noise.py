@@ -65,14 +65,12 @@ def way_twists(
     cos, sin = antenna_sigma * np.cos(heading), antenna_sigma * np.sin(heading)
     out[:, 5, 0], out[:, 5, 1], out[:, 6, 0], out[:, 6, 1] = cos, sin, -sin, cos
     random = random_covariance(noise, forwards(way))
-    for row, packed in enumerate(_MATRIX):
-        for column, place in enumerate(packed):
-            out[:, row, column] = random[place]
-    for column, place in enumerate((1, 2, 0)):
-        out[:, 3, column] = noise.yaw_rad_per_m * way[place]
-        if noise.gyro is not None:  # (as if both constants went together: a little too careful)
+    out[:, :3] = random[_MATRIX].transpose(2, 0, 1, 3)
+    out[:, 3] = (noise.yaw_rad_per_m * way[[1, 2, 0]]).swapaxes(0, 1)
+    if noise.gyro is not None:  # (as if both constants went together: a little too careful)
+        for column, place in enumerate((1, 2, 0)):
             out[:, 3, column] += noise.gyro.yaw_rad_per_s * way[GYRO][place]
-    out[:, 4, :2] = (noise.scale * paths.transpose(2, 0, 1)).transpose(1, 0, 2)
+    out[:, 4, :2] = (noise.scale * paths.transpose(2, 0, 1)).swapaxes(0, 1)
     return out
 
 

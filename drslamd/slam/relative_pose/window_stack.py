@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +67,7 @@ class WindowStack:
         points: (2, w, n) their antennas, x + iy; 0 where there is no measurement.
         counts: (w,) measurements of each window.
         before: (w,) of them before the reference time, or at it.
+        held: (w, n) which places hold a measurement; None where all do.
         gyros: (2, w, 2) seconds after it from when and until when a gyro gave the heading.
     """
 
@@ -77,40 +77,37 @@ class WindowStack:
     points: Array
     counts: Index
     before: Index
+    held: NDArray[np.bool_] | None
     gyros: Array
 
     @staticmethod
     def of(windows: Sequence[Window]) -> WindowStack:
-        counts = np.array([len(window) for window in windows])
-        shape = len(windows), int(counts.max())
-        t, ranges, poses = np.zeros(shape), np.zeros(shape), np.zeros((2, *shape, 3))
-        for k, window in enumerate(windows):
-            n = len(window)
-            t[k, :n], ranges[k, :n] = window.t, window.ranges
-            poses[0, k, :n], poses[1, k, :n] = window.a_poses, window.b_poses
-        antennas = np.array([[w.a_antenna for w in windows], [w.b_antenna for w in windows]])
-        points = np.exp(1j * poses[..., 2]) * (antennas @ [1, 1j])[..., None]
-        points += poses[..., 0] + 1j * poses[..., 1]
-        points *= np.arange(shape[1]) < counts[:, None]
+        counts = np.array([len(window.t) for window in windows])
+        n = int(counts.max())
+        held = None if (counts == n).all() else np.arange(n) < counts[:, None]
+        t, ranges, a, b = (
+            _filled([getattr(window, name) for window in windows], n, held)
+            for name in ("t", "ranges", "a_poses", "b_poses")
+        )
+        poses = np.array((a, b))
+        antennas = [[complex(*w.a_antenna), complex(*w.b_antenna)] for w in windows]
+        points = np.exp(1j * poses[..., 2])
+        points *= np.array(antennas).T[..., None]
+        points.real += poses[..., 0]
+        points.imag += poses[..., 1]
+        if held is not None:
+            points *= held
         before = np.array([window.before for window in windows])
         gyros = np.array([[w.a_gyro for w in windows], [w.b_gyro for w in windows]])
-        return WindowStack(t, ranges, poses, points, counts, before, gyros)
-
-    @cached_property
-    def held(self) -> NDArray[np.bool_] | None:
-        """(w, n) which places hold a measurement; None where all do."""
-        if (self.counts == self.t.shape[1]).all():
-            return None
-        return np.asarray(np.arange(self.t.shape[1]) < self.counts[:, None])
+        return WindowStack(t, ranges, poses, points, counts, before, held, gyros)
 
     @property
     def latest_ranges(self) -> Array:
         """(w,) the middle of the three ranges of each window that are nearest to its reference
         time; of the two, or the only one, where there are no three."""
         since = np.abs(self.t) if self.held is None else np.where(self.held, np.abs(self.t), np.inf)
-        nearest = np.argsort(since, axis=1, kind="stable")[:, :3]
-        three = np.take_along_axis(self.ranges, nearest, axis=1)
-        return middle(three, np.minimum(self.counts, 3))
+        nearest = since.argsort(axis=1, kind="stable")[:, :3]
+        return middle(self.ranges[np.arange(len(since))[:, None], nearest], self.counts)
 
     @property
     def least_ranges(self) -> Array:
@@ -120,10 +117,20 @@ class WindowStack:
         return np.asarray(np.where(self.held, self.ranges, np.inf).min(axis=1))
 
 
+def _filled(rows: Sequence[Array], n: int, held: NDArray[np.bool_] | None) -> Array:
+    """(w, n, ...) zeros where there is nothing."""
+    if held is None:
+        return np.array(rows)
+    filled = np.zeros((len(rows), n, *rows[0].shape[1:]))
+    for place, row in zip(filled, rows, strict=True):
+        place[: len(row)] = row
+    return filled
+
+
 def middle(values: Array, counts: Index) -> Array:
-    """(k,) medians of the first `counts` (k,) of values (k, n)."""
+    """(k,) medians of the first `counts` (k,) of values (k, n), or of all if there are no more."""
     n = values.shape[1]
-    if (counts == n).all():
+    if (counts >= n).all():
         ordered = np.sort(values, axis=1)
         return np.asarray((ordered[:, (n - 1) // 2] + ordered[:, n // 2]) / 2)
     ordered = np.sort(np.where(np.arange(n) < counts[:, None], values, np.inf), axis=1)

@@ -136,7 +136,9 @@ def _state(seen: RobotSeen) -> list[str]:
 
 def _lacking(status: Status | None) -> int:
     """Log entries that it has heard of and does not hold."""
-    return sum(log.newest - log.complete for log in status.logs) if status else 0
+    # (the first row of a log says where its first gap is)
+    first_rows = {log.id: log for log in reversed(status.logs)} if status else {}
+    return sum(log.newest - log.complete for log in first_rows.values())
 
 
 def names(robots: list[int]) -> str:

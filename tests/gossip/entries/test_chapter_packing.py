@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import random
-import zlib
 from dataclasses import replace
 
 import pytest
 from message_builders import CORRECTED, COVARIANCE
 
 from drslamd.conventions import Chain, node_chain
-from drslamd.gossip.entries import chapter_packing
-from drslamd.gossip.entries.chapter_packing import packed, unpacked
+from drslamd.gossip.entries import number_tables
+from drslamd.gossip.entries.chapter_packing import numbers_in, packed, unpacked
 from drslamd.slam.graph.measurements import (
     Chapter,
     ClosureMeasurement,
@@ -77,8 +76,8 @@ def test_what_came_back_is_packed_to_the_same_bytes() -> None:
     assert packed(unpacked(packed(SAMPLE), SEQ)) == packed(SAMPLE)
 
 
-@pytest.mark.parametrize(("seq", "fits"), [(3 + 256, True), (3 + 257, False), (2, False)])
-def test_a_chapter_ends_within_256_entries_of_its_first(seq: int, fits: bool) -> None:
+@pytest.mark.parametrize(("seq", "fits"), [(3 + 512, True), (3 + 513, False), (2, False)])
+def test_a_chapter_ends_within_512_entries_of_its_first(seq: int, fits: bool) -> None:
     data = packed(Chapter(2, 3, (0, 0, 0)))
     if fits:
         assert unpacked(data, seq)
@@ -98,8 +97,9 @@ def test_a_chapter_ends_within_256_entries_of_its_first(seq: int, fits: bool) ->
         replace(SAMPLE, models=((2, UNTOLD),)),
         replace(SAMPLE, models=((71, UNTOLD),)),
         replace(SAMPLE, ranges=((place(2, 4095), ranged(40, A, 3.5)),)),
+        replace(SAMPLE, ranges=((place(3, -1), ranged(40, A, 3.5)),)),
         replace(SAMPLE, ranges=((place(71), ranged(40, A, 3.5)),)),
-        replace(SAMPLE, ranges=SAMPLE.ranges[::-1]),
+        replace(SAMPLE, ranges=SAMPLE.ranges[1::-1]),
         replace(SAMPLE, ranges=SAMPLE.ranges[:1] * 2),
         replace(SAMPLE, ranges=((place(5), ranged(-1, A, 3.5)),)),
         replace(SAMPLE, ranges=((place(5), ranged(40, A, 10_000.5)),)),
@@ -118,38 +118,54 @@ def test_the_largest_number_of_parts_is_that_of_the_entries() -> None:
     assert unpacked(packed(replace(SAMPLE, parts=(60, 6, 1))), SEQ).parts == (60, 6, 1)
 
 
-def test_bytes_that_swell_or_end_elsewhere_are_refused() -> None:
+def test_bytes_that_end_elsewhere_are_refused() -> None:
     data = packed(SAMPLE)
-    inside = zlib.decompress(data)
-    for wrong in (
-        b"",
-        data + b"x",
-        data[:-1],
-        zlib.compress(inside + b"x"),
-        zlib.compress(inside[:-1]),
-        zlib.compress(bytes(chapter_packing.MAX_UNPACKED + 1)),
-    ):
-        with pytest.raises(ValueError):
+    for wrong in (b"", data + b"x", *(data[:size] for size in range(len(data)))):
+        with pytest.raises((ValueError, IndexError)):
             unpacked(wrong, SEQ)
 
 
+def test_few_bytes_cannot_hold_many_numbers() -> None:
+    """Columns that step evenly cost nothing."""
+    said = Chapter(2, 3, (0, 0, 0), (), tuple(Keyframe(k, 0, 0, 0, 0) for k in range(3_277)))
+    assert numbers_in(said) == number_tables.MAX_NUMBERS + 1
+    assert len(packed(said)) < 100
+    with pytest.raises(ValueError, match="more than"):
+        unpacked(packed(said), SEQ)
+    fewer = replace(said, keyframes=said.keyframes[1:])
+    assert unpacked(packed(fewer), SEQ) == fewer
+
+
+def test_peers_are_named_in_order_and_have_something_said_of_them() -> None:
+    data = packed(SAMPLE)
+    head, peer = data[:14], [data[14:28], data[28:42]]
+    rest = data[42:]
+    assert head + b"".join(peer) + rest == data
+    swapped = head + peer[1] + peer[0] + rest
+    with pytest.raises(ValueError, match="out of order"):
+        unpacked(swapped, SEQ)
+    nothing = peer[1][:-4] + bytes(4)
+    with pytest.raises(ValueError, match="nothing is said"):
+        unpacked(head + peer[0] + nothing + rest, SEQ)
+
+
 def test_damaged_bytes_give_a_chapter_or_a_value_error_and_nothing_else() -> None:
-    chance, inside = random.Random(1), bytearray(zlib.decompress(packed(SAMPLE)))
+    chance, data = random.Random(1), packed(SAMPLE)
     read = 0
-    for _ in range(2_000):
-        damaged = bytearray(inside)
+    for _ in range(300):
+        damaged = bytearray(data)
         for _ in range(chance.randrange(1, 4)):
-            damaged[chance.randrange(len(damaged))] = chance.randrange(256)
+            damaged[chance.randrange(len(damaged))] ^= 1 << chance.randrange(8)
         try:
-            found = unpacked(zlib.compress(bytes(damaged)), SEQ)
+            found = unpacked(bytes(damaged), SEQ)
         except (ValueError, IndexError):
             continue
         read += 1
         assert packed(unpacked(packed(found), SEQ)) == packed(found)
-    assert read > 20
+    assert read >= 5
 
 
-def test_a_minute_of_driving_has_a_sixth_of_the_bytes_of_its_entries() -> None:
+def test_a_minute_of_driving_has_an_eighth_of_the_bytes_of_its_entries() -> None:
     """As 60 entries: 70 bytes of each, and 54 for each of two ranges."""
     chance = random.Random(2)
     frames, ranges = list[Keyframe](), list[Placed[RangeMeasurement]]()
@@ -161,13 +177,13 @@ def test_a_minute_of_driving_has_a_sixth_of_the_bytes_of_its_entries() -> None:
         ranges += [(place(k, at), ranged(10 * k, peer, near)) for at, peer in enumerate((A, B))]
     ordered = tuple(sorted(ranges, key=lambda placed: (placed[1].peer, placed[0])))
     chapter = Chapter(2, 0, (0, 0, 0), (), tuple(frames), ordered)
-    assert len(packed(chapter)) < 60 * (70 + 2 * 27 + 20) / 6
+    assert len(packed(chapter)) < 60 * (70 + 2 * 54) / 15
 
 
 def test_a_model_with_a_number_of_traits_that_none_has_is_refused() -> None:
-    data = bytearray(zlib.decompress(packed(Chapter(2, 3, (0, 0, 0), ((5, UNTOLD),)))))
+    data = bytearray(packed(Chapter(2, 3, (0, 0, 0), ((5, UNTOLD),))))
     at = data.index((5).to_bytes(4, "big") + b"\x08") + 4
     for count in (-1 & 0xFF, 7, 15):
         data[at] = count
         with pytest.raises(ValueError, match="traits"):
-            unpacked(zlib.compress(bytes(data)), SEQ)
+            unpacked(bytes(data), SEQ)

@@ -34,8 +34,8 @@ def written(entries: list[GraphEntry]) -> list[GraphEntry]:
     return writer.due(len(entries))
 
 
-@pytest.mark.parametrize(("count", "is_due"), [(63, False), (64, True)])
-def test_a_chapter_is_made_of_64_entries(count: int, is_due: bool) -> None:
+@pytest.mark.parametrize(("count", "is_due"), [(255, False), (256, True)])
+def test_a_chapter_is_made_of_256_entries(count: int, is_due: bool) -> None:
     assert bool(written([an_entry(k, 10 * k) for k in range(count)])) is is_due
 
 
@@ -54,37 +54,43 @@ def test_a_chapter_is_made_early_when_somebody_lacks_sixteen_entries(
 
 
 def test_a_chapter_says_all_keyframes_and_its_last_part_says_of_how_many_it_is_made() -> None:
-    said = written([busy(k, 12) for k in range(64)])
+    said = written([busy(k, 4) for k in range(256)])
     chapters = [entry.chapter for entry in said if entry.chapter]
-    assert [entry.seq for entry in said] == list(range(64, 64 + len(said)))
+    assert [entry.seq for entry in said] == list(range(256, 256 + len(said)))
     layers = [chapter.layer for chapter in chapters]
     assert layers == sorted(layers, reverse=True)
     assert [any(chapter.parts) for chapter in chapters] == [False] * (len(said) - 1) + [True]
     assert chapters[-1].parts == tuple(layers.count(layer) for layer in (2, 1, 0))
     assert all(chapter.first == 0 for chapter in chapters)
     frames = sorted(k.n for chapter in chapters for k in chapter.keyframes)
-    assert frames == [10 * k for k in range(64)]
+    assert frames == [10 * k for k in range(256)]
     places = [place for chapter in chapters for place, _ in chapter.ranges]
-    assert sorted(places) == [4096 * k + at for k in range(64) for at in range(12)]
+    assert sorted(places) == [4096 * k + at for k in range(256) for at in range(4)]
 
 
 def test_each_part_fits_a_message() -> None:
-    said = written([busy(k, 20) for k in range(64)])
+    said = written([busy(k, 19) for k in range(64)])
     assert len(said) > 5
     assert all(len(messages.encode(HEADER, entry)) <= MAX_PAYLOAD for entry in said)
 
 
+@pytest.mark.parametrize(("count", "is_due"), [(63, False), (64, True)])
+def test_a_chapter_is_made_of_fewer_entries_when_they_say_much(count: int, is_due: bool) -> None:
+    """1,280 measurements, a keyframe and 19 ranges in each entry."""
+    assert bool(written([busy(k, 19) for k in range(count)])) is is_due
+
+
 def test_robots_that_range_to_nobody_write_one_part() -> None:
-    (entry,) = written([an_entry(k, 10 * k) for k in range(64)])
+    (entry,) = written([an_entry(k, 10 * k) for k in range(256)])
     assert entry.chapter is not None
     assert entry.chapter.parts == (0, 0, 1)
 
 
 def test_chapters_are_not_made_of_chapters() -> None:
     writer = ChapterWriter()
-    for entry in [busy(k, 3) for k in range(64)]:
+    for entry in [busy(k, 3) for k in range(256)]:
         writer.take(entry)
-    said = writer.due(64)
-    for entry in [*said, *(busy(k, 3) for k in range(64 + len(said), 127 + len(said)))]:
+    said = writer.due(256)
+    for entry in [*said, *(busy(k, 3) for k in range(256 + len(said), 511 + len(said)))]:
         writer.take(entry)
-    assert writer.due(200) == []
+    assert writer.due(600) == []

@@ -9,7 +9,7 @@ from message_builders import OTHER_SECRET, SECOND, a_seal, a_status, an_entry, f
 
 from drslamd.events import ChannelMessage, Datagram
 from drslamd.gossip import lc02
-from drslamd.gossip.envelopes.opening import Opened, is_news_of_a_member, opened
+from drslamd.gossip.envelopes.opening import Opened, entry_of, is_news_of_a_member, opened
 from drslamd.gossip.seal import Seal, SealFault, team_key
 
 T0 = 100 * SECOND
@@ -85,3 +85,17 @@ def test_what_is_proven_and_new_is_news_of_a_member() -> None:
         b"",
     )
     assert not any(is_news_of_a_member(seal, data) for data in others)
+
+
+def test_an_entry_is_read_without_proof_and_nothing_else_is() -> None:
+    channel, payload = sealed(a_seal(3, 5), an_entry(4, 40), T0)
+    for event in (
+        ChannelMessage(T0, channel, payload),
+        Datagram(T0, lc02.encode(7, channel, payload)),
+    ):
+        found = entry_of(event)
+        assert found is not None
+        assert (found[0].seq, found[1]) == (4, payload)
+    assert entry_of(Datagram(T0, b"no frame")) is None
+    assert entry_of(ChannelMessage(T0, channel, payload[:-1])) is None
+    assert entry_of(ChannelMessage(T0, *sealed(a_seal(3, 5), a_status(), T0))) is None

@@ -39,4 +39,7 @@ def test_its_row_is_the_median_beside_what_the_paper_says(
     (row,) = pipeline.rows(quick=True)
     assert row.unit == "ms"
     assert 0 < row.value < 1_000
-    assert [(peer.value, peer.here) for peer in row.peers] == [(81.0, False)]
+    here, paper = row.peers
+    assert (paper.value, paper.here) == (81.0, False)
+    assert here.here
+    assert row.is_met is (here.value >= 2.0 * row.value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 from lab.benchmark import rows
@@ -19,6 +20,16 @@ def test_a_row_meets_its_goal_or_not() -> None:
     assert row(5.0, unit="share").is_met
     assert not row(4.9, unit="share").is_met
     assert Row(1, "some", 3.0, "ms").is_met is None
+
+
+@pytest.mark.parametrize(("times", "met"), [(4.9, True), (5.1, False)])
+def test_a_goal_may_be_how_many_times_as_fast_as_a_peer_of_the_same_run(
+    times: float, met: bool
+) -> None:
+    wanted = replace(row(2.0), goal=None, times=times)
+    assert wanted.is_met is met
+    assert f"| {times} x {'✓' if met else 'MISSED'} |" in rows.markdown([wanted])
+    assert not replace(wanted, peers=wanted.peers[1:]).is_met
 
 
 def test_only_peers_of_the_same_run_give_a_ratio() -> None:

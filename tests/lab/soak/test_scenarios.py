@@ -7,19 +7,9 @@ from lab.soak.faults import FAULTS
 from lab.soak.run import run
 from lab.soak.scenarios import FEWEST, MIXED, MOST, SCENARIOS, mixed
 
-KNOWN = dict.fromkeys(
-    ("stuck", "spinning"),
-    pytest.mark.xfail(
-        reason="poses are called localised for 5 s while they are over a metre off", strict=False
-    ),
-)
-"""What the bench found and nobody has mended yet."""
-
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=KNOWN.get(name, ())) for name in SCENARIOS]
-)
+@pytest.mark.parametrize("name", list(SCENARIOS))
 def test_after_every_event_of_a_scenario_all_promises_are_kept(name: str) -> None:
     result = run(name, 1, journal=False)
     assert not result.fault, result.line

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import random
 import struct
+import time
 from typing import Any
 
 import pytest
@@ -288,3 +290,20 @@ def test_a_roboteq_that_refuses_has_its_own_sentence() -> None:
     for k in range(300):
         wheels.feed(b"-\r", T0 + k * 20 * MS)
     assert "refuses the query ?C" in (wheels.advice(T0 + 6 * SECOND_US) or "")
+
+
+@pytest.mark.row("D9")
+def test_a_full_bus_costs_less_than_a_third_of_a_core_and_no_odometry() -> None:
+    """8,000 frames a second, 50 of them odometry."""
+    wheels, draw = WheelInput(AgilexSection(source="agilex", track_m=0.5)), random.Random(1)
+    frames = []
+    for k in range(8_000):
+        utime, can_id, data = k * 125, draw.randrange(0x400, 0x800), draw.randbytes(8)
+        if k % 160 == 0:
+            can_id, data = 0x311, (k // 16).to_bytes(4, "big") * 2
+        frames.append(CanFrame(utime, can_id, False, data))
+    began, motions = time.process_time(), 0
+    for frame in frames:
+        motions += len(wheels.on_frame(frame))
+    assert time.process_time() - began < 1 / 3
+    assert motions == 8_000 // 160

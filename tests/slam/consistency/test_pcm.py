@@ -96,11 +96,9 @@ def drawn(rng: np.random.Generator, path: Array, i: int, k: int) -> Array:
     turn = bend * length + rng.normal(0, 1, k - i) * n.yaw_rad_per_sqrt_m * np.sqrt(length)
     shift = rng.normal(0, 1, (k - i, 2)) * n.translation_per_sqrt_m * np.sqrt(length)[:, None]
     heading = np.concatenate([[0], np.cumsum(step[:, 2] + turn)])
-    place = np.zeros(2)
-    for way, angle, half in zip(scale * step[:, :2] + shift, heading, turn / 2, strict=False):
-        cos, sin = np.cos(angle + half), np.sin(angle + half)
-        place = place + [cos * way[0] - sin * way[1], sin * way[0] + cos * way[1]]
-    return np.array([*place, heading[-1]])
+    way = (scale * step[:, :2] + shift) @ [1, 1j]
+    place = np.sum(np.exp(1j * (heading[:-1] + turn / 2)) * way)
+    return np.array([place.real, place.imag, heading[-1]])
 
 
 def test_closures_far_apart_in_time_may_differ_by_what_odometry_lost_between() -> None:

@@ -184,3 +184,13 @@ def test_the_small_team_of_the_other_tests_is_whole() -> None:
     team = small_team(0)
     assert len(team.graph.usable()) == 3 - 1 + 1
     assert all(len(items.keyframes.rows) == 40 for items in team.graph.chains.values())
+
+
+def test_a_frozen_graph_stays_as_it_was_whatever_comes() -> None:
+    entries = some_entries()
+    graph = graph_of(*entries[:-1])
+    still = graph.frozen()
+    before = still.digest(EVERYBODY)
+    assert before == graph.digest(EVERYBODY)
+    graph.insert(*entries[-1])
+    assert still.digest(EVERYBODY) == before != graph.digest(EVERYBODY)

@@ -133,6 +133,15 @@ def test_so_many_things_are_followed_and_no_more() -> None:
     assert robot.points.trackers == {}
 
 
+def test_who_drives_on_makes_room_for_what_is_heard_there() -> None:
+    robot = Robot()
+    robot.drive(45)
+    robot.targets = {k: Target(node_chain(k)) for k in range(100, 100 + MOST)}
+    robot.drive(1)
+    assert sorted(robot.points.trackers) == sorted(robot.targets)
+    assert robot.kept() == [(FIRST_NUMBER + 1, 0)]
+
+
 def test_what_is_told_is_remembered_while_it_is_not_heard() -> None:
     robot = Robot()
     robot.drive(45)

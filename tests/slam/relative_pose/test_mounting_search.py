@@ -29,14 +29,17 @@ from drslamd.slam.relative_pose.mounting_search import (
     QUICKLY_US,
     RECENT,
     SHARED,
+    STEADILY,
+    STEADY,
+    SURE_FIT,
     SURELY,
     UNLIKE,
     WRONG,
     MountingSearch,
+    against_backwards,
     is_as_configured,
     is_curve,
     is_learned,
-    is_surely_as_configured,
     winner,
 )
 from drslamd.slam.relative_pose.range_fit import POOR_FIT
@@ -392,26 +395,61 @@ def test_a_pair_that_waits_for_nothing_else_is_asked_about_every_window(
     assert not search.is_due(1_000 + apart_us, True)
 
 
-# one window that is sure
+# one window that is sure, or a few
 
 FREE = 30
 """Degrees of freedom of a window of 33 measurements."""
-ENOUGH = (LEVEL_FREEDOM + GOOD) * np.expm1(SURELY / (LEVEL_FREEDOM + FREE))
-"""Chi-squared by which wheels that run backwards must be worse."""
+BEST = 0.9 * SURE_FIT * FREE
+
+
+def excluding(by: float, place: int = 1, best: float = BEST) -> Array:
+    """A window with so much evidence against one kind of wheels that run backwards."""
+    worse = (LEVEL_FREEDOM + best) * np.expm1(by / (LEVEL_FREEDOM + FREE))
+    return costs({AS_IT_IS: best, CASES[place]: best + worse})
+
+
+def confirms(*windows: Array, is_told: bool = True) -> bool:
+    """Is a pair confirmed by these windows, asked quickly?"""
+    search = MountingSearch()
+    search.begin(0, True)
+    search.begin(QUICKLY_US, True)
+    for window in windows:
+        assert not search.on_costs(window, FREE + 3, is_told)
+    return search.is_confirmed
 
 
 @pytest.mark.parametrize("place", BACKWARDS)
-@pytest.mark.parametrize(("worse", "is_sure"), [(ENOUGH + LITTLE, True), (ENOUGH - LITTLE, False)])
+@pytest.mark.parametrize(("by", "is_sure"), [(SURELY + LITTLE, True), (SURELY - LITTLE, False)])
 def test_one_window_may_exclude_wheels_that_run_backwards(
-    place: int, worse: float, is_sure: bool
+    place: int, by: float, is_sure: bool
 ) -> None:
-    known = {AS_IT_IS: GOOD, CASES[place]: GOOD + worse}
-    assert is_surely_as_configured(costs(known), FREE) is is_sure
+    assert against_backwards(excluding(by, place), FREE) == pytest.approx(by)
+    assert confirms(excluding(by, place)) is is_sure
 
 
-@pytest.mark.parametrize("level", [(FITS - 0.001, True), (FITS + 0.001, False)])
-def test_a_window_that_does_not_fit_well_is_never_sure(level: tuple[float, bool]) -> None:
-    assert is_surely_as_configured(costs({AS_IT_IS: level[0] * FREE}), FREE) is level[1]
+@pytest.mark.parametrize(
+    ("by", "count", "is_sure"),
+    [
+        (STEADILY + LITTLE, STEADY, True),
+        (STEADILY + LITTLE, STEADY - 1, False),
+        (STEADILY - LITTLE, STEADY + 2, False),
+    ],
+)
+def test_so_may_a_few_in_a_row(by: float, count: int, is_sure: bool) -> None:
+    assert confirms(*[excluding(by)] * count) is is_sure
+
+
+def test_a_window_for_wheels_that_run_backwards_speaks_against_those_beside_it() -> None:
+    mirrored = costs({AS_IT_IS: 40.0, MIRROR: BEST})
+    assert against_backwards(mirrored, FREE) < -10
+    assert not confirms(mirrored, *[excluding(STEADILY + LITTLE)] * (STEADY - 1))
+
+
+@pytest.mark.parametrize(("level", "says"), [(SURE_FIT - LITTLE, 20.0), (SURE_FIT + LITTLE, 0.0)])
+def test_a_window_that_does_not_fit_well_is_never_sure(level: float, says: float) -> None:
+    found = against_backwards(excluding(20.0, best=level * FREE), FREE)
+    assert found == pytest.approx(says)
+    assert against_backwards(np.full(len(CASES), np.inf), FREE) == 0.0
 
 
 @pytest.mark.parametrize("case", [TRACK, SCALE, Case(a=CURVES[0])])
@@ -419,16 +457,12 @@ def test_a_window_that_does_not_fit_well_is_never_sure(level: tuple[float, bool]
 def test_nor_is_one_that_another_mistake_explains_better(
     case: Case, by: float, is_sure: bool
 ) -> None:
-    assert is_surely_as_configured(costs({AS_IT_IS: GOOD, case: GOOD - by}), FREE) is is_sure
+    assert confirms(costs({AS_IT_IS: BEST, case: BEST - by})) is is_sure
 
 
 @pytest.mark.parametrize("is_told", [True, False])
-def test_who_is_sure_of_one_window_is_confirmed_where_both_robots_drove(is_told: bool) -> None:
-    search = MountingSearch()
-    search.begin(0, True)
-    search.begin(QUICKLY_US, True)
-    assert not search.on_costs(costs({AS_IT_IS: GOOD}), FREE + 3, is_told)
-    assert search.is_confirmed is is_told
+def test_who_is_sure_is_confirmed_where_both_robots_drove(is_told: bool) -> None:
+    assert confirms(excluding(20.0), is_told=is_told) is is_told
 
 
 class Asked:
@@ -445,11 +479,11 @@ class Asked:
         return np.array([self.known.get(case, FAR) for case in cases])
 
 
-@pytest.mark.parametrize(("mirrored", "asked"), [(GOOD + 1, 6), (FAR, 6 + len(CASES))])
+@pytest.mark.parametrize(("mirrored", "asked"), [(BEST + 1, 6), (FAR, 6 + len(CASES))])
 def test_a_quick_question_is_whole_only_where_wheels_that_run_backwards_are_excluded(
     mirrored: float, asked: int
 ) -> None:
-    search, question = MountingSearch(), Asked({AS_IT_IS: GOOD, MIRROR: mirrored, TRACK: 1.0})
+    search, question = MountingSearch(), Asked({AS_IT_IS: BEST, MIRROR: mirrored, TRACK: 1.0})
     search.begin(0, True)
     search.begin(QUICKLY_US, True)
     found, way_m = search.question(cast(Any, question), cast(Any, None), 0.1)()

@@ -115,8 +115,9 @@ def measured(robots: int, after_s: int, seconds: int = SECONDS, paired: int | No
 
 def _compare(costs: Costs, job: Any, found: TeamEstimate) -> None:
     """Solve a second plainly, timed as it would be, then to the end."""
-    problem, group = job.args[:2]
+    numbers, graph, group, previous = job.args
     began = timing.now_ms()
+    problem = banded_optimizer.build_problem(graph, group, previous, numbers)
     banded_optimizer.solved(problem, group)
     costs.plain.append(timing.now_ms() - began)
     right = banded_optimizer.solved(problem, group, tolerance=SETTLED)

@@ -126,7 +126,7 @@ def _agreement(pool: list[Window]) -> tuple[float, float]:
         found = relaxed(window)
         tight.append(found.ratio < TIGHT)
         theirs = module1.polished(window, found.a_T_b)[1]
-        minima = module1.refined(window, solver.SEEDS)
+        minima = module1.refined([window], solver.SEEDS)[0]
         ours = min(module1.polished(window, pose)[1] for pose in minima)
         same.append(ours <= SAME_COST * theirs)
     return float(np.mean(tight)), float(np.mean(same))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from drslamd.gossip.message_types import PoseState
@@ -10,6 +12,7 @@ from drslamd.slam import se2
 from lab.play import virtual_team
 from lab.play.simulator import Member, Simulator
 from lab.recordings.recording import Array, Recording
+from lab.recordings.seat import on_axle
 from lab.reproduce.tally import Tally
 from lab.score import metrics
 from lab.score.claims import mahalanobis
@@ -35,6 +38,15 @@ def honesty(recording: Recording, seed: int) -> Tally:
             if look % LOOKS_HZ == 0 and near.state == PoseState.LOCALISED:
                 _add(tally, recording, simulator, robot, near)
     return tally
+
+
+def on_axles(recording: Recording) -> Recording:
+    """The same with true poses of what odometry speaks of, whatever frames motion capture gave."""
+    trails = {
+        robot: replace(trail, truth=on_axle(trail.t, trail.truth))
+        for robot, trail in recording.trails.items()
+    }
+    return replace(recording, trails=trails)
 
 
 def _speed(before: Near, after: Near) -> float:

@@ -103,19 +103,26 @@ class RealRobot:
     wheels: PseudoPort
     process: asyncio.subprocess.Process | None = None
     log: FilePath = field(default_factory=FilePath)
+    tree: FilePath | None = None
+    """A checkout of another version, whose daemon it is."""
 
     async def start(self) -> None:
         """Start the process with a clock of its own."""
+        path, module = sys.path, "lab.play.skewed_daemon"
+        if self.tree is not None:
+            path = [str(self.tree), str(self.tree / "tools")]
+            if not (self.tree / "tools/lab/play").is_dir():
+                module = "lab.skewed_daemon"  # where it was before there were rooms
         environment = {
             **os.environ,
             "OPENBLAS_NUM_THREADS": "1",
-            "PYTHONPATH": os.pathsep.join(sys.path),
+            "PYTHONPATH": os.pathsep.join(path),
         }
         with self.log.open("ab") as log:
-            program = (sys.executable, "-m", "lab.play.skewed_daemon")
+            program = (sys.executable, "-m", module)
             arguments = (str(self.config), str(self.clock.offset_us), str(self.clock.ppm))
             self.process = await asyncio.create_subprocess_exec(
-                *program, *arguments, stderr=log, env=environment
+                *program, *arguments, stderr=log, env=environment, cwd=self.tree
             )
 
     async def ready(self) -> None:
@@ -157,8 +164,13 @@ class RealTeam:
         hardware: dict[int, Hardware] | None = None,
         extra: str = "",
         seed: int = 0,
+        tree: FilePath | None = None,
     ) -> None:
-        self.recording = recording
+        """
+        Args:
+            tree: a checkout of another version, whose daemons these are.
+        """
+        self.recording, self._tree = recording, tree
         self._folder = tempfile.TemporaryDirectory(prefix="drslamd-team-")
         self.folder = FilePath(self._folder.name)
         self.port = free_port()
@@ -180,7 +192,8 @@ class RealTeam:
         config.write_text(
             robot_toml(hardware, str(uwb.name), str(wheels.name), gossip + daemon + extra)
         )
-        return RealRobot(hardware, clock, config, place / "socket", uwb, wheels, log=place / "log")
+        devices = (place / "socket", uwb, wheels)
+        return RealRobot(hardware, clock, config, *devices, log=place / "log", tree=self._tree)
 
     async def __aenter__(self) -> RealTeam:
         await asyncio.gather(*(robot.start() for robot in self.robots.values()))

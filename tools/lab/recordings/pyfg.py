@@ -59,7 +59,7 @@ class _File:
     """The first of each two poses; a second one of them is no odometry."""
     more_edges: int = 0
     ranges: list[_Range] = field(default_factory=list)
-    nodes: set[str] = field(default_factory=set)
+    nodes: dict[str, list[float]] = field(default_factory=dict)
 
     def take(self, words: list[str]) -> None:
         """
@@ -72,8 +72,7 @@ class _File:
         if kind == "VERTEX_XY":
             if len(rest) not in (3, 4):
                 raise ValueError(f"{kind} has {len(rest)} fields; key x y belong there")
-            text_lines.numbers(rest[-2:], "x y")
-            self.nodes.add(rest[-3])
+            self.nodes[rest[-3]] = text_lines.numbers(rest[-2:], "x y")
         elif kind == "VERTEX_SE2":
             _long_enough(kind, rest, 5, "t key x y yaw")
             self.truth[rest[1]] = (
@@ -150,7 +149,7 @@ def read(path: Path) -> Recording:
         times = _range_times(file)
     except ValueError as error:
         raise BadRecording(f"{path.name}: {error}") from None
-    standing = file.nodes | {file.owner(key) for r in file.ranges for key in (r.a, r.b)}
+    standing = file.nodes.keys() | {file.owner(key) for r in file.ranges for key in (r.a, r.b)}
     names = [*chains, *sorted(standing - set(chains))]
     ids = {name: k for k, name in enumerate(names)}
     start = min([_began(edges, file) for edges in odometry.values()] + times) - 0.1
@@ -162,7 +161,9 @@ def read(path: Path) -> Recording:
     table = np.array(rows, dtype=float).reshape(-1, 4)
     used = sum(len(edges) for edges in odometry.values())
     notes: dict[str, object] = {"closures left out": len(file.edges) + file.more_edges - used}
-    return Recording(path.name, trails, table[np.argsort(table[:, 0], kind="stable")], notes)
+    places = {ids[name]: (x, y) for name, (x, y) in file.nodes.items() if ids[name] not in trails}
+    ranges = table[np.argsort(table[:, 0], kind="stable")]
+    return Recording(path.name, trails, ranges, notes, nodes=places)
 
 
 def _odometry(keys: list[str], file: _File) -> list[_Edge]:

@@ -46,6 +46,7 @@ class Recording:
             ascending in time. Ids that have no trail are standing nodes.
         antennas: (x, y) of a module's antenna in its robot's body frame, m, where it is not at the
             origin; a mounting that anyone can measure, so the robots' configurations hold it.
+        nodes: where standing nodes really are, as far as that is known.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Recording:
     ranges: Array
     notes: dict[str, object] = field(default_factory=dict)
     antennas: dict[int, tuple[float, float]] = field(default_factory=dict)
+    nodes: dict[int, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def duration(self) -> float:

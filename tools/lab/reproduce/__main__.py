@@ -11,6 +11,7 @@ import json
 import sys
 from pathlib import Path
 
+from lab.bound import first_pose
 from lab.progress import Progress
 from lab.reproduce import experiment, pages, pictures, plan, rbcd_table, verdict
 from lab.reproduce.gyro import gyro_rows
@@ -25,6 +26,7 @@ examples:
   tools/reproduce --rbcd data               module 3 against its centralised optimum, 15 minutes
   tools/reproduce --rbcd data --quick       one recorded case and one graph of them
   tools/reproduce --gyro --seeds 4          what a gyro brings, and what a wrong one costs
+  tools/reproduce --first-pose --seeds 500  how soon robots of the demo say where they are
   tools/reproduce --calibrate               the noise for which odometry is as wrong as the paper's
 
 The folder gets results.md, results.json (with the verdict) and pictures.
@@ -39,6 +41,8 @@ def main(arguments: list[str] | None = None) -> int:
         model = experiment.calibrated(range(options.seeds))
         print(f"scale = {model.scale:.3f}, yaw_deg_per_m = {model.yaw_deg_per_m:.3f}")
         return 0
+    if options.first_pose:
+        return first_pose.main(["--seeds", str(options.seeds)])
     if options.rbcd is not None:
         return rbcd(options.rbcd, options.quick)
     if options.gyro:
@@ -107,6 +111,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--gyro", action="store_true", help="the experiment with gyros, 10 minutes a seed"
+    )
+    parser.add_argument(
+        "--first-pose", action="store_true", help="time first poses, and count wrong ones"
     )
     parser.add_argument("--calibrate", action="store_true", help="print the noise and end")
     return parser

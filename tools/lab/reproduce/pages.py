@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from lab.bound import efficiency
 from lab.reproduce import printed
 from lab.reproduce.plan import SYSTEMS
 from lab.reproduce.table2 import EPSILONS
@@ -44,6 +45,8 @@ def everything(total: Tally, checks: Sequence[Check], drawn: Sequence[str]) -> s
         odometry(total),
         "## Honesty",
         honesty(total),
+        "## Efficiency",
+        efficiency_of(total),
         "## Pictures",
         "\n\n".join(f"![{name}]({name})" for name in drawn),
     ]
@@ -245,3 +248,29 @@ def honesty(total: Tally) -> str:
 def _nees(total: Tally, name: str) -> tuple[int, str]:
     """How many there were, and their mean."""
     return total[f"{name}/nees"].n, f"{total[f'{name}/nees'].mean:.2f}"
+
+
+def efficiency_of(total: Tally) -> str:
+    """Cramer-Rao bound and our errors, root mean square, and bound over mean square error."""
+    rows: list[list[object]] = []
+    for team in efficiency.TEAMS:
+        for row in efficiency.ROWS:
+            cells: list[object] = [team.robots, f"{team.loss:.0%}", row]
+            names = [f"{team.name}/{row}/{unit}" for unit in efficiency.UNITS]
+            if f"{names[0]}/bound" not in total:
+                continue
+            cells.append(total[f"{names[0]}/bound"].n)
+            for name, digits in zip(names, (3, 2), strict=True):
+                both = (total[f"{name}/{what}"].mean ** 0.5 for what in ("bound", "square"))
+                cells += [f"{value:.{digits}f}" for value in both]
+                cells.append(f"{efficiency.of(total, name):.2f}")
+            rows.append(cells)
+    head = (
+        "robots | loss | what | n | bound m | ours m | efficiency | bound ° | ours ° | efficiency"
+    )
+    note = (
+        "The bound is what anybody could know who is told every sigma of the simulator and which "
+        "ranges are wrong. In hindsight: relative poses of all pairs; live: each published pose, "
+        "in the frame of robot 0; first pose: the first of those of each robot."
+    )
+    return table(head, rows) + "\n\n" + note

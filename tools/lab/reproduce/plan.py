@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
+from lab.bound import efficiency
 from lab.play import virtual_team
 from lab.reproduce import central, table2, team_column, window_columns
 from lab.reproduce.experiment import PAIRS, TYPICAL_SEED, pose_errors, trial
@@ -57,6 +58,12 @@ def full(seeds: int) -> list[Piece]:
         ]
     pieces += [
         Piece(f"sweeps/{s}", 60, partial(_sweeps, s)) for s in range(min(SWEEP_SEEDS, seeds))
+    ]
+    pieces += [
+        Piece(f"{team.name}/{seed}", team.seconds, partial(efficiency.run, team, seed))
+        for team in efficiency.TEAMS
+        if team != efficiency.Team(3, 0.0)  # the column drslamd has it
+        for seed in range(seeds)
     ]
     pieces += [Piece(f"table4/{name}", 90, partial(_system, name)) for name in SYSTEMS]
     return pieces

@@ -13,6 +13,7 @@ import numpy as np
 from drslamd.gossip import messages
 from drslamd.gossip.message_types import PoseState
 from drslamd.slam import se2
+from lab.bound import efficiency
 from lab.play import virtual_team
 from lab.play.simulator import Simulator
 from lab.recordings.recording import Array, Recording
@@ -35,6 +36,9 @@ def run(trial: Trial, progress: Callable[[float], None] | None = None) -> Tally:
     _final(tally, trial, result)
     closures(tally, trial, result.closures)
     published(tally, trial.recording, simulator)
+    efficiency.add(
+        tally, efficiency.Team(len(trial.truth), 0.0), trial.recording, simulator, result
+    )
     for name, ms in result.ms.items():
         tally.add(f"drslamd/ms/{name}", ms)
     tally.add("drslamd/bytes", sum(result.bytes_sent.values()))

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Any
 
+from lab.bound import efficiency
 from lab.reproduce import printed
 from lab.reproduce.table2 import EPSILONS, TAUS
 from lab.reproduce.tally import Tally
@@ -59,6 +60,7 @@ def checks(total: Tally) -> list[Check]:
         *_optimised(total),
         *_beaten(total),
         *_honest(total),
+        *_efficient(total),
     ]
 
 
@@ -177,4 +179,19 @@ def _claims(total: Tally, name: str, words: str) -> list[Check]:
     return [
         at_least(f"{words}: squared Mahalanobis <= 14.2", below, 0.98),
         at_most(f"{words}: squared Mahalanobis > 50", wild, 0.0),
+    ]
+
+
+def _efficient(total: Tally) -> list[Check]:
+    """Is the mean square error near the Cramer-Rao bound, for the teams that were played?"""
+    return [
+        at_least(
+            f"{team.robots} robots, {team.loss:.0%} loss, {row}, {unit}: bound over mean square",
+            efficiency.of(total, f"{team.name}/{row}/{unit}"),
+            efficiency.LEAST[team.loss],
+        )
+        for team in efficiency.TEAMS
+        for row in efficiency.ROWS[:2]
+        for unit in efficiency.UNITS
+        if f"{team.name}/{row}/{unit}/bound" in total
     ]

@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from drslamd.slam import headway
 from drslamd.slam.optimizer.banded.lapack import cholesky_banded, triangular_banded
 from drslamd.slam.optimizer.banded.layout import NOWHERE
 from drslamd.slam.optimizer.banded.normal_equations import System
@@ -14,6 +15,8 @@ from drslamd.slam.se2 import Array, Index
 
 ROOM = 64
 """Poses that `selected_inverse` does before it moves its window: moving costs as much as some."""
+AT_ONCE, ROWS_AT_ONCE = 128, 4096
+"""Columns and rows between two signs of headway: a second, with a hundred robots."""
 
 
 class Solver(Protocol):
@@ -51,8 +54,8 @@ class BandFactor:
             lower = cholesky_banded(band)
         except np.linalg.LinAlgError:
             return None
-        halfway = triangular_banded(lower, system.border)
-        schur = corner - halfway.T @ halfway
+        halfway = _through(lower, system.border)
+        schur = corner - _squared(halfway)
         # a tiny pivot of A can leave nothing of the border but rounding
         definite = np.isfinite(schur).all() and bool((np.diag(schur) > 0).all())
         return BandFactor(lower, halfway, schur) if definite else None
@@ -61,12 +64,12 @@ class BandFactor:
         """The solution for a right-hand side (n + b,), or for c of them (n + b, c)."""
         n = len(self.halfway)
         columns = right.reshape(len(right), -1)
-        middle = triangular_banded(self.lower, columns[:n])
+        middle = _through(self.lower, columns[:n])
         try:
             outer = np.linalg.solve(self.schur, columns[n:] - self.halfway.T @ middle)
         except np.linalg.LinAlgError:
             return None
-        inner = triangular_banded(self.lower, middle - self.halfway @ outer, transposed=True)
+        inner = _through(self.lower, middle - self.halfway @ outer, transposed=True)
         return np.concatenate([inner, outer]).reshape(right.shape)
 
     def joint_covariance(self, unknowns: Index) -> Array | None:
@@ -76,7 +79,7 @@ class BandFactor:
         inside = unknowns < n
         unit = np.zeros((n, len(unknowns)))
         unit[unknowns[inside], columns[inside]] = 1
-        own = triangular_banded(self.lower, unit)
+        own = _through(self.lower, unit)
         bound = -self.halfway.T @ own
         bound[unknowns[~inside] - n, columns[~inside]] += 1
         try:
@@ -92,7 +95,7 @@ class BandFactor:
         where there is no inverse.
         """
         n = len(self.halfway)
-        across = triangular_banded(self.lower, self.halfway, transposed=True)
+        across = _through(self.lower, self.halfway, transposed=True)
         try:
             outer = np.linalg.inv(self.schur)
         except np.linalg.LinAlgError:
@@ -107,6 +110,26 @@ class BandFactor:
         both = (row < n) & (column != NOWHERE)
         blocks[both] += selected_inverse(self.lower)[(row - column)[both], column[both]]
         return np.asarray(blocks)
+
+
+def _through(lower: Array, columns: Array, transposed: bool = False) -> Array:
+    """`triangular_banded`, some columns at a time: all of a large team take many seconds, in which
+    nobody could tell a long computation from one that is stuck."""
+    done = []
+    for first in range(0, max(columns.shape[1], 1), AT_ONCE):
+        headway.mark()
+        done.append(triangular_banded(lower, columns[:, first : first + AT_ONCE], transposed))
+    return np.concatenate(done, axis=1)
+
+
+def _squared(columns: Array) -> Array:
+    """(b, b) X' X of columns (n, b), likewise."""
+    out = np.zeros((columns.shape[1], columns.shape[1]))
+    for first in range(0, len(columns), ROWS_AT_ONCE):
+        headway.mark()
+        part = columns[first : first + ROWS_AT_ONCE]
+        out += part.T @ part
+    return out
 
 
 def selected_inverse(lower: Array) -> Array:
@@ -130,6 +153,7 @@ def selected_inverse(lower: Array) -> Array:
     room = reach + 3 * ROOM
     window, at = np.zeros((room, room)), room - reach
     for k in range(n // 3 - 1, -1, -1):
+        headway.mark()
         if at < 3:
             window[-reach:, -reach:] = window[at : at + reach, at : at + reach].copy()
             at = room - reach

@@ -90,9 +90,7 @@ class BandedOptimizer:
         public: Mapping[int, PublicPoses],
     ) -> Job:
         """See `Optimizer.job`; public poses are not needed."""
-        team = build_problem(graph, group, previous, self)
-        kept = previous.kept if previous else None
-        return partial(solved, team, group, solve=self.solve, kept=kept)
+        return partial(_begun, self, graph.frozen(), group, previous)
 
 
 @dataclass(frozen=True)
@@ -238,6 +236,14 @@ def _doubted(
     antennas = previous.antenna_m if previous else {}
     turns = [robot in known and known[robot].turn != 0 for robot in robots]
     return Doubted(np.array(turns), np.array([robot in antennas for robot in robots]))
+
+
+def _begun(
+    numbers: BandedOptimizer, graph: PoseGraph, group: Group, previous: TeamEstimate | None
+) -> TeamEstimate:
+    """State the problem and solve it: both take long where the team is large."""
+    team = build_problem(graph, group, previous, numbers)
+    return solved(team, group, solve=numbers.solve, kept=previous.kept if previous else None)
 
 
 def solved(

@@ -72,7 +72,7 @@ def solve(
         joint=joint,
         spread=spread,
         odometry_level=explained.level,
-        feared_level=np.maximum(np.sqrt(explained.feared), explained.level),
+        feared_level=np.sqrt(explained.feared),
         late_level=np.sqrt(explained.lately),
         is_explained=explained.other is None,
         contradicted=contradicted(problem, point),

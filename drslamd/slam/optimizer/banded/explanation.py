@@ -2,13 +2,13 @@
 
 A solution as configured is asked three questions: does odometry fit, do ranges fit now, does some
 track or antenna ask to be another one? Most often all is well. Else mountings are tried
-(`mountings`), which explain a fault for good, then one moment in which a robot lost its way
-(`slips`), and then odometry that was worse for a while (`odometry_levels`).
+(`mountings`), which explain a fault for good, and then odometry that was worse for a while
+(`odometry_levels`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,11 +22,9 @@ from drslamd.slam.optimizer.banded.misfit import (
     runs,
 )
 from drslamd.slam.optimizer.banded.mountings import Scores
-from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.banded.odometry_levels import FEW_OUTLIERS, STANDS_OUT, TARGET
+from drslamd.slam.optimizer.banded.odometry_levels import FEW_OUTLIERS, STANDS_OUT
 from drslamd.slam.optimizer.banded.point import Point
-from drslamd.slam.optimizer.banded.slips import releases
 from drslamd.slam.se2 import Array
 
 SUSPICIOUS = 3.0
@@ -90,10 +88,6 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
             return _as_is(mounted, better, again.ratio)
         if better.converged and _gain(equations, nominal, mounted, better) > MUCH:
             bases.insert(0, (mounted, better, again))
-    for base, point, _ in bases:
-        freed = _freed(base, point, most, tolerance)
-        if freed is not None:
-            return freed
     for base, point, said in bases:
         levels = odometry_levels.levelled(base, point, said.ratio, said.runs, most, tolerance)
         seen = np.sqrt(levels.seen)
@@ -101,25 +95,6 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
             return Explanation(base, levels.point, None, seen, levels.feared, levels.lately)
     # what was tried last is what remains of the nominal solution
     return Explanation(equations, nominal, levels.point, seen, levels.feared, levels.lately)
-
-
-def _freed(equations: Equations, point: Point, most: int, tolerance: float) -> Explanation | None:
-    """Moments of odometry that were wrong, if those are all."""
-    found = releases.released(equations, point)
-    if not found.lost.any():
-        return None
-    problem = replace(found.equations.problem, initial=found.point.poses)
-    believed = Equations(problem, like=equations)
-    point = descend(believed, found.point.calibration, most, tolerance)
-    again = _checked(believed, point)
-    few = outlier_share(problem, point).max(initial=0) < FEW_OUTLIERS
-    is_right = few and not again.runs and bool((again.ratio <= TARGET).all())
-    if not (point.converged and is_right):
-        return None
-    feared = np.maximum(again.ratio, 1.0)[problem.odometry.robot]
-    seen = releases.seen(equations.problem, point, found.lost)
-    lately = releases.lately(equations.problem, seen)
-    return Explanation(believed, point, found.other, np.sqrt(seen), feared, lately)
 
 
 def _as_is(equations: Equations, point: Point, ratio: Array) -> Explanation:

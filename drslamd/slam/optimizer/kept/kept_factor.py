@@ -17,7 +17,7 @@ from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout, border_pos
 from drslamd.slam.optimizer.banded.normal_equations import Equations, System
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
-from drslamd.slam.optimizer.kept.elimination import Elimination, Rest, eliminated
+from drslamd.slam.optimizer.kept.elimination import SINGLE, Elimination, Rest, eliminated
 from drslamd.slam.optimizer.kept.head import Flags, Head, Pair, Places, keys_of, tail_of
 from drslamd.slam.optimizer.problem import Problem, RangeErrors
 from drslamd.slam.se2 import Array, Index
@@ -237,7 +237,8 @@ class Current:
         """For right-hand sides (n,) or (n, c) in the order of `BandLayout.flat`."""
         columns = right.reshape(len(right), -1)
         inside = self.places.flat.poses[self.places.inside].ravel()
-        inner, outer = columns[inside], columns[self.places.outer]
+        inner = columns[inside].astype(SINGLE)
+        outer = columns[self.places.outer].astype(SINGLE)
         for block in self.kept.blocks:
             block.forward(inner, outer)
         top = columns[self.numbers]
@@ -245,7 +246,7 @@ class Current:
         top[: len(front)] = inner[front]
         top[len(top) - border :] = outer
         top = cholesky_solved(self.lower, top)
-        inner[front], outer = top[: len(front)], top[len(top) - border :]
+        inner[front], outer = top[: len(front)], top[len(top) - border :].astype(SINGLE)
         for block in reversed(self.kept.blocks):
             block.backward(inner, outer)
         out = np.empty_like(columns)

@@ -8,6 +8,8 @@ from dense_problems import matrix_of
 from scipy.linalg import cholesky_banded
 from slam_scenes import Array
 
+from drslamd.slam import headway
+from drslamd.slam.optimizer.banded import band_factor
 from drslamd.slam.optimizer.banded.band_factor import ROOM, BandFactor, selected_inverse
 from drslamd.slam.optimizer.banded.layout import NOWHERE
 from drslamd.slam.optimizer.banded.normal_equations import System
@@ -147,6 +149,27 @@ def test_the_inverse_is_selected_however_many_poses_there_are(poses: int, reach:
 
 
 # where there is no solution
+
+
+def test_long_computations_leave_marks_of_headway(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some columns or rows at a time, and to the same end."""
+    system = a_system(12, 2, 9)
+    whole = factorised(system)
+    right = np.random.default_rng(1).normal(size=(45, 7))
+    expected = whole.solved(right)
+    monkeypatch.setattr(band_factor, "AT_ONCE", 2)
+    monkeypatch.setattr(band_factor, "ROWS_AT_ONCE", 5)
+    before = headway.marks()
+    factor = factorised(system)
+    # nine columns of the border, 36 rows
+    assert headway.marks() - before == 5 + 8
+    assert np.allclose(factor.schur, whole.schur)
+    assert np.array_equal(factor.halfway, whole.halfway)
+    found = factor.solved(right)
+    assert found is not None
+    assert expected is not None
+    assert np.allclose(found, expected)
+    assert headway.marks() - before == 5 + 8 + 4 + 4
 
 
 @pytest.mark.row("O12")

@@ -51,7 +51,7 @@ def solved(blocks: list[Elimination], rest: Rest, right: Array, count: int, n: i
     return np.concatenate([inner, outer])
 
 
-SHAPES = [(40, 4, 5, 102), (40, 4, 5, 120), (35, 4, 0, 60), (5, 3, 4, 0), (3, 2, 0, 9)]
+SHAPES = [(90, 4, 5, 240), (90, 4, 5, 270), (50, 4, 0, 129), (5, 3, 4, 0), (3, 2, 0, 9)]
 """Poses, reach, border, and how many unknowns are eliminated: none, some, all."""
 
 
@@ -68,7 +68,7 @@ def test_what_is_left_is_the_schur_complement_and_solutions_are_those_of_the_who
     for shape in ((len(full),), (len(full), 2)):
         right = np.random.default_rng(1).normal(size=shape)
         found = solved(blocks, rest, right, count, 3 * poses)
-        assert np.allclose(found, np.linalg.solve(full, right), atol=1e-9)
+        assert np.allclose(found, np.linalg.solve(full, right), atol=1e-5)
 
 
 def test_a_rest_can_be_eliminated_further() -> None:
@@ -86,14 +86,14 @@ def test_a_rest_can_be_eliminated_further() -> None:
     expected = dense[np.ix_(stays, stays)] - gone.T @ np.linalg.solve(dense[np.ix_(own, own)], gone)
     assert np.allclose(whole(last), expected, atol=1e-9)
     assert block.own.tolist() == [91, 94, 95]  # type: ignore[union-attr]
-    assert len(blocks) == 2
+    assert len(blocks) == 1
 
 
 def test_what_is_not_positive_definite_has_no_factor() -> None:
     system = a_system(30, 2, 1)
     system.band[0, 50] = -1e6
     assert eliminated(system, 90) is None
-    assert eliminated(system, 48) is not None
+    assert eliminated(system, 32) is not None
     assert (
         Rest(-np.eye(3), np.zeros((3, 0)), np.zeros((0, 0))).without(
             np.arange(2), np.array([2]), np.arange(3)

@@ -52,7 +52,9 @@ def driven(
         job: Any = team.back.begin(team.living)
         assert job is not None
         found: TeamEstimate = job()
-        right = banded_optimizer.solved(job.args[0], job.args[1], tolerance=SETTLED)
+        numbers, graph, group, previous = job.args
+        problem = banded_optimizer.build_problem(graph, group, previous, numbers)
+        right = banded_optimizer.solved(problem, group, tolerance=SETTLED)
         yield Second(found, right, found.kept is None)
         team.back.on_solution(found)
         for chain, entry in said(second, team.entries()):
