@@ -19,7 +19,12 @@ from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 
 
 def test_without_an_estimate_there_are_no_paths() -> None:
-    assert report.trajectories(RobotScene().robot, T0) == {"frame": None, "robots": {}}
+    assert report.trajectories(RobotScene().robot, T0) == {
+        "frame": None,
+        "robots": {},
+        "modules": {},
+        "site": None,
+    }
 
 
 def test_our_path_is_said_at_ten_hertz_and_those_of_others_at_their_keyframes() -> None:
@@ -39,6 +44,7 @@ def test_our_path_is_said_at_ten_hertz_and_those_of_others_at_their_keyframes() 
         "epoch": 8,
         "utime": [4 * SECOND, 5 * SECOND],
         "poses": [[1, 2, 3], [4, 5, 6]],
+        "has_heading": True,
         "clock": {"source": "unknown", "readings": []},
     }
     ours = told["robots"]["2"]

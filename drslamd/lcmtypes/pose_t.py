@@ -31,6 +31,8 @@ class pose_t(object):
         2 doubtful: there is a pose, but what was measured contradicts it
         3 stale: no odometry for more than a second; a position by ranges, with the sigma of any
         heading, or the last pose, with a covariance that grows as fast as the robot drove
+        4 position: it stands, and others have found its place; theta means nothing and has the
+        sigma of any
         LCM Type: int8_t
         """
 

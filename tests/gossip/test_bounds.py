@@ -34,7 +34,7 @@ FOR_EVERY_CASE = settings(derandomize=True, max_examples=300, deadline=None)
     [
         (bounds.robot, 0, 254),
         (bounds.flag, 0, 1),
-        (bounds.pose_state, PoseState.NOT_LOCALISED, PoseState.STALE),
+        (bounds.pose_state, PoseState.NOT_LOCALISED, PoseState.POSITION),
         (bounds.epoch, 0, MAX_EPOCH),
         (bounds.sample, 0, LAST_N),
         (bounds.uwb_clock, -bounds.MAX_UWB_CLOCK_US, bounds.MAX_UWB_CLOCK_US),

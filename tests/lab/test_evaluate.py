@@ -80,7 +80,8 @@ def test_the_scores_have_the_fields_of_the_schema_and_no_others(run: Run) -> Non
     assert set(scores["pairs"]["0-1"]) == PAIR
     assert set(scores["closures"]) == {"seen", "kept"}
     assert set(scores["bytes_sent"]) == {"0", "1"}
-    assert set(scores["ms"]) == {"relative_pose", "what_if", "consistency", "optimizer"}
+    modules = {"relative_pose", "what_if", "consistency", "optimizer", "points"}
+    assert set(scores["ms"]) == modules
     assert all(set(module) == {"median", "p99"} for module in scores["ms"].values())
 
 

@@ -97,19 +97,22 @@ def joints(graph: PoseGraph) -> list[Joint]:
         a, b = (graph.view.chains[chain.robot].keyframes for chain in (pair.a, pair.b))
         if a.is_one_segment and b.is_one_segment:
             one, other = int(a.rows[0, 1]), int(b.rows[0, 1])
-            out.append(Joint(Segment(*pair.a, one), Segment(*pair.b, other), pair.closures))
+            out.append(_joint(Segment(*pair.a, one), Segment(*pair.b, other), pair.closures))
             continue
         at_a, _ = a.find(pair.closures.a_n)
         at_b, _ = b.find(pair.closures.b_n)
         ends = np.stack([a.segment[at_a], b.segment[at_b]], axis=-1)
         for one, other in np.unique(ends, axis=0).tolist():
             these = pair.closures.chosen((ends == (one, other)).all(axis=1))
-            whole = ~these.tells_place_only
-            found = these.chosen(whole) if whole.any() else these
-            out.append(
-                Joint(Segment(*pair.a, one), Segment(*pair.b, other), found, not whole.any())
-            )
+            out.append(_joint(Segment(*pair.a, one), Segment(*pair.b, other), these))
     return out
+
+
+def _joint(a: Segment, b: Segment, closures: ClosureTable) -> Joint:
+    """By the closures that tell a heading, where there are any."""
+    whole = ~closures.tells_place_only
+    found = closures.chosen(whole) if whole.any() else closures
+    return Joint(a, b, found, not whole.any())
 
 
 def gauge_segment(group: set[Segment], living: set[int]) -> Segment | None:

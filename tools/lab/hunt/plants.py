@@ -83,7 +83,7 @@ TEN = (
     Plant(
         "nan-passed",
         "sensors/linktrack/linktrack_input.py",
-        "        if not all(math.isfinite(node[name]) for name in _MEASURED):\n"
+        "        if not all(map(math.isfinite, _measured(node))):\n"
         "            return RangeRefusal.NOT_FINITE\n",
         "",
         ("sensors/test_border_of_numbers.py",),

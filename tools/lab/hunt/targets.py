@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-import zlib
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
@@ -83,7 +82,7 @@ def payload(kind: str) -> Target:
 def chapter(data: bytes) -> None:
     """What a chapter packs, before it is deflated: no bent byte survives that."""
     with suppress(ValueError, IndexError):
-        packed(unpacked(zlib.compress(data), CHAPTER_SEQ))
+        packed(unpacked(data, CHAPTER_SEQ))
 
 
 def uwb() -> Target:
@@ -194,4 +193,4 @@ def seeds() -> list[bytes]:
             if isinstance(effect, Send):
                 out.append(lc02.encode(second, effect.channel, effect.payload))
     teller = Liar(2, bytes(32))
-    return out + [zlib.decompress(packed(teller.chapter(CHAPTER_SEQ))) for _ in range(3)]
+    return out + [packed(teller.chapter(CHAPTER_SEQ)) for _ in range(3)]
