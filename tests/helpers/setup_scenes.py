@@ -21,7 +21,7 @@ from typing import NamedTuple
 import pytest
 import structlog.testing
 
-from drslamd import cli
+from drslamd import cli, memory
 from drslamd.cli import run as run_verb
 from drslamd.config import Config
 from drslamd.daemon import Daemon
@@ -132,6 +132,7 @@ class Setup:
         with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stderr(said):
             patch.setattr(run_verb, "_serve", serve)
             patch.setattr(run_verb, "_heed_signals", lambda: None)
+            patch.setattr(memory, "LISTEN_US", 0)  # who cannot write its state would wait
             code = cli.main(["run", "-c", str(self.config)])
         refused = [self._plain(line) for line in said.getvalue().splitlines()]
         return Verdict(code, refused + [what for what in problems if not what.startswith(ALONE)])

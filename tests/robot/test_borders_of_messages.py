@@ -123,7 +123,7 @@ def members(team: VirtualTeam) -> list[Any]:
 def test_a_team_that_has_just_met_survives_every_number_at_its_borders(tmp_path: Path) -> None:
     team = VirtualTeam()
     team.run(6.0)
-    battered(team, tmp_path, later_s=6.0)
+    battered(team, tmp_path, later_s=10.0)
 
 
 @pytest.mark.slow
