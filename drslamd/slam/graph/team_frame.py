@@ -21,6 +21,7 @@ from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.tables import ClosureTable, KeyframeTable
+from drslamd.slam.graph.thinning.pair_view import PairView
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.se2 import Array, Index
 
@@ -96,23 +97,22 @@ def joints(graph: PoseGraph) -> list[Joint]:
             continue
         a, b = (graph.view.chains[chain.robot].keyframes for chain in (pair.a, pair.b))
         if a.is_one_segment and b.is_one_segment:
-            one, other = int(a.rows[0, 1]), int(b.rows[0, 1])
-            out.append(_joint(Segment(*pair.a, one), Segment(*pair.b, other), pair.closures))
+            out.append(_joint(pair, int(a.rows[0, 1]), int(b.rows[0, 1]), pair.closures))
             continue
         at_a, _ = a.find(pair.closures.a_n)
         at_b, _ = b.find(pair.closures.b_n)
         ends = np.stack([a.segment[at_a], b.segment[at_b]], axis=-1)
         for one, other in np.unique(ends, axis=0).tolist():
             these = pair.closures.chosen((ends == (one, other)).all(axis=1))
-            out.append(_joint(Segment(*pair.a, one), Segment(*pair.b, other), these))
+            out.append(_joint(pair, one, other, these))
     return out
 
 
-def _joint(a: Segment, b: Segment, closures: ClosureTable) -> Joint:
-    """By the closures that tell a heading, where there are any."""
-    whole = ~closures.tells_place_only
-    found = closures.chosen(whole) if whole.any() else closures
-    return Joint(a, b, found, not whole.any())
+def _joint(pair: PairView, one: int, other: int, these: ClosureTable) -> Joint:
+    """Of two segments; who says a whole pose is believed before who says but a place."""
+    whole = ~these.tells_place_only
+    found = these.chosen(whole) if whole.any() else these
+    return Joint(Segment(*pair.a, one), Segment(*pair.b, other), found, not whole.any())
 
 
 def gauge_segment(group: set[Segment], living: set[int]) -> Segment | None:
