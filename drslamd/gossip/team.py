@@ -288,11 +288,8 @@ class Team:
             self.logs.repeats.pace.reckon([p.usual_loss for p in self.living(utime).values()])
             self.logs.on_states(status.logs, peer.chain.robot, utime)
             self._chapters.on_states(self.own, status.logs)
-        self.starts.on_status(peer.chain.robot, status, self._said, utime)
-
-    @property
-    def _said(self) -> int | None:
-        return self._next_seq if self.seal.has_spoken else None
+        said = self._next_seq if self.seal.has_spoken else None
+        self.starts.on_status(peer.chain.robot, status, said, utime)
 
     @property
     def superseded_by(self) -> int | None:
