@@ -230,7 +230,7 @@ class Team:
         if isinstance(message, Status):
             self.acquaintance.read(origin, message, event.utime)
             # who holds us for a later start does not hear us, and cannot answer
-            self.starts.on_status(origin.robot, message, self._said, event.utime)
+            self.starts.on_status(origin.robot, message, self._said(), event.utime)
         return False
 
     def meet(self, origin: Chain, counter: int, utime: int) -> None:
@@ -288,8 +288,10 @@ class Team:
             self.logs.repeats.pace.reckon([p.usual_loss for p in self.living(utime).values()])
             self.logs.on_states(status.logs, peer.chain.robot, utime)
             self._chapters.on_states(self.own, status.logs)
-        said = self._next_seq if self.seal.has_spoken else None
-        self.starts.on_status(peer.chain.robot, status, said, utime)
+        self.starts.on_status(peer.chain.robot, status, self._said(), utime)
+
+    def _said(self) -> int | None:
+        return self._next_seq if self.seal.has_spoken else None
 
     @property
     def superseded_by(self) -> int | None:
@@ -314,8 +316,7 @@ class Team:
         direct = self.living(utime)
         audible = {chain for peer in direct.values() for chain in peer.audible}
         vouched_for = {c.robot for c in audible if c.epoch == self.logs.epoch(c.robot)}
-        there = set(direct) | (vouched_for - self.namesakes.twice(utime))
-        return there | {self.own.robot}
+        return set(direct) | (vouched_for - self.namesakes.twice(utime)) | {self.own.robot}
 
     def compare_radio_clocks(self, own_minus_system: int | None, utime: int) -> None:
         """Use LinkTrack's system_time, where both sides know their clock against it."""
