@@ -12,7 +12,7 @@ WORTH_SETTING = 0.1
 
 
 def wheel_mounting(patient: Patient) -> Iterator[Finding]:
-    yield from patient.told("wheels", "mounting")
+    yield from patient.told("wheels", "gyro", "wheels.slip", "wheels.track", "mounting")
     own = str(patient.now["robot"])
     scale = number(patient.now, ("graph", "wheel_scale", own))
     if abs(scale) > WORTH_SETTING:
