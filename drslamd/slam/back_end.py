@@ -28,6 +28,10 @@ URGENT = 1e-4
 when a team has just met, and for some moves after each closure that says something new."""
 
 
+PATIENCE = 3
+"""Solutions in a row that did not converge: the first ones of a large team may need as many."""
+
+
 class _Known(NamedTuple):
     """What a job knows: log entries that are held, robots that live, moves of the neighbours."""
 
@@ -59,6 +63,8 @@ class BackEnd:
         self.estimate: TeamEstimate | None = None
         self._inserted = 0
         self._known = _Known()
+        self._not_converged = 0
+        """Solutions in a row."""
 
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
         self.graph.insert(origin, entry)
@@ -114,7 +120,8 @@ class BackEnd:
             self.estimate, self._known = None, now
             return None
         same = self.exchange.held(gauge.chain)
-        job = self._optimizer.job(self.graph, Group(members, gauge, points), self.estimate, same)
+        group = Group(members, gauge, points)
+        job = self._optimizer.job(self.graph, group, self._beginning(), same)
         if job is None:
             self.exchange.wait(utime)
             return None
@@ -138,9 +145,16 @@ class BackEnd:
         robots = lifted_neighbours.robots(self.graph, self._own) & talking
         return [self.graph.chains[robot].chain for robot in robots]
 
+    def _beginning(self) -> TeamEstimate | None:
+        """From where to solve: the last solution; nothing where it leads nowhere again and again,
+        so that who began in a wrong valley begins anew as a newcomer does."""
+        leads_nowhere = self._not_converged and self._not_converged % PATIENCE == 0
+        return None if leads_nowhere and not self._takes_turns else self.estimate
+
     def on_solution(self, result: TeamEstimate, utime: int = 0) -> list[PublicPoses]:
         """Module 3 has answered; what must be said of it."""
         self.estimate = result = self._anchored(result)
+        self._not_converged = 0 if result.converged else self._not_converged + 1
         self.revisions.on_solution(result, self._own.robot)
         if bold := self.revisions.of_pairs:
             self.estimate = result = replace(result, boldness=bold)

@@ -178,6 +178,30 @@ def test_what_is_not_final_goes_on_without_news(
 # who is connected, and in whose frame
 
 
+@pytest.mark.parametrize("times", range(1, 8))
+def test_every_third_time_that_nothing_converges_it_begins_as_a_newcomer_does(
+    team: SmallTeam, times: int
+) -> None:
+    back, asked = back_end(team)
+    nowhere = TeamEstimate(Segment(0, 10, 0), {}, converged=False, settled=False)
+    for _ in range(times):
+        back.on_solution(nowhere)
+    begin(back)
+    assert (asked.previous is None) is (times in (3, 6))
+    back.on_solution(TeamEstimate(Segment(0, 10, 0), {}, settled=False))
+    begin(back)
+    assert asked.previous is not None
+
+
+def test_with_turns_a_move_goes_on_from_the_last_one_always(team: SmallTeam) -> None:
+    back, asked = back_end(team, extra=RBCD)
+    for _ in range(3):
+        back.on_solution(TeamEstimate(Segment(0, 10, 0), {}, converged=False))
+    begin(back)
+    assert asked.groups
+    assert asked.previous is not None
+
+
 def test_a_job_is_of_the_group_of_our_current_segment(team: SmallTeam) -> None:
     back, asked = back_end(team, robot=1)
     assert begin(back) is not None
