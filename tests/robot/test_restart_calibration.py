@@ -62,10 +62,10 @@ def test_what_was_learned_is_in_the_state_that_an_orderly_stop_keeps(first: Virt
 def test_a_restarted_robot_begins_with_what_it_knew(first: VirtualTeam) -> None:
     kept = first.member(0).robot.calibration.latest
     team = wronged_team(kept)
-    team.run(20.0)
+    team.run(10.0)
     robot = team.member(0).robot
     trail = team.recording.trails[0]
-    driven = path_length(at_times(trail.t, trail.truth, np.arange(20.0)))
+    driven = path_length(at_times(trail.t, trail.truth, np.arange(10.0)))
     assert path_length(robot.front.reckoning.track.poses[::10]) == pytest.approx(driven, rel=0.04)
     assert robot.front.model.noise.scale < 0.05
     assert robot.front.ranges[1].bias_m == kept.bias[1].value

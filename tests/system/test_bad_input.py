@@ -19,6 +19,7 @@ from message_builders import a_status, an_entry, forged
 from drslamd.gossip import lc02
 from drslamd.gossip.message_types import Heard, LogState, Message, OdometryBatch
 from drslamd.gossip.seal import team_key
+from drslamd.io.ports.reading_round import PERIOD_S
 from drslamd.io.state_store import StateStore
 from drslamd.io.status_socket import ask
 
@@ -129,6 +130,7 @@ def test_a_cable_pulled_in_mid_frame_and_put_back_is_read_again() -> None:
             robot.uwb.plug()
             await until(robot, lambda a: a["uwb"]["port"] == "open", 6.0)
             await print_frames(robot, 60, start=1000 * round_ + 500)
+            await asyncio.sleep(2 * PERIOD_S)
             answer = await status(robot)
             assert answer["uwb"]["counters"]["frames.accepted"] >= before + 57
 

