@@ -18,13 +18,13 @@ from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.points.point_tracker import Sensors
 from drslamd.slam.relative_pose.solver import EXCLUDED_CHI2
 from drslamd.slam.relative_pose.window_noise import moments, odometry_covariance, way_twists
+from drslamd.slam.relocation.minima import distinct_poses, gauss_newton_step
 from drslamd.slam.se2 import Array
 
 MOST = 6
 """Minima that are judged."""
 STARTS = 24
 STEPS, JUDGED_STEPS = 20, 6
-DAMPING = 1e-3
 LONGEST = 1.0
 """m, rad: what one step may do."""
 MERGE_M, MERGE_RAD = 0.3, 0.15
@@ -101,14 +101,17 @@ def joined(
     """
     problem = _Problem(common, noises, sensors)
     x = problem.descended(problem.starts())
-    judged = [problem.judged(row) for row in _distinct(x[np.argsort(problem.cost(x))])[:MOST]]
+    judged = [
+        problem.judged(row)
+        for row in distinct_poses(x[np.argsort(problem.cost(x))], MERGE_M, MERGE_RAD)[:MOST]
+    ]
     judged.sort(key=lambda one: one.chi2)
     first = judged[0]
     freedom = len(common.t) + 2 * len(common.a_places) - 3
     if not first.chi2 <= freedom + POOR_FIT * np.sqrt(2 * freedom):
         return "they do not fit each other"
     rivals = [one.x for one in judged if one.chi2 < first.chi2 + EXCLUDED_CHI2]
-    if len(_distinct(np.array(rivals))) > 1:
+    if len(distinct_poses(np.array(rivals), MERGE_M, MERGE_RAD)) > 1:
         return "ambiguous"
     sigma_m = np.sqrt(np.linalg.eigvalsh(first.covariance[:2, :2])[-1])
     if sigma_m > MAX_SIGMA_M or np.sqrt(first.covariance[2, 2]) > MAX_SIGMA_RAD:
@@ -191,11 +194,7 @@ class _Problem:
             w = 1 / (1 + (sights / self._wide) ** 2 / c2) / self._wide**2
             normal = both[:, :, :3] + np.einsum("mki,mk,mkj->mij", by, w, by)
             g = both[:, :, 3] + np.einsum("mki,mk->mi", by, w * sights)
-            diagonal = np.einsum("mii->mi", normal)
-            normal = normal + (DAMPING * diagonal + 1e-9)[:, :, None] * np.eye(3)
-            step = -np.linalg.solve(normal, g[..., None])[..., 0]
-            size = np.abs(step).max(axis=1, keepdims=True)
-            x = x + step * np.minimum(1.0, LONGEST / (size + 1e-12))
+            x = gauss_newton_step(x, normal, g, LONGEST)
         return x
 
     def judged(self, x: Array) -> _Judged:
@@ -224,15 +223,3 @@ class _Problem:
         beyond = np.maximum(e**2 - (self._model.cauchy_sigmas * self._wide) ** 2, 0.0)
         both = np.tril(lower) + np.tril(lower, -1).T
         return np.asarray(both + self._of_ranges + np.diag(beyond))
-
-
-def _distinct(x: Array) -> Array:
-    """Rows (m, 3), best first, that are not near a better one."""
-    kept: list[Array] = []
-    for row in x:
-        if not any(
-            np.hypot(*(row - other)[:2]) < MERGE_M and abs(se2.wrap(row[2] - other[2])) < MERGE_RAD
-            for other in kept
-        ):
-            kept.append(row)
-    return np.array(kept)

@@ -20,6 +20,7 @@ from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.range_model import RangeModel, RangeNoise
 from drslamd.slam.relative_pose.solver import EXCLUDED_CHI2
 from drslamd.slam.relative_pose.window_noise import moments, odometry_covariance, way_twists
+from drslamd.slam.relocation.minima import gauss_newton_step
 from drslamd.slam.se2 import Array
 
 Row = TypeVar("Row")
@@ -27,7 +28,6 @@ Row = TypeVar("Row")
 STARTS = 24
 """Around the robot's place in the middle of its way, as far away as the range there."""
 STEPS, JUDGED_STEPS = 20, 6
-DAMPING = 1e-3
 LONGEST_M = 2.0
 """What one step may do."""
 MERGE_M = 0.25
@@ -162,11 +162,7 @@ class _Problem:
             normal[:, 2, 2] += self._bias**-2
             g = np.einsum("mki,mk->mi", j, w * e)
             g[:, 2] += x[:, 2] / self._bias**2
-            diagonal = np.einsum("mii->mi", normal)
-            normal = normal + (DAMPING * diagonal + 1e-9)[:, :, None] * np.eye(3)
-            step = -np.linalg.solve(normal, g[..., None])[..., 0]
-            size = np.abs(step).max(axis=1, keepdims=True)
-            x = x + step * np.minimum(1.0, LONGEST_M / (size + 1e-12))
+            x = gauss_newton_step(x, normal, g, LONGEST_M)
         return x
 
     def judged(self, place: Array) -> PlaceCandidate:

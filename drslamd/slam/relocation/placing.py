@@ -17,6 +17,7 @@ from drslamd.slam import se2
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.range_model import RangeModel
 from drslamd.slam.relative_pose.solver import EXCLUDED_CHI2
+from drslamd.slam.relocation.minima import distinct_poses, gauss_newton_step
 from drslamd.slam.relocation.sightings import Sightings
 from drslamd.slam.se2 import Array
 
@@ -27,7 +28,6 @@ RINGS = (0.0, 0.5, 1.0)
 FIRST_STEPS, STEPS = 4, 16
 CARRIED = 32
 """Starts that are carried on after the first steps."""
-DAMPING = 1e-3
 LONGEST = 1.0
 """m, rad: what one step may do."""
 MERGE_M, MERGE_RAD = 0.2, 0.15
@@ -89,14 +89,14 @@ def place(seen: Sightings, stretch: WayUnder, prior: Prior, model: RangeModel) -
     best = np.argsort(problem.cost(x), kind="stable")[:CARRIED]
     x = problem.descended(x[best], STEPS)
     x = x[np.argsort(problem.cost(x), kind="stable")]
-    judged = [problem.judged(row) for row in _distinct(x)[:CANDIDATES]]
+    judged = [problem.judged(row) for row in distinct_poses(x, MERGE_M, MERGE_RAD)[:CANDIDATES]]
     judged.sort(key=lambda one: one.chi2)
     first = judged[0]
     is_poor = not first.chi2 <= POOR_FIT * len(seen) or problem.share_off(first.x) > MOST_OFF
     if is_poor:
         return "ranges and odometry disagree"
     rivals = [one for one in judged[1:] if one.chi2 < first.chi2 + EXCLUDED_CHI2]
-    if len(_distinct(np.array([one.x for one in (first, *rivals)]))) > 1:
+    if len(distinct_poses(np.array([one.x for one in (first, *rivals)]), MERGE_M, MERGE_RAD)) > 1:
         return "ambiguous"
     sigma_m = np.sqrt(np.linalg.eigvalsh(first.covariance[:2, :2])[-1])
     if sigma_m > MAX_SIGMA_M or np.sqrt(first.covariance[2, 2]) > MAX_SIGMA_RAD:
@@ -181,11 +181,7 @@ class _Problem:
             normal = np.einsum("mki,mk,mkj->mij", j, w, j)
             normal = normal + np.einsum("mki,mkj->mij", by * v[..., None], by)
             g = np.einsum("mki,mk->mi", j, w * e) + np.einsum("mki,mk->mi", by, v * before)
-            diagonal = np.einsum("mii->mi", normal)
-            normal = normal + (DAMPING * diagonal + 1e-9)[:, :, None] * np.eye(3)
-            step = -np.linalg.solve(normal, g[..., None])[..., 0]
-            size = np.abs(step).max(axis=1, keepdims=True)
-            x = x + step * np.minimum(1.0, LONGEST / (size + 1e-12))
+            x = gauss_newton_step(x, normal, g, LONGEST)
         return x
 
     def judged(self, x: Array) -> _Judged:
@@ -230,19 +226,6 @@ class _Problem:
         c, theta = found.x[:2], found.x[2]
         xy = c - se2.rotate(theta, self._middle)
         return Placed(np.append(xy, theta), found.covariance, self._middle)
-
-
-def _distinct(x: Array) -> Array:
-    """Rows (m, 3), best first, that are not near a better one."""
-    kept: list[Array] = []
-    for row in x:
-        near = any(
-            np.hypot(*(row - other)[:2]) < MERGE_M and abs(se2.wrap(row[2] - other[2])) < MERGE_RAD
-            for other in kept
-        )
-        if not near:
-            kept.append(row)
-    return np.array(kept)
 
 
 def _complex(points: Array) -> Array:
