@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from drslamd.slam.relocation.minima import DAMPING, distinct_poses
+from drslamd.slam.relocation.minima import DAMPING, distinct_poses, gauss_newton_step
 
 
 def test_a_step_of_a_quadratic_cost_goes_nearly_to_its_minimum() -> None:
