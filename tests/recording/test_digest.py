@@ -92,4 +92,3 @@ def test_what_a_solver_keeps_for_the_next_solution_is_no_part_of_this_one() -> N
     found = TeamEstimate(Segment(1, 2, 0), {})
     kept = replace(found, kept=(slice(0, 3), object()))
     assert digest.of_result(kept) == digest.of_result(found)
-    assert kept == found

@@ -31,6 +31,8 @@ from drslamd.sensors.wheels.roboteq import RoboteqDriver
 MS = 1000
 T0 = 100 * SECOND_US
 
+about: Any = pytest.approx  # it stands for a number, whatever its type says
+
 NOT_FROM_A_MODULE = {"linktrack/user_frame1", "linktrack/iot_frame0"}
 """What a host sends to a MASTER, and another product."""
 
@@ -133,9 +135,9 @@ def test_captured_kobuki_packets_give_their_counters_and_their_heading(vectors: 
         samples += driver.feed(data, T0 + k * 20 * MS)
     # (the base holds its heading in hundredths of a degree)
     assert samples == [
-        GyroAngle(T0 + 20 * MS, pytest.approx(math.radians(74.85))),
+        GyroAngle(T0 + 20 * MS, about(math.radians(74.85))),
         WheelCounts(T0 + 20 * MS, 11252, 18272, 16),
-        GyroAngle(T0 + 40 * MS, pytest.approx(math.radians(74.86))),
+        GyroAngle(T0 + 40 * MS, about(math.radians(74.86))),
         WheelCounts(T0 + 40 * MS, 11260, 18279, 16),
     ]
     wrap = KobukiDriver()

@@ -10,10 +10,10 @@ import pytest
 from slam_scenes import EXACT, Array, inverted, product
 
 from drslamd.conventions import GRID_US, Chain, Segment
-from drslamd.slam import range_watch
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.estimate import MUCH_WORSE, Learned, TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import Keyframe
+from drslamd.slam.odometry import jumps
 from drslamd.slam.odometry.jumps import Jump
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.odometry.track import Track
@@ -411,7 +411,7 @@ def jumped(
 ) -> float:
     """What is feared if our wheels went farther by such a way, along the axes of odometry."""
     jump = None if way is None else Jump(n, np.array(way))
-    monkeypatch.setattr(range_watch.jumps, "feared", lambda track: jump)
+    monkeypatch.setattr(jumps, "feared", lambda track: jump)
     scene.look(solved())
     return scene.watch.gap_m
 

@@ -33,6 +33,8 @@ from drslamd.sensors.wheels.dbc_file import decoded
 MS = 1000
 T0 = 100 * SECOND_US
 
+about: Any = pytest.approx  # it stands for a number, whatever its type says
+
 DBC = """
 VERSION ""
 NS_ :
@@ -474,13 +476,13 @@ def turning(driver: DbcDriver, yaw: int) -> list[WheelSample]:
 
 def test_a_gyro_is_read_in_the_unit_of_the_file() -> None:
     driver = DbcDriver(section(**COUNTED, gyro="Imu.Yaw"), DBC)
-    assert turning(driver, -123) == [GyroRate(T0, pytest.approx(math.radians(-12.3)))]
+    assert turning(driver, -123) == [GyroRate(T0, about(math.radians(-12.3)))]
 
 
 def test_a_factor_that_is_given_counts_instead() -> None:
     driver = DbcDriver(section(**COUNTED, gyro="Imu.Odd", gyro_unit=0.01), DBC)
     frame = CanFrame(T0, 264, False, struct.pack("<2h4x", 0, 50))
-    assert driver.on_frame(frame) == [GyroRate(T0, pytest.approx(0.05))]
+    assert driver.on_frame(frame) == [GyroRate(T0, about(0.05))]
 
 
 def test_without_its_key_a_gyro_is_not_read() -> None:
@@ -494,8 +496,8 @@ def test_a_gyro_in_the_frame_of_the_wheels_comes_with_them() -> None:
     driver = DbcDriver(section(**keys, gyro="Speeds.SpeedR", gyro_unit=0.1), DBC)
     frame = CanFrame(T0, 257, False, struct.pack(">hh4x", 360, 720))
     gyro, wheels = driver.on_frame(frame)
-    assert gyro == GyroRate(T0, pytest.approx(0.72))
-    assert wheels == WheelSpeeds(T0, pytest.approx(1.0), pytest.approx(2.0))
+    assert gyro == GyroRate(T0, about(0.72))
+    assert wheels == WheelSpeeds(T0, about(1.0), about(2.0))
 
 
 def test_a_short_frame_of_a_gyro_is_counted_and_costs_nothing_else() -> None:

@@ -15,7 +15,7 @@ from drslamd.sensors.samples import (
     Motion,
     Twist,
     WheelCounts,
-    WheelSample,
+    WheelReading,
     WheelSpeeds,
     WheelTurns,
 )
@@ -43,7 +43,7 @@ def counts(after_ms: float, left: int, right: int, bits: int = 32) -> WheelCount
     return WheelCounts(T0 + round(after_ms * MS), left, right, bits)
 
 
-def motions(*samples: WheelSample, geometry: DriveGeometry = BASE) -> list[Motion]:
+def motions(*samples: WheelReading, geometry: DriveGeometry = BASE) -> list[Motion]:
     base = WheelBase(geometry)
     return [motion for sample in samples if (motion := base.add(sample)) is not None]
 
@@ -386,7 +386,7 @@ def test_whatever_comes_motions_are_finite_and_in_order(
     base, utime, last = WheelBase(BASE), T0, 0
     for kind, pause, left, right, count, bits in events:
         utime += pause
-        samples: dict[str, WheelSample] = {
+        samples: dict[str, WheelReading] = {
             "counts": WheelCounts(utime, count, -count, bits),
             "turns": WheelTurns(utime, left, right),
             "speeds": WheelSpeeds(utime, left, right),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -172,10 +173,14 @@ def test_a_link_far_from_the_origin_keeps_its_digits() -> None:
     ],
 )
 def test_noise_is_plausible_up_to_what_a_configuration_may_say(name: str, most: float) -> None:
-    assert replace(NOISE, **{name: most}).is_plausible()
-    assert not replace(NOISE, **{name: 1.002 * most}).is_plausible()
-    assert not replace(NOISE, **{name: 0.0}).is_plausible()
-    assert not replace(NOISE, **{name: math.nan}).is_plausible()
+    def noise(value: float) -> OdometryNoise:
+        changed: dict[str, Any] = {name: value}
+        return replace(NOISE, **changed)
+
+    assert noise(most).is_plausible()
+    assert not noise(1.002 * most).is_plausible()
+    assert not noise(0.0).is_plausible()
+    assert not noise(math.nan).is_plausible()
 
 
 def test_where_a_gyro_gave_the_heading_the_path_adds_to_translation_only() -> None:

@@ -260,7 +260,8 @@ def test_a_gyro_whose_noise_by_time_is_that_of_the_wheels_by_path_changes_nothin
     team.graph.insert(team.chains[1], GraphEntry(9, RobotModel(wheels)))
     by_gyro = build_problem(team.graph, group, None, BANDED)
     assert by_gyro.problem.priors.yaw[1] == gyro.yaw_rad_per_s
-    assert (by_wheels.by_gyro, by_gyro.by_gyro) == (frozenset(), {1})
+    assert not by_wheels.by_gyro
+    assert set(by_gyro.by_gyro) == {1}
     one, other = (banded_solver.solve(team.problem, team.start) for team in (by_wheels, by_gyro))
     assert other.poses == pytest.approx(one.poses, abs=0.02)
     of_path, of_time = one.calibration.yaw, other.calibration.yaw
