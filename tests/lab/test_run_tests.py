@@ -10,7 +10,8 @@ import pytest
 from lab import run_tests
 from places import REPOSITORY
 
-STEPS = ["lint", "format", "types", "quick tests", "slow tests"]
+QUICK = ["lint", "format", "types", "quick tests"]
+STEPS = [*QUICK, "slow tests in virtual time", "slow tests"]
 
 
 class Steps:
@@ -40,7 +41,16 @@ def test_everything_is_run_and_quick_leaves_the_slow_out(steps: Steps) -> None:
     assert steps.names == STEPS
     steps.names.clear()
     assert run_tests.main(["--quick"]) == 0
-    assert steps.names == STEPS[:-1]
+    assert steps.names == QUICK
+
+
+def test_every_folder_with_slow_tests_is_in_one_of_the_two_steps(steps: Steps) -> None:
+    run_tests.main([])
+    shared, alone = (steps.commands[name] for name in STEPS[-2:])
+    folders = [part for part in shared if part.startswith("tests/")]
+    assert all((REPOSITORY / folder).is_dir() for folder in folders)
+    assert folders == [p.removeprefix("--ignore=") for p in alone if p.startswith("--ignore=")]
+    assert not [part for part in alone if part.startswith("tests/")]
 
 
 @pytest.mark.parametrize("name", STEPS)

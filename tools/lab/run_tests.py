@@ -17,6 +17,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SUPPORTED = ("3.10", "3.11", "3.12", "3.13")
+IN_VIRTUAL_TIME = (
+    *("tests/gossip", "tests/near", "tests/robot", "tests/slam"),
+    *("tests/lab/bound", "tests/lab/reproduce", "tests/lab/soak", "tests/lab/trust"),
+)
+"""Slow here are computations alone, which may share the machine; what runs in real time may not."""
 SHOWN = 4_000
 """Characters of the end of what another interpreter says."""
 
@@ -50,7 +55,10 @@ def main(arguments: list[str] | None = None) -> int:
         ("quick tests", [python, "-m", "pytest", "-q", "-n", "auto", "-m", "not slow"]),
     ]
     if not options.quick:
-        steps.append(("slow tests", [python, "-m", "pytest", "-q", "-m", "slow"]))
+        slow = [python, "-m", "pytest", "-q", "-m", "slow"]
+        real = [f"--ignore={folder}" for folder in IN_VIRTUAL_TIME]
+        steps.append(("slow tests in virtual time", [*slow, "-n", "auto", *IN_VIRTUAL_TIME]))
+        steps.append(("slow tests", [*slow, *real]))
     failed = [name for name, command in steps if _run(name, *command)]
     if not options.quick:
         failed += _other_interpreters()
