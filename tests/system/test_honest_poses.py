@@ -20,9 +20,10 @@ pytestmark = pytest.mark.slow
 
 SEEDS = range(100, 106)
 LEAST, MOST = 0.7, 1.4
-LEAST_OF_CLOSURES, MOST_OF_CLOSURES = 0.65, 1.45
-"""Windows claim a little too much where sensors are better than configured (0.67), and a little too
-little where each pair has a bias of its own as large as configured (1.41): still to be mended."""
+LEAST_OF_CLOSURES, MOST_OF_CLOSURES = 0.60, 1.40
+"""Windows claim a little too much where sensors are better than configured (0.66). Where each pair
+has a bias of its own as large as configured it is 1.32 of these seeds, of which two drew biases of
+2.4 and 2.1 sigmas, 0.99 of seeds 200 to 205, 1.14 of all."""
 
 
 def claims(scene: world.Scene) -> Tally:
@@ -46,7 +47,6 @@ def test_poses_and_closures_are_as_wrong_as_they_say() -> None:
     assert tally["drslamd/claim/below"].mean > 0.98
 
 
-@pytest.mark.xfail(reason="a fault: closures that are believed sooner claim too little, NEES 1.54")
 def test_closures_are_as_wrong_as_they_say_where_sensors_are_as_wrong_as_configured() -> None:
     tally = claims(CONFIGURED)
     assert tally["drslamd/claim/nees"].n > 100 * len(SEEDS)

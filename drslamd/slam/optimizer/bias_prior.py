@@ -13,6 +13,10 @@ where they differ all are held loosely. Its cost is -2 log of the density, witho
 `team` has Cauchy's cost, log(1 + (team / width)^2). Both have Gauss's tails beyond the sigma that
 is configured: without them a bias that motion says little of runs off by metres after whatever else
 is wrong.
+
+How sure of a bias one may be is another question than where it most likely is. The peak of a heavy
+tail is narrow, and most of what it holds is elsewhere: what is told of a bias has the variances of
+these distributions (`own_variance`, `team_variance`), and not the curvatures of their costs.
 """
 
 from __future__ import annotations
@@ -33,6 +37,10 @@ WEIGHT = 1.0
 """In its place: no less than that square, which no step overshoots, however far it starts."""
 TINY = 1e-12
 """m^2; no bias is known so well."""
+ROUNDS, SAME = 50, 1e-3
+"""Of finding how much the pairs of a team differ, until it moves by less than a thousandth."""
+REACH, POINTS = 8.0, 400
+"""Gauss's tails are over after so many sigmas; steps of an integral that far."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +97,38 @@ class BiasPrior:
     def team_curvature(self, team: float, least: float = LEAST_CURVATURE) -> float:
         """Half the second derivative, kept positive."""
         return float(cauchy_curvature(self.team, np.array([team]), least)[0]) + self.sigma**-2
+
+    def own_variance(self, own: Array, told: Array) -> float:
+        """What a pair may have of its own, m^2, where nothing was measured of it.
+
+        Student's distribution is Gauss's with a variance that is unknown, of 1 / chi-squared. What
+        the pairs that were measured have of their own tells of it, and those that were not tell
+        nothing; it is the mean of
+
+            (dof spread^2 + sum (own^2 + variance of own)) / (dof + pairs - 2).
+
+        Args:
+            own: (pairs,) m; told: (pairs,) the information with which it was measured, 1/m^2.
+        """
+        least, count = self.dof * self.spread**2, self.dof + len(own) - 2
+        variance = least / (self.dof - 2)
+        for _ in range(ROUNDS):
+            before = variance
+            left = 1 / (told + 1 / before)
+            variance = (least + float(np.sum(own**2 + left))) / count
+            if abs(variance - before) < SAME * before:
+                break
+        return variance
+
+    @property
+    def team_variance(self) -> float:
+        """What all pairs may have in common, m^2, before anything is measured."""
+        # with team = width sinh(u) the density of Cauchy's cost is even in u
+        u = np.linspace(0.0, np.arcsinh(REACH * self.sigma / self.team), POINTS)
+        squares = (self.team * np.sinh(u)) ** 2
+        tails = np.exp(-squares / (2 * self.sigma**2))
+        tails[0] /= 2
+        return float(tails @ squares / tails.sum())
 
     def _scale(self, own: Array) -> float:
         return self.dof * self.spread**2 + float(own @ own)

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_t
+from scipy.integrate import quad
+from scipy.stats import invgamma, multivariate_t
+from scipy.stats import t as t_distribution
 from slam_scenes import Array
 
 from drslamd.slam.optimizer.bias_prior import (
@@ -172,3 +176,54 @@ def test_far_beyond_what_is_configured_gauss_holds_a_bias(metres: float) -> None
     gauss = metres / 0.3**2
     assert gauss < PRIOR.own_pull(np.array([metres, 0.0]))[0] < 1.2 * gauss
     assert gauss < PRIOR.team_pull(metres) < 1.2 * gauss
+
+
+# how sure one may be
+
+
+@pytest.mark.parametrize(("sigma", "width"), [(0.3, 0.02), (0.3, 0.3), (0.05, 0.001)])
+def test_what_is_common_varies_as_its_distribution_does(sigma: float, width: float) -> None:
+    """The density to the cost -2 log of it, integrated; Cauchy's alone has no variance."""
+    prior = replace(PRIOR, sigma=sigma, team=width)
+
+    def density(team: float) -> float:
+        return math.exp(-prior.cost(np.zeros(0), team) / 2)
+
+    knees = [0.0, width, 10 * width, sigma, 4 * sigma, 12 * sigma]
+    spans = list(pairwise(sorted(knees)))
+    whole = sum(quad(density, *span)[0] for span in spans)
+    squares = sum(quad(lambda t: t * t * density(t), *span)[0] for span in spans)
+    assert prior.team_variance == pytest.approx(squares / whole, rel=1e-3)
+
+
+@pytest.mark.parametrize("count", [1, 3, 40])
+def test_before_anything_is_measured_pairs_vary_as_student_does(count: int) -> None:
+    """The curvature at the peak would say a sixth of that of three pairs."""
+    student = t_distribution(PRIOR.dof, scale=PRIOR.spread).var()
+    assert PRIOR.own_variance(np.zeros(count), np.zeros(count)) == pytest.approx(student, rel=1e-2)
+    assert 1 / PRIOR.own_curvature(np.zeros(3))[0, 0] < student / 5
+
+
+def test_pairs_that_are_known_tell_how_much_those_of_a_team_differ() -> None:
+    """The mean of a variance whose inverse is of chi-squared, with six degrees of freedom."""
+    own, surely = np.array([0.05, -0.3, 0.1]), np.full(3, 1e8)
+    scale = (PRIOR.dof * PRIOR.spread**2 + float(own @ own)) / 2
+    expected = invgamma((PRIOR.dof + 3) / 2, scale=scale).mean()
+    assert PRIOR.own_variance(own, surely) == pytest.approx(expected, rel=1e-3)
+
+
+def test_of_drawn_teams_the_pair_that_was_not_measured_is_as_far_off_as_is_said() -> None:
+    """Two pairs are known to 2 cm; teams that differ much and little are told apart."""
+    prior, rng = replace(PRIOR, dof=10.0, sigma=10.0), np.random.default_rng(3)
+    width = prior.spread * np.sqrt(prior.dof / rng.chisquare(prior.dof, 3000))
+    own = width[:, None] * rng.normal(size=(3000, 3))
+    said = np.array(
+        [
+            prior.own_variance(np.array([*seen, 0.0]), np.array([2500.0, 2500.0, 0.0]))
+            for seen in own[:, :2] + rng.normal(0, 0.02, (3000, 2))
+        ]
+    )
+    wide = said > np.median(said)
+    assert said[wide].mean() > 1.2 * said[~wide].mean()
+    for some in (wide, ~wide):
+        assert np.mean(own[some, 2] ** 2 / said[some]) == pytest.approx(1.0, abs=0.12)

@@ -39,7 +39,8 @@ def covariances(
     sigmas = np.full(layout.band + layout.border, np.sqrt(UNKNOWN))
     if factor is None or joint is None or not _is_known(joint):
         return UNKNOWN * np.eye(len(poses)), layout.calibration(sigmas)
-    learned = np.linalg.inv(factor.schur + equations.bias_belief(point))
+    claimed = np.diag(np.linalg.inv(factor.schur))[layout.bias - layout.band]
+    learned = np.linalg.inv(factor.schur + equations.bias_belief(point, claimed))
     sigmas[layout.band :] = np.sqrt(np.diag(learned))
     return joint, layout.calibration(sigmas)
 

@@ -33,7 +33,8 @@ def kept_covariances(
     joint = cholesky_solved(lower, unit)[at]
     first = len(lower) - len(claimed.places.flat.constants)
     own = lower[first:, first:]
-    belief = Equations(problem, layout=layout).bias_belief(point)[first:, first:]
+    alone = (inverse_triangular(own) ** 2).sum(axis=0)[layout.bias - layout.band - first]
+    belief = Equations(problem, layout=layout).bias_belief(point, alone)[first:, first:]
     try:
         learned = inverse_triangular(np.linalg.cholesky(own @ own.T + belief))
     except np.linalg.LinAlgError:
