@@ -3,42 +3,22 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import json
-import socket
 import subprocess
-import sys
-import threading
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from near_scenes import NEAR
-from places import REPOSITORY
 
 from drslamd.feed.foxglove_server import as_json
-from drslamd.gossip.seal import VERSION, Header
-from drslamd.near.near_message import encode
 
 aiohttp = pytest.importorskip("aiohttp", reason="aiohttp is not installed")
 pytest.importorskip("foxglove", reason="foxglove-sdk is not installed")
 
 import browser  # noqa: E402
+from telling import feeding  # noqa: E402
 
-CONFIG = """
-[robot]
-id = 3
-[team]
-insecure = true
-[uwb]
-port = "/dev/none"
-[wheels]
-source = "kobuki"
-port = "/dev/none"
-[daemon]
-status_socket = "{folder}/3.sock"
-"""
 TOPICS = {"/tf", "/robot_3/pose", "/robot_3/near"}
 MESSAGE, HEAD = 1, 13
 """Of a binary message of that protocol: its kind, and the bytes before the content."""
@@ -49,22 +29,6 @@ def test_peers_are_shown_in_metres_and_seconds_with_their_sigmas() -> None:
     assert told["peers"]["1"]["age_s"] == pytest.approx(0.1)
     assert told["peers"]["2"]["state"] == "stale"
     assert told["sigma"]["x_m"] == 0.25
-
-
-def telling(path: Path, ended: threading.Event) -> threading.Thread:
-    """A daemon that says the same again and again."""
-    daemon = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    daemon.bind(str(path))
-    daemon.listen(1)
-
-    def serve() -> None:
-        with daemon, daemon.accept()[0] as reader:
-            while not ended.wait(0.05):
-                reader.send(encode(Header(VERSION, 3, 7, 0, 5_000_001), NEAR))
-
-    thread = threading.Thread(target=serve)
-    thread.start()
-    return thread
 
 
 async def seen(url: str) -> tuple[dict[str, Any], Any]:
@@ -88,29 +52,15 @@ async def seen(url: str) -> tuple[dict[str, Any], Any]:
                 return channels, json.loads(message.data[HEAD:])
 
 
-@contextlib.contextmanager
-def feeding(folder: Path) -> Iterator[str]:
-    """Where `drslamd feed foxglove` of such a daemon serves."""
-    config, ended = folder / "3.toml", threading.Event()
-    config.write_text(CONFIG.format(folder=folder))
-    daemon = telling(folder / "3.near", ended)
-    command = (sys.executable, "-m", "drslamd", "feed", "foxglove", "-c", str(config))
-    with subprocess.Popen(
-        (*command, "--port", "0"), cwd=REPOSITORY, stdout=subprocess.PIPE, text=True
-    ) as feed:
-        assert feed.stdout is not None
-        url = feed.stdout.readline().split()[1]
-        try:
-            yield url
-        finally:
-            feed.terminate()
-            ended.set()
-            daemon.join()
+def address(feed: subprocess.Popen[str]) -> str:
+    """Where it says that it serves."""
+    assert feed.stdout is not None
+    return feed.stdout.readline().split()[1]
 
 
 def test_a_client_sees_the_channels_and_what_is_told(tmp_path: Path) -> None:
-    with feeding(tmp_path) as url:
-        channels, told = asyncio.run(asyncio.wait_for(seen(url), 20))
+    with feeding(tmp_path, "foxglove", "--port", "0") as feed:
+        channels, told = asyncio.run(asyncio.wait_for(seen(address(feed)), 20))
     assert set(channels) == TOPICS
     assert channels["/tf"]["schemaName"] == "foxglove.FrameTransforms"
     assert told == as_json(NEAR)
@@ -148,8 +98,8 @@ async def browsed(url: str) -> dict[str, str]:
 @pytest.mark.slow
 @pytest.mark.skipif(browser.CHROMIUM is None, reason="no chromium is installed")
 def test_a_browser_sees_frames_pose_and_peers(tmp_path: Path) -> None:
-    with feeding(tmp_path) as url:
-        told = asyncio.run(browsed(url))
+    with feeding(tmp_path, "foxglove", "--port", "0") as feed:
+        told = asyncio.run(browsed(address(feed)))
     assert set(told) == TOPICS
     assert json.loads(told["/robot_3/near"]) == as_json(NEAR)
     for frame in ("team_of_0", "robot_3/odom", "robot_3/base_link", "robot_3/sees/robot_2"):
