@@ -52,6 +52,7 @@ def add(verbs: Verbs) -> None:
 
 
 def _feed(options: argparse.Namespace) -> int:
+    from drslamd.cli.watch import ended_by_a_signal
     from drslamd.feed.stream import told
     from drslamd.machine.folders import near_path
 
@@ -71,8 +72,9 @@ def _feed(options: argparse.Namespace) -> int:
         print(f"drslamd feed {options.kind}: {reason}", file=sys.stderr)
         return CANNOT_CREATE if options.mcap else UNAVAILABLE
     try:
-        for near in told(path):
-            feed.tell(near)
+        with ended_by_a_signal():
+            for near in told(path):
+                feed.tell(near)
     except OSError as error:
         reason = error.strerror or str(error)
         print(f"{path}: {reason}; is drslamd running for this configuration?", file=sys.stderr)

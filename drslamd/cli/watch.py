@@ -30,7 +30,7 @@ def watch(path: Path, config_path: str, sleep: Callable[[float], object] = time.
     """
     show = _draw if sys.stdout.isatty() else _print
     picture, before, then = answer(path, "status", config_path), None, 0.0
-    with _ended_by_a_signal(), _screen():
+    with ended_by_a_signal(), _screen():
         try:
             while True:
                 now = time.monotonic()
@@ -84,8 +84,8 @@ def _screen() -> Iterator[None]:
 
 
 @contextmanager
-def _ended_by_a_signal() -> Iterator[None]:
-    """SIGTERM ends it as Ctrl-C does, so that the terminal is as it was."""
+def ended_by_a_signal() -> Iterator[None]:
+    """SIGTERM ends it as Ctrl-C does, so that what was begun is put in order."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield

@@ -1,11 +1,16 @@
-"""``drslamd feed``: what it says when it cannot."""
+"""``drslamd feed``: what it says when it cannot, and what others hear when it can."""
 
 from __future__ import annotations
 
+import signal
+import socket
 import sys
 from pathlib import Path
 
 import pytest
+from lab.play.real_team import free_port
+from near_scenes import NEAR
+from telling import feeding
 
 from drslamd import cli
 
@@ -49,3 +54,54 @@ def test_a_file_that_cannot_be_made_is_one_sentence(
     there = str(tmp_path / "no" / "run.mcap")
     assert cli.main(["feed", "ros2", "-c", str(config), "--mcap", there]) == 73
     assert "No such file" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_file_has_its_end_however_the_feed_is_ended(tmp_path: Path, number: int) -> None:
+    pytest.importorskip("mcap", reason="mcap is not installed")
+    from mcap.reader import make_reader
+
+    path = tmp_path / "run.mcap"
+    with feeding(tmp_path, "ros2", "--mcap", str(path)) as feed:
+        feed.send_signal(number)
+        assert feed.wait(10) == 0
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    assert summary.statistics.message_count > 0
+
+
+@pytest.mark.slow
+def test_an_autopilot_hears_the_feed_at_its_port(tmp_path: Path) -> None:
+    common = pytest.importorskip("pymavlink.dialects.v20.common", reason="no pymavlink")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
+        port.bind(("127.0.0.1", 0))
+        port.settimeout(20)
+        to = f"127.0.0.1:{port.getsockname()[1]}"
+        with feeding(tmp_path, "mavlink", "--to", to):
+            (message,) = common.MAVLink(None).parse_buffer(port.recv(1024))
+    assert message.get_type() == "ODOMETRY"
+    assert (message.x, message.y) == pytest.approx((NEAR.pose[0], -NEAR.pose[1]))
+
+
+@pytest.mark.slow
+def test_dimos_hears_the_feed_over_lcm(tmp_path: Path) -> None:
+    nav = pytest.importorskip("dimos_lcm.nav_msgs", reason="dimos-lcm is not installed")
+    import lcm
+
+    url = f"udpm://239.255.76.67:{free_port()}?ttl=0"
+    try:
+        bus = lcm.LCM(url)
+    except RuntimeError:
+        pytest.skip("LCM finds no network for multicast here")
+    heard: list[bytes] = []
+    bus.subscribe("/robot_3/odometry#nav_msgs.Odometry", lambda _, payload: heard.append(payload))
+    with feeding(tmp_path, "dimos", "--url", url):
+        for _ in range(40):
+            if not heard:
+                bus.handle_timeout(500)
+    message = nav.Odometry.lcm_decode(heard[0])
+    assert message.child_frame_id == "robot_3/base_link"
+    assert message.pose.pose.position.y == NEAR.odom[1]

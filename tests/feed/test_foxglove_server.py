@@ -3,38 +3,23 @@
 from __future__ import annotations
 
 import asyncio
-import importlib.util
 import json
-import socket
 import subprocess
-import sys
-import threading
 from pathlib import Path
 from typing import Any
 
 import pytest
 from near_scenes import NEAR
-from places import REPOSITORY
 
 from drslamd.feed.foxglove_server import as_json
-from drslamd.gossip.seal import VERSION, Header
-from drslamd.near.near_message import encode
 
 aiohttp = pytest.importorskip("aiohttp", reason="aiohttp is not installed")
+pytest.importorskip("foxglove", reason="foxglove-sdk is not installed")
 
-CONFIG = """
-[robot]
-id = 3
-[team]
-insecure = true
-[uwb]
-port = "/dev/none"
-[wheels]
-source = "kobuki"
-port = "/dev/none"
-[daemon]
-status_socket = "{folder}/3.sock"
-"""
+import browser  # noqa: E402
+from telling import feeding  # noqa: E402
+
+TOPICS = {"/tf", "/robot_3/pose", "/robot_3/near"}
 MESSAGE, HEAD = 1, 13
 """Of a binary message of that protocol: its kind, and the bytes before the content."""
 
@@ -44,22 +29,6 @@ def test_peers_are_shown_in_metres_and_seconds_with_their_sigmas() -> None:
     assert told["peers"]["1"]["age_s"] == pytest.approx(0.1)
     assert told["peers"]["2"]["state"] == "stale"
     assert told["sigma"]["x_m"] == 0.25
-
-
-def telling(path: Path, ended: threading.Event) -> threading.Thread:
-    """A daemon that says the same again and again."""
-    daemon = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    daemon.bind(str(path))
-    daemon.listen(1)
-
-    def serve() -> None:
-        with daemon, daemon.accept()[0] as reader:
-            while not ended.wait(0.05):
-                reader.send(encode(Header(VERSION, 3, 7, 0, 5_000_001), NEAR))
-
-    thread = threading.Thread(target=serve)
-    thread.start()
-    return thread
 
 
 async def seen(url: str) -> tuple[dict[str, Any], Any]:
@@ -83,25 +52,56 @@ async def seen(url: str) -> tuple[dict[str, Any], Any]:
                 return channels, json.loads(message.data[HEAD:])
 
 
-@pytest.mark.skipif(
-    importlib.util.find_spec("foxglove") is None, reason="foxglove-sdk is not installed"
-)
+def address(feed: subprocess.Popen[str]) -> str:
+    """Where it says that it serves."""
+    assert feed.stdout is not None
+    return feed.stdout.readline().split()[1]
+
+
 def test_a_client_sees_the_channels_and_what_is_told(tmp_path: Path) -> None:
-    config, ended = tmp_path / "3.toml", threading.Event()
-    config.write_text(CONFIG.format(folder=tmp_path))
-    daemon = telling(tmp_path / "3.near", ended)
-    command = (sys.executable, "-m", "drslamd", "feed", "foxglove", "-c", str(config))
-    with subprocess.Popen(
-        (*command, "--port", "0"), cwd=REPOSITORY, stdout=subprocess.PIPE, text=True
-    ) as feed:
-        assert feed.stdout is not None
-        url = feed.stdout.readline().split()[1]
-        try:
-            channels, told = asyncio.run(asyncio.wait_for(seen(url), 20))
-        finally:
-            feed.terminate()
-            ended.set()
-            daemon.join()
-    assert set(channels) == {"/tf", "/robot_3/pose", "/robot_3/near"}
+    with feeding(tmp_path, "foxglove", "--port", "0") as feed:
+        channels, told = asyncio.run(asyncio.wait_for(seen(address(feed)), 20))
+    assert set(channels) == TOPICS
     assert channels["/tf"]["schemaName"] == "foxglove.FrameTransforms"
     assert told == as_json(NEAR)
+
+
+BROWSED = """new Promise((resolve, reject) => {
+  const socket = new WebSocket(%s, ["foxglove.sdk.v1"]), topics = new Map(), told = {};
+  socket.binaryType = "arraybuffer";
+  socket.onerror = () => reject(new Error("no connection"));
+  socket.onmessage = ({ data }) => {
+    if (typeof data === "string") {
+      const said = JSON.parse(data), subscriptions = [];
+      for (const { id, topic } of said.op === "advertise" ? said.channels : []) {
+        topics.set(id, topic);
+        subscriptions.push({ id, channelId: id });
+      }
+      socket.send(JSON.stringify({ op: "subscribe", subscriptions }));
+    } else if (new Uint8Array(data)[0] === 1) {
+      const topic = topics.get(new DataView(data).getUint32(1, true));
+      told[topic] = new TextDecoder().decode(new Uint8Array(data, 13));
+      if (Object.keys(told).length === 3) { socket.close(); resolve(told); }
+    }
+  };
+})"""
+"""A client in a browser: what comes first on each channel, as text."""
+
+
+async def browsed(url: str) -> dict[str, str]:
+    async with browser.tab() as page:
+        told: dict[str, str] = await page.run(BROWSED % json.dumps(url))
+        assert page.complaints == []
+        return told
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(browser.CHROMIUM is None, reason="no chromium is installed")
+def test_a_browser_sees_frames_pose_and_peers(tmp_path: Path) -> None:
+    with feeding(tmp_path, "foxglove", "--port", "0") as feed:
+        told = asyncio.run(browsed(address(feed)))
+    assert set(told) == TOPICS
+    assert json.loads(told["/robot_3/near"]) == as_json(NEAR)
+    for frame in ("team_of_0", "robot_3/odom", "robot_3/base_link", "robot_3/sees/robot_2"):
+        assert frame in told["/tf"]
+    assert "team_of_0" in told["/robot_3/pose"]

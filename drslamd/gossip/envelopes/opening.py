@@ -33,15 +33,19 @@ Outcome = Union[Opened, SealFault, str, None]
 """Or why it is to be refused; None for what is not meant for robots."""
 
 
+def unframed(event: Datagram | ChannelMessage) -> tuple[str, bytes] | lc02.FramingFault:
+    """Channel and payload, whether LCM has taken off its framing or we have to."""
+    if isinstance(event, Datagram):
+        return lc02.decode(event.data)
+    return event.channel, event.payload
+
+
 def opened(seal: Seal, event: Datagram | ChannelMessage) -> Outcome:
     """What came, proven and within its bounds. Nothing is remembered of it."""
-    if isinstance(event, Datagram):
-        framed = lc02.decode(event.data)
-        if isinstance(framed, lc02.FramingFault):
-            return framed.value
-        channel, payload = framed
-    else:
-        channel, payload = event.channel, event.payload
+    framed = unframed(event)
+    if isinstance(framed, lc02.FramingFault):
+        return framed.value
+    channel, payload = framed
     kind = messages.kind_of_channel(channel)
     if channel.startswith(messages.NEAR_PREFIX):
         return None  # for whoever steers, not for robots
@@ -67,13 +71,10 @@ def opened(seal: Seal, event: Datagram | ChannelMessage) -> Outcome:
 
 def entry_of(event: Datagram | ChannelMessage) -> tuple[GraphEntry, bytes] | None:
     """The entry of a log that it says it is, and as it was sealed; nothing of it is proven."""
-    if isinstance(event, Datagram):
-        framed = lc02.decode(event.data)
-        if isinstance(framed, lc02.FramingFault):
-            return None
-        channel, payload = framed
-    else:
-        channel, payload = event.channel, event.payload
+    framed = unframed(event)
+    if isinstance(framed, lc02.FramingFault):
+        return None
+    channel, payload = framed
     is_entry = messages.kind_of_channel(channel) == "GRAPH"
     entry = messages.decode("GRAPH", payload) if is_entry else None
     return (entry, payload) if isinstance(entry, GraphEntry) else None

@@ -14,6 +14,7 @@ from typing import NamedTuple, Union
 from drslamd.conventions import SECOND_US, Chain
 from drslamd.events import ChannelMessage, Datagram
 from drslamd.gossip import lc02, messages
+from drslamd.gossip.envelopes.opening import unframed
 from drslamd.gossip.messages import Message
 from drslamd.gossip.seal import Header, Seal, SealFault, header_of, team_key
 
@@ -78,13 +79,10 @@ class Hearing:
         return verdict
 
     def _judged(self, event: Union[Datagram, ChannelMessage]) -> Said | str:
-        if isinstance(event, Datagram):
-            framed = lc02.decode(event.data)
-            if isinstance(framed, lc02.FramingFault):
-                return framed.value
-            channel, payload = framed
-        else:
-            channel, payload = event.channel, event.payload
+        framed = unframed(event)
+        if isinstance(framed, lc02.FramingFault):
+            return framed.value
+        channel, payload = framed
         kind = messages.kind_of_channel(channel)
         if kind is None:
             return "channel of another program"

@@ -15,9 +15,13 @@ from lab.reproduce.tally import Tally
 def test_efficiency_is_variance_over_mean_square_error() -> None:
     tally = Tally()
     metres, radians = np.array([0.3, 0.4]), np.radians([1.0, 2.0])
-    efficiency._put(tally, "x", (metres, np.degrees(radians)), (metres**2 / 2, radians**2 / 4))
+    errors = metres, np.degrees(radians)
+    told = metres / 2, np.degrees(radians) * 0.75
+    efficiency._put(tally, "x", (metres**2 / 2, radians**2 / 4), told, errors)
     assert efficiency.of(tally, "x/m") == pytest.approx(0.5)
     assert efficiency.of(tally, "x/deg") == pytest.approx(0.25)
+    assert efficiency.on_same_data(tally, "x/m") == pytest.approx(0.25)
+    assert efficiency.on_same_data(tally, "x/deg") == pytest.approx(0.5625)
     assert np.isnan(efficiency.of(tally, "y/m"))
 
 

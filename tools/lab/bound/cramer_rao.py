@@ -50,13 +50,11 @@ class Bound:
     hindsight: Array
     poses: Array
 
-    def of_pose(self, robot: int, t: float) -> tuple[float, float]:
-        """Variances of position, m^2, and heading, rad^2, that can be reached live."""
-        covariance = self.live[int(np.argmin(np.abs(self.t - t)))]
+    def of_pose(self, k: int, robot: int) -> tuple[Array, Array]:
+        """(1,) variances of position, m^2, and heading, rad^2, that can be reached live."""
         at = 3 * robot
-        return float(covariance[at, at] + covariance[at + 1, at + 1]), float(
-            covariance[at + 2, at + 2]
-        )
+        x, y, theta = np.diag(self.live[k])[at : at + 3]
+        return np.array([x + y]), np.array([theta])
 
     def of_pair(self, a: int, b: int) -> tuple[Array, Array]:
         """(k,) variances of position and heading of b seen from a, in hindsight."""
@@ -71,68 +69,101 @@ class Bound:
 
 def of_recording(recording: Recording, scene: Scene, times: Array) -> Bound:
     """The bound of a simulated recording of a scene, at these times, s."""
+    truths = true_steps(recording)
+    return of_team(truths, scene, steps_at(times, len(truths)))
+
+
+def true_steps(recording: Recording) -> Array:
+    """(n, R, 3) where everybody was, one each `STEP_S`."""
     trails = [recording.trails[robot] for robot in sorted(recording.trails)]
     t = np.arange(0.0, trails[0].t[-1], STEP_S)
-    truths = np.stack([metrics.at_times(x.t, x.truth, t) for x in trails], axis=1)
+    return np.stack([metrics.at_times(x.t, x.truth, t) for x in trails], axis=1)
+
+
+def steps_at(times: Array, count: int) -> Array:
+    """The steps of these times, s, as far as there are any."""
     at = np.round(times / STEP_S).astype(int)
-    return of_team(truths, scene, at[at < len(t)])
+    return at[at < count]
 
 
 def of_team(truths: Array, scene: Scene, at: Array) -> Bound:
     """The bound for true poses (n, R, 3), one each `STEP_S`, at some of the n."""
     robots = truths.shape[1]
-    pairs = list(combinations(range(robots), 2))
-    transition = _Transition(scene.odometry, scene.ranges, robots, len(pairs))
-    white = _white(scene)
-    sight = _sights(truths, pairs, transition.size)
-    covariance = _start(scene.odometry, scene.ranges, robots, len(pairs))
-    wanted, found = set(at.tolist()), dict[int, Array]()
-    before: list[tuple[Array, Array, Array]] = []
-    filtered: dict[int, Array] = {}
-    for k in range(len(truths)):
-        f = np.eye(transition.size)
-        if k:
-            f, q = transition.step(truths[k - 1], truths[k])
-            covariance = f @ covariance @ f.T + q
-        h = sight[k]
-        innovation = h @ covariance @ h.T + white * np.eye(len(h))
-        gain = np.linalg.solve(innovation, h @ covariance).T
-        before.append((f, gain, innovation))
-        if k in wanted:
-            found[k] = covariance
-        left = np.eye(transition.size) - gain @ h
-        covariance = left @ covariance @ left.T + white * gain @ gain.T
-        if k in wanted:
-            filtered[k] = covariance
-    smoothed = _smoothed(before, sight, found)
+    white = np.full((len(truths), robots * (robots - 1) // 2), _white(scene))
+    gone = through(truths, scene, white, at)
     poses = slice(0, 3 * robots)
+    smoothed = _smoothed(gone)
     return Bound(
         at * STEP_S,
-        np.array([filtered[k][poses, poses] for k in at.tolist()]),
+        np.array([gone.filtered[k][poses, poses] for k in at.tolist()]),
         np.array([smoothed[k][poses, poses] for k in at.tolist()]),
         truths[at],
     )
 
 
-def _smoothed(
-    before: Sequence[tuple[Array, Array, Array]], sight: Array, predicted: dict[int, Array]
-) -> dict[int, Array]:
-    """Covariances after all measurements, from those before each: P - P L P, with L from behind.
+@dataclass(frozen=True)
+class Gone:
+    """Kalman's filter, gone through all steps.
+
+    Attributes:
+        steps: how each came from the one before, its gain and its innovation.
+        sight: (n, P, size) derivatives of the ranges.
+        predicted, filtered: covariances before and after what was measured, where wanted.
+    """
+
+    steps: list[tuple[Array, Array, Array]]
+    sight: Array
+    predicted: dict[int, Array]
+    filtered: dict[int, Array]
+
+
+def through(truths: Array, scene: Scene, white: Array, at: Array) -> Gone:
+    """The filter, linear about the truth.
 
     Args:
-        before: how each step came from the one before, its gain and its innovation.
-        sight: (n, P, size) derivatives of the ranges.
-        predicted: P where it is wanted.
+        white: (n, P) variances of what was measured between each pair in each step.
+        at: steps of which covariances are kept.
     """
-    size = sight.shape[2]
+    robots = truths.shape[1]
+    pairs = pairs_of(robots)
+    transition = _Transition(scene.odometry, scene.ranges, robots, len(pairs))
+    covariance = _start(scene.odometry, scene.ranges, robots, len(pairs))
+    gone = Gone([], _sights(truths, pairs, transition.size), {}, {})
+    wanted = set(at.tolist())
+    for k in range(len(truths)):
+        f = np.eye(transition.size)
+        if k:
+            f, q = transition.step(truths[k - 1], truths[k])
+            covariance = f @ covariance @ f.T + q
+        h = gone.sight[k]
+        innovation = h @ covariance @ h.T + np.diag(white[k])
+        gain = np.linalg.solve(innovation, h @ covariance).T
+        gone.steps.append((f, gain, innovation))
+        if k in wanted:
+            gone.predicted[k] = covariance
+        left = np.eye(transition.size) - gain @ h
+        covariance = left @ covariance @ left.T + (gain * white[k]) @ gain.T
+        if k in wanted:
+            gone.filtered[k] = covariance
+    return gone
+
+
+def pairs_of(robots: int) -> list[tuple[int, int]]:
+    return list(combinations(range(robots), 2))
+
+
+def _smoothed(gone: Gone) -> dict[int, Array]:
+    """Covariances after all measurements, from those before each: P - P L P, with L from behind."""
+    size = gone.sight.shape[2]
     later, out = np.zeros((size, size)), dict[int, Array]()
-    for k in range(len(before) - 1, -1, -1):
-        f, gain, innovation = before[k]
-        h = sight[k]
+    for k in range(len(gone.steps) - 1, -1, -1):
+        f, gain, innovation = gone.steps[k]
+        h = gone.sight[k]
         left = np.eye(size) - gain @ h
         known = h.T @ np.linalg.solve(innovation, h) + left.T @ later @ left
-        if k in predicted:
-            out[k] = predicted[k] - predicted[k] @ known @ predicted[k]
+        if k in gone.predicted:
+            predicted = gone.predicted[k]
+            out[k] = predicted - predicted @ known @ predicted
         later = f.T @ known @ f
     return out
 

@@ -11,7 +11,7 @@ import json
 import sys
 from pathlib import Path
 
-from lab.bound import first_pose
+from lab.bound import efficiency, first_pose
 from lab.progress import Progress
 from lab.reproduce import experiment, pages, pictures, plan, rbcd_table, verdict
 from lab.reproduce.gyro import gyro_rows
@@ -26,6 +26,7 @@ examples:
   tools/reproduce --rbcd data               module 3 against its centralised optimum, 15 minutes
   tools/reproduce --rbcd data --quick       one recorded case and one graph of them
   tools/reproduce --gyro --seeds 4          what a gyro brings, and what a wrong one costs
+  tools/reproduce --efficiency --seeds 3    how near to the best that there is, an hour
   tools/reproduce --first-pose --seeds 500  how soon robots of the demo say where they are
   tools/reproduce --calibrate               the noise for which odometry is as wrong as the paper's
 
@@ -47,8 +48,13 @@ def main(arguments: list[str] | None = None) -> int:
         return rbcd(options.rbcd, options.quick)
     if options.gyro:
         return gyro(1 if options.quick else options.seeds)
-    out = options.out or Path("out/reproduce-quick" if options.quick else "out/reproduce")
-    pieces = plan.quick() if options.quick else plan.full(options.seeds)
+    if options.efficiency:
+        out, write = options.out or Path("out/reproduce-efficiency"), write_efficiency
+        pieces = plan.efficient(1, efficiency.TEAMS[:2])
+        pieces = pieces if options.quick else plan.efficient(options.seeds)
+    else:
+        out = options.out or Path("out/reproduce-quick" if options.quick else "out/reproduce")
+        pieces, write = plan.quick() if options.quick else plan.full(options.seeds), write_all
     state = State(out / "state.json")
     if state.stale:
         print(f"{out}/state.json was made by other code: starting anew", file=sys.stderr)
@@ -57,7 +63,7 @@ def main(arguments: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"\nbroken off; {len(state.done)} pieces are kept in {out}", file=sys.stderr)
         return BROKEN_OFF
-    checks = write(pieces, state, out)
+    checks = write(state.total([piece.name for piece in pieces]), out)
     print((out / "verdict.md").read_text())
     print(f"everything: {out}/results.md")
     return 0 if all(check.ok for check in checks) else 1
@@ -113,6 +119,9 @@ def _parser() -> argparse.ArgumentParser:
         "--gyro", action="store_true", help="the experiment with gyros, 10 minutes a seed"
     )
     parser.add_argument(
+        "--efficiency", action="store_true", help="how near to the Cramer-Rao bound"
+    )
+    parser.add_argument(
         "--first-pose", action="store_true", help="time first poses, and count wrong ones"
     )
     parser.add_argument("--calibrate", action="store_true", help="print the noise and end")
@@ -132,16 +141,28 @@ def work(pieces: list[plan.Piece], state: State) -> None:
     progress.end()
 
 
-def write(pieces: list[plan.Piece], state: State, out: Path) -> list[verdict.Check]:
-    """Pages, figures and pictures of everything in the state."""
-    total = state.total([piece.name for piece in pieces])
+def write_all(total: Tally, out: Path) -> list[verdict.Check]:
+    """Pages, figures and pictures of everything."""
     checks = verdict.checks(total)
+    drawn = pictures.draw(total, out)
+    _write(total, checks, pages.everything(total, checks, drawn), out)
+    return checks
+
+
+def write_efficiency(total: Tally, out: Path) -> list[verdict.Check]:
+    """How near to the bound."""
+    checks = verdict.efficient(total)
+    page = pages.efficiency_of(total)
+    print(page, end="\n\n")
+    _write(total, checks, page + "\n", out)
+    return checks
+
+
+def _write(total: Tally, checks: list[verdict.Check], page: str, out: Path) -> None:
     figures = {"verdict": [check.as_dict() for check in checks], "figures": total.as_dict()}
     (out / "results.json").write_text(json.dumps(figures, indent=1) + "\n")
     (out / "verdict.md").write_text(pages.verdict(checks))
-    drawn = pictures.draw(total, out)
-    (out / "results.md").write_text(pages.everything(total, checks, drawn))
-    return checks
+    (out / "results.md").write_text(page)
 
 
 if __name__ == "__main__":

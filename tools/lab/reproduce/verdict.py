@@ -60,7 +60,7 @@ def checks(total: Tally) -> list[Check]:
         *_optimised(total),
         *_beaten(total),
         *_honest(total),
-        *_efficient(total),
+        *efficient(total),
     ]
 
 
@@ -182,12 +182,12 @@ def _claims(total: Tally, name: str, words: str) -> list[Check]:
     ]
 
 
-def _efficient(total: Tally) -> list[Check]:
+def efficient(total: Tally) -> list[Check]:
     """Is the mean square error near the Cramer-Rao bound, for the teams that were played?"""
     return [
         at_least(
-            f"{team.robots} robots, {team.loss:.0%} loss, {row}, {unit}: bound over mean square",
-            efficiency.of(total, f"{team.name}/{row}/{unit}"),
+            f"{team.robots} robots, {team.loss:.0%} loss, {row}, {unit}: efficiency, same data",
+            efficiency.on_same_data(total, f"{team.name}/{row}/{unit}"),
             efficiency.LEAST[team.loss],
         )
         for team in efficiency.TEAMS
