@@ -47,7 +47,7 @@ def test_where_ranges_are_the_edges_one_in_a_while_is_said(
 
 
 def test_of_closures_that_are_believed_at_once_the_newest_is_said_first() -> None:
-    """Where module 3 begins: the oldest knows least, and may lie in another valley of the ranges."""
+    """Module 3 begins there: the oldest knows least, and may lie in another valley of ranges."""
     pair = OwnedPair(Agreement(9, 2, confirms=False))
     pair.see(BESIDE, 9)
     assert pair.told(every=False) == [(8, True)]
