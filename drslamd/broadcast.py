@@ -164,14 +164,16 @@ class Broadcast:
         away = [float(np.hypot(*(here[:2] - left.places[0].pose[:2]))) for left in found]
         nearest = [left for _, left in sorted(zip(away, found, strict=True), key=lambda p: p[0])]
         x, y, theta = here.tolist()
-        while sum(len(left.places) for left in nearest) > MAX_PLACES:
+        while (
+            sum(len(left.places) for left in nearest) > MAX_PLACES
+            or sum(left.motion is not None for left in nearest) > MAX_MOTIONS
+        ):
             nearest.pop()
-        motions = [left.motion for left in nearest if left.motion is not None]
         return Hypotheses(
             odom_utime=(track.end - 1) * GRID_US,
             odom=(x, y, float(se2.wrap(theta))),
             places=tuple(place for left in nearest for place in left.places),
-            motions=tuple(motions[:MAX_MOTIONS]),
+            motions=tuple(left.motion for left in nearest if left.motion is not None),
         )
 
     # pose

@@ -90,10 +90,10 @@ def test_of_many_peers_the_nearest_have_room() -> None:
     assert len(said.places) == MAX_PLACES
     assert [place.peer for place in said.places[::4]] == [8, 7, 6, 5, 4]
     assert [motion.peer for motion in said.motions] == [8, 7, 6, 5, 4]
-    single = Scene([left_of(peer, float(peer), count=2) for peer in range(1, 11)]).make()
-    assert single is not None
-    assert len(single.places) == MAX_PLACES
-    assert len(single.motions) == MAX_MOTIONS
+    two = Scene([left_of(peer, float(peer), count=2) for peer in range(1, 11)]).make()
+    assert two is not None
+    assert len(two.motions) == MAX_MOTIONS
+    assert [place.peer for place in two.places[::2]] == [motion.peer for motion in two.motions]
 
 
 @pytest.mark.parametrize(

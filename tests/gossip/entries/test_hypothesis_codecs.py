@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from message_builders import COVARIANCE, HEADER, kinds
@@ -13,8 +13,7 @@ from drslamd.gossip import messages
 from drslamd.gossip.message_types import MAX_MOTIONS, MAX_PLACES, Hypotheses
 from drslamd.slam.hypotheses.deciding_motion import NO_TURN, WAYS_M
 
-SAID = kinds()["HYPOTHESES"]
-assert isinstance(SAID, Hypotheses)
+SAID = cast(Hypotheses, kinds()["HYPOTHESES"])
 (PLACE, _), (MOTION,) = SAID.places, SAID.motions
 
 

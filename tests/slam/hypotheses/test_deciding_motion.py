@@ -166,8 +166,8 @@ def solved(a: Array, b: Array, seed: int) -> RelativePoseEstimate:
     a, b = (np.concatenate([way, np.repeat(way[-1:], n - len(way), axis=0)]) for way in (a, b))
     ranges = np.hypot(*(a - b)[:, :2].T) + np.random.default_rng(seed).normal(0, 0.03, n)
     at = np.arange(n - 1, -1, -5)[::-1]
-    seen = [se2.between(way[-1], way[at]) for way in (a, b)]
-    window = Window((at - at[-1]) / 10, ranges[at], *seen, np.zeros(2), np.zeros(2))
+    a_poses, b_poses = (se2.between(way[-1], way[at]) for way in (a, b))
+    window = Window((at - at[-1]) / 10, ranges[at], a_poses, b_poses, np.zeros(2), np.zeros(2))
     return solver.solve(window, PairNoise(RangeNoise(0.1, 0.1), NOISE, NOISE), 0.2)
 
 

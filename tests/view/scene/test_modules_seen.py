@@ -85,14 +85,14 @@ def test_it_is_carried_along_when_the_frame_changes() -> None:
     tell(scene, actor, module_at(actor, 10.0, FIRST))
     shown(scene)
     # two seconds after its last pose it is in a frame that lies elsewhere, and turned
-    moved = product((10.0, -3.0, 1.2), actor.truth(20.0))
+    x, y, theta = product((10.0, -3.0, 1.2), actor.truth(20.0)).tolist()
     for t in (19.0, 19.4, 20.0):
         scene.take(actor.said(entry(30 + round(t), (actor.keyframe(t),)), t), t)
-    pose = replace(actor.pose(20.0), frame=4, frame_epoch=9, pose=tuple(map(float, moved)))
+    pose = replace(actor.pose(20.0), frame=4, frame_epoch=9, pose=(x, y, theta))
     scene.take(actor.said(pose, 20.0), 20.0)
-    ((_, frame, x, y, _),) = shown(scene)
+    ((_, frame, *there, _),) = shown(scene)
     assert frame == "4/9"
-    assert (x, y) == pytest.approx(product((10.0, -3.0, 1.2), (*FIRST, 0.0))[:2], abs=0.05)
+    assert there == pytest.approx(product((10.0, -3.0, 1.2), (*FIRST, 0.0))[:2], abs=0.05)
 
 
 def test_after_an_hour_it_is_where_it_was() -> None:
