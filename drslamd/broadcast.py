@@ -2,7 +2,8 @@
 
 Most of a small datagram is its envelope, so what nobody needs is not said: odometry goes only to
 who makes closures with it and from the first sample that is lacked there, a heartbeat without news
-comes a third as often, and a pose that moved less than it is uncertain waits for its second.
+comes a third as often, and a pose that moved less than it is uncertain waits for its second. Where
+peers may be while no answer stands no robot needs: it is said when the configuration asks for it.
 """
 
 from __future__ import annotations
@@ -13,13 +14,16 @@ from collections.abc import Set
 import numpy as np
 
 from drslamd.config import Config
-from drslamd.conventions import SECOND_US, Segment
+from drslamd.conventions import GRID_US, SECOND_US, Segment
 from drslamd.events import Effect
 from drslamd.gossip.bounds import is_sayable
 from drslamd.gossip.message_types import (
     MAX_BATCH,
+    MAX_MOTIONS,
+    MAX_PLACES,
     NOTHING_WANTED,
     UNKNOWN_CLOCK,
+    Hypotheses,
     OdometryBatch,
     Pose,
     PoseState,
@@ -136,6 +140,41 @@ class Broadcast:
         known = [end for at, end in said if at + ON_THE_AIR_US < peer.wanted_at]
         is_lost = bool(known) and peer.wanted_n < known[-1]
         return peer.wanted_n if is_lost or not said else said[-1][1]
+
+    # hypotheses
+
+    def hypotheses(self, neighbours: list[PeerInRange], utime: int) -> list[Effect]:
+        """Where peers may be, if that is asked for and not known."""
+        said = self.make_hypotheses(neighbours, utime) if self._config.near.hypotheses else None
+        if said is None or not is_sayable(said):
+            return []
+        return [self._team.send(said, utime)]
+
+    def make_hypotheses(self, neighbours: list[PeerInRange], utime: int) -> Hypotheses | None:
+        """Of the nearest peers that are not known otherwise; None where there is nothing to say."""
+        track, estimate = self._front.reckoning.track, self._back.estimate
+        known = estimate.trajectories.keys() if estimate is not None else set()
+        unknown = [peer for peer in neighbours if peer.chain.robot not in known]
+        if self._team.own.robot not in known:
+            unknown = neighbours
+        found = self._front.places_left(unknown, self._back.graph, utime)
+        if not found:
+            return None
+        here = track.poses[-1]
+        away = [float(np.hypot(*(here[:2] - left.places[0].pose[:2]))) for left in found]
+        nearest = [left for _, left in sorted(zip(away, found, strict=True), key=lambda p: p[0])]
+        x, y, theta = here.tolist()
+        while (
+            sum(len(left.places) for left in nearest) > MAX_PLACES
+            or sum(left.motion is not None for left in nearest) > MAX_MOTIONS
+        ):
+            nearest.pop()
+        return Hypotheses(
+            odom_utime=(track.end - 1) * GRID_US,
+            odom=(x, y, float(se2.wrap(theta))),
+            places=tuple(place for left in nearest for place in left.places),
+            motions=tuple(left.motion for left in nearest if left.motion is not None),
+        )
 
     # pose
 

@@ -182,6 +182,9 @@ class NearSection(Section):
     lcm_hz: Annotated[float, Field(ge=0, le=50)] = 0
     """Messages a second on the channel DRSLAM_NEAR, at most one for each sample of odometry; 0 says
     nothing there. The local socket always has all of them."""
+    hypotheses: bool = False
+    """Once a second on the channel DRSLAM_HYPOTHESES where peers may be, until one answer stands;
+    the live map then shows it. `drslamd status` always has it."""
 
 
 class DaemonSection(Section):

@@ -14,7 +14,7 @@ from drslamd.conventions import GRID_US, SECOND_US, is_node
 from drslamd.events import PortCondition
 from drslamd.gossip.message_types import PoseState
 from drslamd.gossip.peer import Peer
-from drslamd.reports import clock_report, point_report
+from drslamd.reports import clock_report, hypothesis_report, point_report
 from drslamd.robot import Robot
 from drslamd.sensors.gyro.gyro_heading import GyroHeading
 from drslamd.slam.consistency.pair import PairTracker
@@ -39,6 +39,7 @@ def status(robot: Robot, utime: int) -> dict[str, Any]:
         "network": _network(robot, utime),
         "peers": _peers(robot, utime),
         "pairs": {str(k): _pair(pair) for k, pair in sorted(robot.front.pairs.items())},
+        "hypotheses": _hypotheses(robot, utime),
         "points": point_report.points(robot),
         "site": point_report.site(robot, utime),
         "graph": _graph(robot),
@@ -72,6 +73,11 @@ def _pose(robot: Robot, utime: int) -> dict[str, Any]:
         "sigma_m": round(math.sqrt(float(spread)), 4),
         "sigma_deg": round(sigma_deg, 3) if is_known else None,
     }
+
+
+def _hypotheses(robot: Robot, utime: int) -> list[dict[str, Any]]:
+    said = robot.broadcast.make_hypotheses(robot.neighbours(utime), utime)
+    return hypothesis_report.rows(said, robot.own.robot, utime)
 
 
 def state_name(state: PoseState) -> str:

@@ -217,7 +217,9 @@ class Robot:
 
     def _send_status(self, utime: int) -> list[Effect]:
         clock, where = self.uwb.system_offset_us(utime), self.whereabouts(utime)
-        status = self.broadcast.heartbeat(self.neighbours(utime), clock, where.state, utime)
+        neighbours = self.neighbours(utime)
+        status = self.broadcast.heartbeat(neighbours, clock, where.state, utime)
+        status += self.broadcast.hypotheses(neighbours, utime)
         # solutions come with news; that a pose grew old or doubtful is said without any
         is_odd = where.is_old or where.doubt
         return [*status, *(self.broadcast.pose(where, utime) if is_odd else [])]

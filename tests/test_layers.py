@@ -60,6 +60,7 @@ SLAM_ORDER = [
     "relocation",
     "points",
     "consistency",
+    "hypotheses",
     "calibration",
     "optimizer",
     "closure_method",

@@ -21,7 +21,13 @@ from drslamd.conventions import (
     ROTATION_STEP_RAD,
 )
 from drslamd.gossip.epochs import FIRST_EPOCH, MAX_EPOCH
-from drslamd.gossip.message_types import UNKNOWN_CLOCK, OdometryBatch, Pose, PoseState
+from drslamd.gossip.message_types import (
+    UNKNOWN_CLOCK,
+    Hypotheses,
+    OdometryBatch,
+    Pose,
+    PoseState,
+)
 from drslamd.slam import se2
 from drslamd.slam.graph.measurements import ClosureMeasurement, Keyframe, RangeMeasurement
 from drslamd.slam.graph.pair_data import BEST_SIGMA, FARTHEST_M, WORST_SIGMA
@@ -136,7 +142,7 @@ Measurement = Union[Keyframe, RangeMeasurement, ClosureMeasurement]
 """What a log entry is made of."""
 
 
-def is_sayable(item: Measurement | OdometryBatch | Pose | PublicPoses) -> bool:
+def is_sayable(item: Measurement | OdometryBatch | Pose | PublicPoses | Hypotheses) -> bool:
     """Would a reader take it? What a sensor or a solver makes up may be beyond all bounds."""
     if isinstance(item, Keyframe):
         places = (item.x, item.y, item.theta)
@@ -153,5 +159,8 @@ def is_sayable(item: Measurement | OdometryBatch | Pose | PublicPoses) -> bool:
         return bool((np.abs(item.steps) <= SPENT_STEP).all()) and last <= LAST_N
     if isinstance(item, Pose):
         return is_pose(item.pose, item.covariance)
+    if isinstance(item, Hypotheses):
+        known = [is_pose(place.pose, place.covariance) for place in item.places]
+        return all(known) and all(abs(v) <= MAX_PLACE_M for v in item.odom)
     parts = np.ascontiguousarray(item.values).view(float)
     return bool((np.abs(parts) <= MAX_PLACE_M).all())

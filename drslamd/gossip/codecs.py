@@ -19,6 +19,7 @@ from drslamd.conventions import (
 from drslamd.gossip import bounds
 from drslamd.gossip.bounds import LONGEST_STEP, bounded
 from drslamd.gossip.entries.chapter_packing import packed, unpacked
+from drslamd.gossip.entries.hypothesis_codecs import fill_hypotheses, read_hypotheses
 from drslamd.gossip.entries.measurement_codecs import (
     filled,
     filled_closure,
@@ -38,6 +39,7 @@ from drslamd.gossip.message_types import (
     MAX_LOGS,
     NOTHING_WANTED,
     Heard,
+    Hypotheses,
     LogState,
     OdometryBatch,
     Pose,
@@ -244,4 +246,5 @@ CODECS = {
     "GRAPH": Codec(GraphEntry, lcmtypes.graph_t, _fill_graph, _read_graph),
     "POSE": Codec(Pose, lcmtypes.pose_t, _fill_pose, _read_pose),
     "PUBLIC": Codec(PublicPoses, lcmtypes.public_poses_t, _fill_public, _read_public),
+    "HYPOTHESES": Codec(Hypotheses, lcmtypes.hypotheses_t, fill_hypotheses, read_hypotheses),
 }

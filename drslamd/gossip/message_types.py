@@ -12,6 +12,8 @@ from typing import Union
 from drslamd.conventions import LAST_UTIME, Chain
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.public_poses import PublicPoses
+from drslamd.slam.hypotheses.deciding_motion import DecidingMotion
+from drslamd.slam.hypotheses.places_left import PossiblePlace
 from drslamd.slam.se2 import Array
 
 UNKNOWN_CLOCK = -(2**63)
@@ -30,6 +32,10 @@ MAX_LOGS = 28
 """Logs named in one status; whoever holds more names them in turn."""
 MAX_STRETCHES = 6
 """Of one log, in one status."""
+MAX_PLACES = 20
+"""Of all peers in one message: four of each of the nearest five, at least."""
+MAX_MOTIONS = 8
+"""Likewise of peers; with as many places a message has 1,263 bytes."""
 MAX_BATCH = 150
 """Odometry samples in one message: 15 s, 955 bytes."""
 
@@ -116,7 +122,23 @@ class Pose:
         return [self.pose_utime, self.state, self.frame, *self.pose, *self.covariance]
 
 
-Message = Union[Status, OdometryBatch, GraphEntry, Pose, PublicPoses]
+@dataclass(frozen=True)
+class Hypotheses:
+    """Where peers may be, until one answer stands.
+
+    Attributes:
+        odom_utime, odom: where we are in our odometry frame, and when, us.
+        places: in that frame, those of one peer in a row, the likeliest first.
+        motions: what would decide between those of a peer.
+    """
+
+    odom_utime: int
+    odom: tuple[float, float, float]
+    places: tuple[PossiblePlace, ...] = ()
+    motions: tuple[DecidingMotion, ...] = ()
+
+
+Message = Union[Status, OdometryBatch, GraphEntry, Pose, PublicPoses, Hypotheses]
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,14 @@ from drslamd.events import Send
 from drslamd.gossip import messages
 
 BUCKET_S = 2.0
-LEAVES = {"STATUS": 0.0, "GRAPH": 0.2, "ODOMETRY": 0.4, "POSE": 0.6, "PUBLIC": 0.6}
+LEAVES = {
+    "STATUS": 0.0,
+    "GRAPH": 0.2,
+    "ODOMETRY": 0.4,
+    "POSE": 0.6,
+    "PUBLIC": 0.6,
+    "HYPOTHESES": 0.8,
+}
 """What each kind leaves in the bucket, as a share of it: the least useful stops first."""
 RELAYED = 0.8
 """Entries of another robot's log, which somebody else may also repeat."""

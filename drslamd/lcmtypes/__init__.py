@@ -5,16 +5,19 @@ lcm-gen 1.5.3
 """
 
 from .closure_t import closure_t as closure_t
+from .deciding_motion_t import deciding_motion_t as deciding_motion_t
 from .graph_t import graph_t as graph_t
 from .header_t import header_t as header_t
 from .heard_t import heard_t as heard_t
 from .held_t import held_t as held_t
+from .hypotheses_t import hypotheses_t as hypotheses_t
 from .keyframe_t import keyframe_t as keyframe_t
 from .log_t import log_t as log_t
 from .near_t import near_t as near_t
 from .odometry_t import odometry_t as odometry_t
 from .peer_t import peer_t as peer_t
 from .pose_t import pose_t as pose_t
+from .possible_place_t import possible_place_t as possible_place_t
 from .public_poses_t import public_poses_t as public_poses_t
 from .range_t import range_t as range_t
 from .status_t import status_t as status_t

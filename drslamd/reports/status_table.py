@@ -28,6 +28,7 @@ def table(
     if now["insecure"]:
         out.append("! INSECURE: no team key, anybody on the network can forge messages")
     out += [f"! {c['what']} (since {span(c['since_s'])})" for c in now["conditions"]]
+    out += [f"? {left['what']}" for left in now.get("hypotheses", ())]
     out += ["", *_inputs(now, before, seconds), ""]
     rows = [_peer(robot, peer, now) for robot, peer in now["peers"].items()]
     out += columns([PEER_COLUMNS, *rows]) if rows else ["no other robot is heard"]

@@ -22,6 +22,7 @@ def lines(s: dict[str, Any]) -> list[str]:
         )
     else:
         out.append(pose["state"])  # the problems above say why
+    out += [f"? {left['what']}" for left in s.get("hypotheses", ())]
     out += _sensor("uwb", s["uwb"]) + _ranges(s["uwb"]) + _sensor("wheels", s["wheels"])
     network = s["network"]
     out.append(

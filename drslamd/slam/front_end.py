@@ -17,6 +17,7 @@ from drslamd.slam.doubt import Partners
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import ClosureMeasurement, Keyframe, RangeMeasurement
 from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.hypotheses.places_left import PlacesLeft, places_left
 from drslamd.slam.keyframe_selector import KeyframeSelector
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.dead_reckoning import DeadReckoning
@@ -276,6 +277,16 @@ class FrontEnd:
         pairs = {robot: pair for robot, pair in self.pairs.items() if robot in solved}
         wrong = frozenset(robot for robot, pair in pairs.items() if pair.search.disagrees)
         return Partners(frozenset(pairs), wrong)
+
+    def places_left(
+        self, neighbours: list[PeerInRange], graph: PoseGraph, utime: int
+    ) -> list[PlacesLeft]:
+        """Where peers may be whose pairs are not connected yet."""
+        found = (
+            places_left(pair, a, b, self._range_sigma)
+            for pair, a, b in self._measurable(neighbours, graph, utime)
+        )
+        return [left for left in found if left is not None]
 
     # module 2
 

@@ -362,6 +362,8 @@ COUNTS = {
     "neighbours": ("PUBLIC", 39 + 33, ">h"),
     "public poses": ("PUBLIC", 39 + 35 + 20, ">h"),
     "values": ("PUBLIC", 39 + 35 + 20 + 2 + 8, ">i"),
+    "places": ("HYPOTHESES", 39 + 20, ">h"),
+    "motions": ("HYPOTHESES", 39 + 20 + 2 + 2 * 50, ">h"),
 }
 """Where the counts stand in the messages of `kinds`, by the .lcm files."""
 

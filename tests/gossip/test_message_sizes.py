@@ -15,10 +15,21 @@ from drslamd.events import ChannelMessage, Send
 from drslamd.gossip import lc02, messages
 from drslamd.gossip.envelopes.splitting import MEASUREMENTS_PER_ENTRY
 from drslamd.gossip.lc02 import MAX_PAYLOAD
-from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose, PoseState
+from drslamd.gossip.message_types import (
+    MAX_MOTIONS,
+    MAX_PLACES,
+    Heard,
+    Hypotheses,
+    LogState,
+    OdometryBatch,
+    Pose,
+    PoseState,
+)
 from drslamd.gossip.team import Team
 from drslamd.slam.graph.measurements import ClosureMeasurement, Keyframe, RangeMeasurement
 from drslamd.slam.graph.public_poses import PublicPoses
+from drslamd.slam.hypotheses.deciding_motion import NO_TURN, DecidingMotion
+from drslamd.slam.hypotheses.places_left import PossiblePlace
 from drslamd.slam.odometry.gyro_noise import GyroNoise
 from drslamd.slam.robot_model import UNTOLD
 
@@ -54,6 +65,14 @@ def test_a_full_batch_of_odometry_has_955_bytes() -> None:
 def test_a_pose_has_94_bytes() -> None:
     pose = Pose(PoseState.LOCALISED, 3, 11, 0)
     assert len(messages.encode(HEADER, pose)) == 8 + 31 + 19 + 12 + 24 == 94
+
+
+def test_as_many_hypotheses_as_are_said_at_once_have_1263_bytes() -> None:
+    place = PossiblePlace(1, 0, 1.0, (0.0, 0.0, 0.0), COVARIANCE)
+    motion = DecidingMotion(1, 0, 0.5, NO_TURN, NO_TURN, 1)
+    full = Hypotheses(0, (0.0, 0.0, 0.0), (place,) * MAX_PLACES, (motion,) * MAX_MOTIONS)
+    size = len(messages.encode(HEADER, full))
+    assert size == 8 + 31 + 20 + 2 + 20 * 50 + 2 + 8 * 25 == 1263 <= MAX_PAYLOAD
 
 
 def test_an_entry_with_one_keyframe_has_72_bytes() -> None:

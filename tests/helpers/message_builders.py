@@ -11,6 +11,7 @@ from drslamd.conventions import Chain
 from drslamd.gossip import messages
 from drslamd.gossip.message_types import (
     Heard,
+    Hypotheses,
     LogState,
     Message,
     OdometryBatch,
@@ -26,6 +27,8 @@ from drslamd.slam.graph.measurements import (
     RangeMeasurement,
 )
 from drslamd.slam.graph.public_poses import PublicPoses
+from drslamd.slam.hypotheses.deciding_motion import NO_TURN, DecidingMotion
+from drslamd.slam.hypotheses.places_left import PossiblePlace
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.robot_model import RobotModel
 
@@ -91,6 +94,15 @@ def one_of_each_kind() -> list[Message]:
         Pose(PoseState.LOCALISED, 3, 11, 4_000_000, (1.25, -2.5, 3.0), COVARIANCE),
         PublicPoses(
             3, 11, 2, (40, 50), lifted, round=9, since=7, part=1, parts=3, held=((4, 6), (9, 0))
+        ),
+        Hypotheses(
+            5_000_000,
+            (1.5, -2.5, 0.25),
+            (
+                PossiblePlace(4, 4_900_000, 0.75, (1.25, -2.5, 3.0), COVARIANCE),
+                PossiblePlace(4, 4_900_000, 0.25, (1.25, 2.5, -3.0), COVARIANCE),
+            ),
+            (DecidingMotion(4, 3, 1.5, (0.5, 2.5), NO_TURN, 1),),
         ),
     ]
 

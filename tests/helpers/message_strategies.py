@@ -9,8 +9,11 @@ from hypothesis import strategies as st
 
 from drslamd.conventions import Chain
 from drslamd.gossip.message_types import (
+    MAX_MOTIONS,
+    MAX_PLACES,
     UNKNOWN_CLOCK,
     Heard,
+    Hypotheses,
     LogState,
     Message,
     OdometryBatch,
@@ -27,6 +30,8 @@ from drslamd.slam.graph.measurements import (
     RangeMeasurement,
 )
 from drslamd.slam.graph.public_poses import MAX_HELD, MAX_PUBLIC, PublicPoses
+from drslamd.slam.hypotheses.deciding_motion import NO_TURN, DecidingMotion
+from drslamd.slam.hypotheses.places_left import PossiblePlace
 from drslamd.slam.odometry.gyro_noise import OPEN, GyroNoise
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.robot_model import RobotModel
@@ -174,6 +179,33 @@ poses = st.builds(
 )
 
 
+wrapped = st.floats(-3.125, 3.125, width=32)
+possible_places = st.builds(
+    PossiblePlace,
+    robots,
+    times,
+    st.floats(0, 1, width=32),
+    st.tuples(metres, metres, wrapped),
+    covariances,
+)
+turns = st.floats(0, 3.125, width=32)
+sectors = st.just(NO_TURN) | st.tuples(turns, turns).map(lambda both: (min(both), max(both)))
+motions = st.builds(
+    DecidingMotion,
+    robots,
+    robots,
+    st.floats(0.125, 8, width=32),
+    sectors,
+    sectors,
+    st.integers(1, 20),
+)
+hypotheses = st.builds(
+    Hypotheses,
+    times,
+    st.tuples(metres, metres, wrapped),
+    st.lists(possible_places, max_size=MAX_PLACES).map(tuple),
+    st.lists(motions, max_size=MAX_MOTIONS).map(tuple),
+)
 rounds = st.integers(0, 2**62 - 1)
 
 
@@ -202,5 +234,5 @@ def publics(draw: st.DrawFn) -> PublicPoses:
 
 
 any_message: st.SearchStrategy[Message] = st.one_of(
-    statuses, batches, entries, chapters(), poses, publics()
+    statuses, batches, entries, chapters(), poses, publics(), hypotheses
 )

@@ -85,3 +85,9 @@ def test_a_time_is_said_in_the_unit_that_one_would_say() -> None:
 
 def test_columns_are_as_wide_as_their_widest_cell() -> None:
     assert columns([("a", "bb"), ("ccc", "d")]) == ["  a  bb", "ccc   d"]
+
+
+def test_where_a_peer_may_be_is_one_sentence() -> None:
+    whole = answer()
+    whole["hypotheses"] = [{"robot": 1, "what": "robot 1 is at one of 2 places"}]
+    assert "? robot 1 is at one of 2 places" in table(whole)

@@ -170,3 +170,9 @@ def test_without_peers_and_pairs_there_is_no_line_of_them() -> None:
     whole = answer()
     whole |= {"peers": {}, "pairs": {}}
     assert not [line for line in lines(whole) if line.startswith(("peer", "pair"))]
+
+
+def test_where_a_peer_may_be_is_one_sentence() -> None:
+    whole = answer()
+    whole["hypotheses"] = [{"robot": 1, "what": "robot 1 is at one of 2 places"}]
+    assert "? robot 1 is at one of 2 places" in lines(whole)

@@ -7,11 +7,12 @@ import contextlib
 import json
 import math
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from onlooked_team import Actor
+from onlooked_team import COVARIANCE, Actor, entry
 from transport_helpers import in_a_loop
 
 aiohttp = pytest.importorskip("aiohttp", reason="aiohttp is not installed")
@@ -19,7 +20,9 @@ aiohttp = pytest.importorskip("aiohttp", reason="aiohttp is not installed")
 from browser import CHROMIUM, Tab, artefacts, tab  # noqa: E402
 from stage import Stage, playing, ring  # noqa: E402
 
-from drslamd.gossip.message_types import PoseState  # noqa: E402
+from drslamd.conventions import node_chain  # noqa: E402
+from drslamd.gossip.message_types import Hypotheses, PoseState  # noqa: E402
+from drslamd.slam.hypotheses.places_left import PossiblePlace  # noqa: E402
 
 pytestmark = [
     pytest.mark.slow,
@@ -76,6 +79,53 @@ async def item(page: Tab, robot: int) -> dict[str, str]:
         "return { standing: li.className, words: li.innerText }; })()"
     )
     return dict(found)
+
+
+NOSE = """(() => {{
+  const spot = {spot}, {{ theta }} = liveMap.team.robot({robot}).shown;
+  const probe = document.createElement("canvas").getContext("2d");
+  probe.fillStyle = spot.colour; probe.fillRect(0, 0, 1, 1);
+  const x = spot.x + 15 * Math.cos(theta), y = spot.y - 15 * Math.sin(theta);
+  const at = document.getElementById("map").getContext("2d").getImageData(x, y, 1, 1).data;
+  const wanted = probe.getImageData(0, 0, 1, 1).data;
+  return Math.max(...[0, 1, 2].map((k) => Math.abs(at[k] - wanted[k])));
+}})()"""
+
+
+def test_headings_that_are_not_known_modules_and_possible_places_are_drawn(tmp_path: Path) -> None:
+    @in_a_loop
+    async def go() -> None:
+        stage = Stage(ring(2))
+        first, second = stage.actors.values()
+        second.state, second.turning = PoseState.POSITION, 0.0
+        async with shown(stage) as page:
+            nose = [NOSE.format(spot=SPOT.format(k), robot=k) for k in (0, 1)]
+            await page.until(f"{nose[0]} < 40")
+            assert await page.run(nose[1]) > 40
+            await page.until("document.querySelector('#robots li.position')")
+            assert "position only" in (await item(page, 1))["words"]
+
+            t = stage.t
+            closure = replace(first.closure_to(second, t - 1, 0), peer=node_chain(101))
+            said = entry(1, (), (), (closure,))
+            stage.deliver(first.datagram(said, t, stage.clock.now()))
+            await page.until("liveMap.map.spots.some((s) => s.module === 101)")
+
+            x, y, theta = first.truth(t).tolist()
+            place = PossiblePlace(9, 0, 0.5, (x - 1.5, y - 1.5, 1.0), COVARIANCE)
+            mirrored = replace(place, pose=(x - 1.5, y + 1.5, 2.0))
+            for _ in range(3):
+                utime = first.n(stage.t) * 100_000
+                odom = x, y, theta
+                message = Hypotheses(utime, odom, (place, mirrored))
+                stage.deliver(first.datagram(message, stage.t, stage.clock.now()))
+                await asyncio.sleep(0.6)
+            await page.until("liveMap.map.spots.filter((s) => s.maybe === 9).length === 2")
+            said_in_words = "document.getElementById('robots').innerText"
+            await page.until(f"{said_in_words}.includes('Robot 9 is at one of 2 places')")
+            await page.screenshot(artefacts(tmp_path) / "possible.png")
+
+    go()
 
 
 def test_robots_move_are_doubted_lose_odometry_and_get_lost(tmp_path: Path) -> None:

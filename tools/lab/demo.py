@@ -41,6 +41,8 @@ examples:
   tools/demo --json out/demo.json        the figures for a program
 """
 
+FOR_THE_MAP = "[near]\nhypotheses = true\n"
+
 
 def main(arguments: list[str] | None = None) -> int:
     """Run it; the exit code."""
@@ -53,8 +55,10 @@ def main(arguments: list[str] | None = None) -> int:
     progress = Progress(f"{len(recording.trails)} daemons driving", recording.duration + SETTLE_S)
     hardware = equip(recording, varied=options.dataset is None)
     try:
-        beside = live_map if options.view else None
-        result = asyncio.run(real_team.run(recording, hardware, progress=progress, beside=beside))
+        beside, extra = (live_map, FOR_THE_MAP) if options.view else (None, "")
+        result = asyncio.run(
+            real_team.run(recording, hardware, extra, progress=progress, beside=beside)
+        )
     except real_team.TeamFailed as error:
         print(f"\n{error}", file=sys.stderr)
         return FAILED

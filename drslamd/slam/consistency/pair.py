@@ -309,6 +309,9 @@ class PairTracker:
         }
         new: list[ClosureMeasurement] = []
         recent = max((told.a_n for told in self._told.values()), default=-TELL_EVERY)
+        if kept and not (self._told or every):
+            # module 3 begins there: the newest window holds what earlier ones held, and more
+            kept = dict([max(kept.items())])
         for number, m in kept.items():
             if number not in self._told and (every or m.a_n - recent >= TELL_EVERY):
                 new.append(m)

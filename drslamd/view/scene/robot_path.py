@@ -189,7 +189,13 @@ class RobotPath:
 
     def place(self, own: float) -> Array | None:
         """w_T_a (3,) at a time of the robot's clock; None where that cannot be said (yet)."""
-        rows = self.rows[-RECENT:]
+        return self._place(own, self.rows[-RECENT:])
+
+    def place_of_then(self, own: float) -> Array | None:
+        """The same at any time that is kept; it looks at all of it."""
+        return self._place(own, self.rows)
+
+    def _place(self, own: float, rows: Array) -> Array | None:
         rows = rows[(rows[:, STATE] != PoseState.STALE) & (rows[:, OWN] != NO_CLOCK)]
         if not len(rows):
             return None

@@ -10,6 +10,8 @@ import numpy as np
 
 from drslamd.conventions import Chain
 from drslamd.gossip.message_types import PoseState, Status
+from drslamd.reports import hypothesis_report
+from drslamd.view.scene.possible_seen import PossibleSeen
 from drslamd.view.scene.robot_path import RobotPath
 
 SILENCE_S = 5.0
@@ -27,11 +29,13 @@ class RobotSeen:
         state: what it says of its pose, in its latest pose or heartbeat.
         heard: when it was heard last, s; began: when this start was heard first.
         is_first: is it the first start that was heard of this robot?
+        possible: where it says that others may be.
     """
 
     def __init__(self, chain: Chain, t: float) -> None:
         self.chain = chain
         self.path = RobotPath()
+        self.possible = PossibleSeen()
         self.state = PoseState.NOT_LOCALISED
         self.status: Status | None = None
         self.heard = self.began = t
@@ -42,6 +46,7 @@ class RobotSeen:
         self.chain, self.began, self.is_first = chain, t, False
         self.state, self.status = PoseState.NOT_LOCALISED, None
         self.path.begin_again()
+        self.possible = PossibleSeen()
 
     def speaks(self, t: float) -> bool:
         """Was it heard of late, and did it not say goodbye?"""
@@ -93,7 +98,7 @@ def sentences(seen: RobotSeen, team: Mapping[int, RobotSeen], t: float) -> list[
         return ["has said goodbye"]
     if not seen.speaks(t):
         return ["is not heard any more: switched off, or out of reach"]
-    out = [*_speech(seen, team, t), *_state(seen)]
+    out = [*_speech(seen, team, t), *_state(seen), *_possible(seen, t)]
     if t - seen.began < BEGAN_S and not seen.is_first:
         out.append(f"began again {t - seen.began:.0f} s ago")
     return out
@@ -132,6 +137,11 @@ def _state(seen: RobotSeen) -> list[str]:
     if seen.state is PoseState.POSITION:
         return ["stands, and others have found its place: its heading is known once it drives"]
     return []
+
+
+def _possible(seen: RobotSeen, t: float) -> list[str]:
+    said = seen.possible.latest(t)
+    return [row["what"] for row in hypothesis_report.rows(said, seen.chain.robot, 0)]
 
 
 def _lacking(status: Status | None) -> int:

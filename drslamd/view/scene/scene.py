@@ -12,13 +12,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Union
 
-from drslamd.conventions import SECOND_US, Chain
-from drslamd.gossip.message_types import Pose, Status
+from drslamd.conventions import SECOND_US, Chain, is_node
+from drslamd.gossip.message_types import Hypotheses, Pose, Status
 from drslamd.slam.graph.measurements import ClosureMeasurement, GraphEntry, RangeMeasurement
 from drslamd.slam.se2 import Array
 from drslamd.view.scene import robot_path
 from drslamd.view.scene.hearing import Said
+from drslamd.view.scene.modules_seen import ModulesSeen
 from drslamd.view.scene.pair_seen import ClosureSeen, PairSeen, closure_seen, residual
+from drslamd.view.scene.possible_seen import possible
 from drslamd.view.scene.robot_path import RobotPath
 from drslamd.view.scene.robot_seen import RobotSeen, picture
 
@@ -50,6 +52,7 @@ class Scene:
     def __init__(self) -> None:
         self.robots: dict[int, RobotSeen] = {}
         self.pairs: dict[tuple[int, int], PairSeen] = {}
+        self.modules = ModulesSeen()
         self.not_shown: set[int] = set()
         """Robots beyond `MAX_ROBOTS`; ids bound their number."""
         self._waiting: deque[_Waiting] = deque(maxlen=WAITING)
@@ -71,6 +74,8 @@ class Scene:
         seen.heard = t
         if isinstance(message, Status):
             seen.status, seen.state = message, message.state
+        elif isinstance(message, Hypotheses):
+            seen.possible.add(message, t)
         elif isinstance(message, Pose):
             seen.state = message.state
             if message.state:
@@ -117,6 +122,7 @@ class Scene:
                 pair.forget_closures(key[0])
                 pair.forget_closures(key[1])
                 self._forgotten.add(key)
+        self.modules.forget(robot)
 
     def _take_entry(self, seen: RobotSeen, entry: GraphEntry, t: float) -> None:
         for k in entry.keyframes:
@@ -142,6 +148,10 @@ class Scene:
 
     def _is_settled(self, waiting: _Waiting, t: float) -> bool:
         origin, item = waiting.origin, waiting.item
+        if is_node(item.peer.robot):
+            if isinstance(item, ClosureMeasurement):
+                self.modules.take(origin, item)
+            return True
         a, b = self.robots.get(origin.robot), self.robots.get(item.peer.robot)
         if a is None or b is None or (a.chain, b.chain) != (origin, item.peer):
             return False
@@ -190,7 +200,7 @@ class Scene:
             for key, pair in self.pairs.items()
             if (scatter := pair.renew(t)) is not None
         ]
-        out |= {"robots": self._pictures(t), "not_shown": len(self.not_shown)}
+        out |= self._all(t)
         out |= {"pairs": scatters} if scatters else {}
         out |= {"forget": sorted(self._forgotten)} if self._forgotten else {}
         out |= {"closures": self._new_closures} if self._new_closures else {}
@@ -199,7 +209,7 @@ class Scene:
 
     def everything(self, t: float) -> Iterator[dict[str, Any]]:
         """All that is known, in pieces that take a few milliseconds each."""
-        yield {"t": round(t, 2), "robots": self._pictures(t), "not_shown": len(self.not_shown)}
+        yield {"t": round(t, 2), **self._all(t)}
         for robot in list(self.robots):
             if robot in self.robots:
                 yield {"paths": {str(robot): _path_rows(self.robots[robot].path.rows)}}
@@ -213,8 +223,15 @@ class Scene:
                 past = [[*key, *(round(v, 3) for v in row)] for row in pair.past.tolist()]
                 yield {"pairs": past, "closures": closures}
 
-    def _pictures(self, t: float) -> list[dict[str, Any]]:
-        return [picture(self.robots[robot], self.robots, t) for robot in sorted(self.robots)]
+    def _all(self, t: float) -> dict[str, Any]:
+        """How everybody is, what stands, and where who is not known may be."""
+        robots = [picture(self.robots[robot], self.robots, t) for robot in sorted(self.robots)]
+        return {
+            "robots": robots,
+            "not_shown": len(self.not_shown),
+            "modules": self.modules.rows(self.robots),
+            "possible": possible(self.robots, t),
+        }
 
 
 def _place(path: RobotPath, n: int) -> Array | None:

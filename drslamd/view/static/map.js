@@ -27,7 +27,9 @@ export class MapView {
     if (!width || !height) return;
     if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
     const here = this.places(scene, seconds);
-    camera.step(this.box(scene, here), seconds);
+    const maybe = scene.until === null ? scene.team.possible.filter((p) => p.frame_key === scene.frame) : [];
+    const modules = scene.team.modules.filter((m) => m.frame === scene.frame);
+    camera.step(this.box(scene, here, [...modules, ...maybe.flatMap(spotsOf)]), seconds);
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.fillStyle = PAGE.ground;
     context.fillRect(0, 0, width, height);
@@ -44,6 +46,8 @@ export class MapView {
     }
     if (scene.layers.links) this.links(scene, here);
     if (scene.layers.ellipses) for (const place of here) this.ellipse(scene, place);
+    for (const module of modules) this.module(module);
+    for (const saying of maybe) this.possible(scene, saying);
     for (const place of here) this.robot(scene, place);
     this.scaleBar();
   }
@@ -72,8 +76,8 @@ export class MapView {
     return out;
   }
 
-  box({ team, ids }, here) {
-    if (!here.length) return null;
+  box({ team, ids }, here, beside) {
+    if (!here.length && !beside.length) return null;
     const box = [Infinity, Infinity, -Infinity, -Infinity];
     const take = (x, y) => {
       if (x < box[0]) box[0] = x;
@@ -82,6 +86,7 @@ export class MapView {
       if (y > box[3]) box[3] = y;
     };
     for (const { row } of here) take(row.x, row.y);
+    for (const { x, y } of beside) take(x, y);
     for (const id of ids) {
       const { x, y, length } = team.robot(id).path;
       const stride = 1 + Math.floor(length / 200);
@@ -178,11 +183,12 @@ export class MapView {
     context.beginPath();
     context.ellipse(camera.toX(row.x), camera.toY(row.y), Math.min(long, 1e5), Math.min(short, 1e5), -angle, 0, 7);
     context.fillStyle = context.strokeStyle = colour;
-    context.globalAlpha = 0.13 * share;
+    const isFaint = standing === "possible";
+    context.globalAlpha = (isFaint ? 0.06 : 0.13) * share;
     context.fill();
     context.globalAlpha = 0.75 * share;
     context.lineWidth = 1.2;
-    context.setLineDash(isGrey(standing) ? [4, 4] : []);
+    context.setLineDash(isFaint || isGrey(standing) ? [4, 4] : []);
     context.stroke();
     context.setLineDash([]);
     context.globalAlpha = 1;
@@ -196,10 +202,7 @@ export class MapView {
     context.globalAlpha = isDimmed(scene, id) ? 0.35 : 1;
     context.translate(x, y);
     context.rotate(-row.theta);
-    context.beginPath();
-    context.arc(0, 0, BODY_PX, 0.62, 2 * Math.PI - 0.62);
-    context.lineTo(BODY_PX * 1.75, 0);
-    context.closePath();
+    this.body(standing !== "position");
     context.fillStyle = colour;
     context.strokeStyle = PAGE.panel;
     context.lineWidth = 2;
@@ -220,6 +223,70 @@ export class MapView {
     context.textBaseline = "middle";
     context.fillText(String(id), 0, 0.5);
     if (standing === "stale" || standing === "lost") this.label(standing === "stale" ? "no odometry" : "lost");
+    context.restore();
+  }
+
+  // with a nose where it is known which way it looks
+  body(hasHeading) {
+    const { context } = this, gap = hasHeading ? 0.62 : 0;
+    context.beginPath();
+    context.arc(0, 0, BODY_PX, gap, 2 * Math.PI - gap);
+    if (hasHeading) context.lineTo(BODY_PX * 1.75, 0);
+    context.closePath();
+  }
+
+  // a module that stands without a robot
+  module({ uwb, x, y }) {
+    const { context, camera } = this, px = camera.toX(x), py = camera.toY(y);
+    context.strokeStyle = PAGE.ink;
+    context.fillStyle = PAGE.panel;
+    context.lineWidth = 2;
+    context.beginPath();
+    context.rect(px - 6, py - 6, 12, 12);
+    context.fill();
+    context.stroke();
+    this.spots.push({ module: uwb, x: px, y: py });
+    context.font = "600 11px system-ui, sans-serif";
+    context.fillStyle = PAGE.soft;
+    context.textAlign = "center";
+    context.textBaseline = "top";
+    context.fillText(`module ${uwb}`, px, py + 10);
+  }
+
+  // hollow where a robot may be; hollow too who says so, while nobody is localised
+  possible(scene, { origin, frame_key: frame, here: [x, y, theta], places }) {
+    const { context } = this;
+    for (const [id, share, px, py, turned, xx, xy, yy] of places) {
+      const row = { x: px, y: py, theta: turned, xx, xy, yy };
+      context.setLineDash([2, 5]);
+      this.line({ x, y }, row, ofRobot(id), 1.2, 0.25 + 0.5 * share);
+      context.setLineDash([]);
+      if (scene.layers.ellipses) this.ellipse(scene, { id, row, standing: "possible" });
+      this.hollow(id, row, 0.4 + 0.6 * share);
+    }
+    if (frame === null) this.hollow(origin, { x, y, theta }, 1);
+  }
+
+  hollow(id, row, alpha) {
+    const { context, camera } = this, x = camera.toX(row.x), y = camera.toY(row.y);
+    this.spots.push({ maybe: id, x, y });
+    context.save();
+    context.globalAlpha = alpha;
+    context.translate(x, y);
+    context.rotate(-row.theta);
+    this.body(true);
+    context.fillStyle = PAGE.ground;
+    context.strokeStyle = ofRobot(id);
+    context.lineWidth = 2;
+    context.fill();
+    context.setLineDash([4, 3]);
+    context.stroke();
+    context.rotate(row.theta);
+    context.fillStyle = ofRobot(id);
+    context.font = `700 ${id > 99 ? 9 : 12}px system-ui, sans-serif`;
+    context.textAlign = "center";
+    context.textBaseline = "middle";
+    context.fillText(String(id), 0, 0.5);
     context.restore();
   }
 
@@ -259,6 +326,7 @@ export class MapView {
   }
 }
 
+function spotsOf({ here: [x, y], places }) { return [{ x, y }, ...places.map(([, , px, py]) => ({ x: px, y: py }))]; }
 export function isGrey(standing) { return standing === "stale" || standing === "lost" || standing === "away"; }
 function isGone({ standing }) { return standing === "lost" || standing === "away"; }
 function isDimmed({ selected }, id) { return selected !== null && selected !== id; }

@@ -2,7 +2,7 @@
 
 import { WORST_M, ofRobot } from "./colours.js";
 
-const STATES = { localised: "localised", doubtful: "in doubt", stale: "no odometry", lost: "lost", away: "not localised" };
+const STATES = { localised: "localised", doubtful: "in doubt", stale: "no odometry", position: "position only", lost: "lost", away: "not localised" };
 const QUIET_S = 4; // the slowest heartbeat comes every three
 const byId = (id) => document.getElementById(id);
 
@@ -44,7 +44,7 @@ export class Panel {
 
   nobody(team, robots, about) {
     const card = byId("nobody"), isPlaced = team.frames().length > 0;
-    card.hidden = isPlaced || !team.isComplete || !about;
+    card.hidden = isPlaced || !team.isComplete || !about || team.possible.length > 0;
     if (card.hidden) return;
     set(card, robots.length
       ? `${robots.length === 1 ? "One robot is" : `${robots.length} robots are`} heard, nobody is localised yet.\n`

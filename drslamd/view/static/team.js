@@ -91,6 +91,7 @@ export class Team {
 
   reset() {
     this.robots = new Map(); this.pairs = new Map();
+    this.modules = []; this.possible = [];
     this.about = null; this.notShown = 0; this.version = ""; this.isComplete = false;
     this.lead = null; this.heardAt = 0;
   }
@@ -127,6 +128,8 @@ export class Team {
     if (update.team) this.about = update.team;
     for (const key of update.forget ?? []) this.forget(key);
     if (update.robots) this.takeRobots(update.robots, update.not_shown);
+    if (update.modules) this.modules = update.modules.map(([uwb, frame, x, y, sigma]) => ({ uwb, frame, x, y, sigma }));
+    if (update.possible) this.possible = update.possible;
     for (const [id, rows] of Object.entries(update.paths ?? {})) {
       const { path } = this.robot(+id);
       path.clear();

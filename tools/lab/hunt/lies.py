@@ -11,6 +11,7 @@ from drslamd.conventions import Chain
 from drslamd.gossip import messages
 from drslamd.gossip.message_types import (
     Heard,
+    Hypotheses,
     LogState,
     Message,
     OdometryBatch,
@@ -28,6 +29,7 @@ from drslamd.slam.graph.measurements import (
     RangeMeasurement,
 )
 from drslamd.slam.graph.public_poses import PublicPoses
+from drslamd.slam.hypotheses.places_left import PossiblePlace
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.robot_model import RobotModel
 
@@ -57,6 +59,7 @@ class Liar:
             self._entry,
             self._chapter,
             self._public,
+            self._hypotheses,
         )
 
     def hears(self, robot: int, epoch: int) -> None:
@@ -180,6 +183,12 @@ class Liar:
             a_T_b=(x, y, self._int(-31_000, 31_000) * 1e-4),
             covariance=(variance, 0.0, 0.0, variance, 0.0, variance),
         )
+
+    def _hypotheses(self) -> Hypotheses:
+        x, y = (self._int(-10_000, 10_000) * 1e-2 for _ in range(2))
+        known = (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
+        place = PossiblePlace(self._int(0, ROBOTS), self._int(0, SAMPLES), 1.0, (x, y, 0.0), known)
+        return Hypotheses(self._int(0, SAMPLES), (y, x, 0.0), (place,))
 
     def _public(self) -> PublicPoses:
         count = self._int(0, 4)
