@@ -1,4 +1,4 @@
-"""Where peers may be is told until one answer stands: to whoever asks, on the air only if wanted."""
+"""Where peers may be is told until one answer stands: to who asks, on the air only if wanted."""
 
 from __future__ import annotations
 

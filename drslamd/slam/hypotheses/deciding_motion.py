@@ -31,6 +31,10 @@ NO_TURN = (-1.0, -1.0)
 """In the place of the least and the largest turn to a side: none decides."""
 WAYS_M = np.array([0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0])
 """That are tried; who drives farther is localised in another way."""
+END_M = 0.25
+"""So long before its end a way decides already: the ranges of a moment err together. In the worlds
+of the tests module 1 is then left with as few places as were foretold after 68 of 70 turns, without
+it after 64."""
 TURN_STEP_DEG = 5
 TURNS = np.radians(np.arange(-180, 181, TURN_STEP_DEG))
 WIDE = 30 // TURN_STEP_DEG
@@ -80,7 +84,7 @@ def deciding_motion(
 def most_left(places: Array, covariances: Array, sigma: float) -> Index:
     """(turns, ways): how many places are left at most, for each of `TURNS` and `WAYS_M`; arguments
     as of `deciding_motion`."""
-    ends = WAYS_M[:, None] * np.stack([np.cos(TURNS), np.sin(TURNS)], axis=-1)[:, None]
+    ends = (WAYS_M[:, None] - END_M) * np.stack([np.cos(TURNS), np.sin(TURNS)], axis=-1)[:, None]
     before, there = _sight(places), _sight(places - ends[:, :, None])
     changes, gradients = there[1] - before[1], there[0] - before[0]
     variances = np.einsum("...ka,kab,...kb->...k", gradients, covariances, gradients)
