@@ -91,7 +91,8 @@ def adjoint(a_T_b: Array) -> Array:
 
 def packed(covariance: Array) -> tuple[float, ...]:
     """xx xy xt yy yt tt of a (3, 3) covariance."""
-    return tuple(float(v) for v in covariance[np.triu_indices(3)])
+    (xx, xy, xt), (_, yy, yt), (_, _, tt) = covariance.tolist()
+    return xx, xy, xt, yy, yt, tt
 
 
 def unpacked(upper: Sequence[float] | Array) -> Array:

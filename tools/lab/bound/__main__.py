@@ -3,7 +3,8 @@
 usage: python -m lab.bound [--seeds N] [--robots N]
 
 Where the ratio of both, in the mean of many seeds, is not one, the bound has another noise than the
-simulator. Errors of one drive hang together, live ones most: twenty seeds tell a quarter.
+simulator. Errors of one drive hang together, live ones most; the scatter is that of whole drives
+(jackknife), and none with one.
 """
 
 from __future__ import annotations
@@ -12,9 +13,23 @@ import argparse
 import sys
 from collections.abc import Sequence
 
+import numpy as np
+
 from lab.bound import efficiency
 from lab.progress import Progress
+from lab.recordings.recording import Array
 from lab.reproduce.tally import Tally
+
+KINDS = ("bound", "told")
+
+
+def jackknifed(drives: Array) -> tuple[float, float]:
+    """The ratio of the means of two columns (n, 2), and how far that scatters by the drives."""
+    first, second = drives.mean(axis=0)
+    others = drives.sum(axis=0) - drives
+    with np.errstate(invalid="ignore"):
+        spread = np.sqrt((len(drives) - 1) * np.var(others[:, 0] / others[:, 1]))
+    return float(first / second), float(spread)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -23,20 +38,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seeds", type=int, default=20, metavar="N", help="default 20")
     parser.add_argument("--robots", type=int, default=3, metavar="N", help="default 3")
     options = parser.parse_args(arguments)
-    team, total = efficiency.Team(options.robots, 0.0), Tally()
+    team, drives = efficiency.Team(options.robots, 0.0), list[Tally]()
     bar = Progress("bounds", options.seeds, "seeds")
     for seed in range(options.seeds):
-        total.merge(efficiency.checked(team, seed).sums)
+        drives.append(efficiency.checked(team, seed))
         bar(seed + 1)
     bar.end()
     print(f"{options.robots} robots, {options.seeds} seeds: root mean squares")
     for row in efficiency.ROWS[:2]:
         for unit in efficiency.UNITS:
             name = f"{team.name}/{row}/{unit}"
-            bound, told = (total[f"{name}/{what}"].mean for what in ("bound", "told"))
+            known = np.array([[drive[f"{name}/{x}"].mean for x in KINDS] for drive in drives])
+            bound, told = np.sqrt(known.mean(axis=0))
+            ratio, spread = jackknifed(known)
             print(
-                f"{row:<10} bound {bound**0.5:.3f} {unit}, told all {told**0.5:.3f} {unit}: "
-                f"{bound / told:.2f}"
+                f"{row:<10} bound {bound:.3f} {unit}, told all {told:.3f} {unit}: "
+                f"{ratio:.2f} ± {spread:.2f}"
             )
     return 0
 

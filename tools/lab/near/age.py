@@ -48,6 +48,7 @@ async def measured(
         word = "compute" if computes else "rest"
         process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "lab.near.busy_daemon", str(config), str(robots), word),
+            stdout=asyncio.subprocess.DEVNULL,
             env={
                 **os.environ,
                 "OPENBLAS_NUM_THREADS": "1",
