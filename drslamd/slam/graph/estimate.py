@@ -59,6 +59,17 @@ class Learned(NamedTuple):
     sigma: float = float("inf")
 
 
+class Lapse(NamedTuple):
+    """A stretch along which wheels of a robot stood, or spun, while it drove: of its keyframes from
+    `first` to `last`. Is it known for sure where it went meanwhile?"""
+
+    robot: int
+    first: int
+    last: int
+    stood: bool
+    is_settled: bool = False
+
+
 class PoseNow(NamedTuple):
     """Where a robot is: utime on its clock, w_T_a (3,), covariance (3, 3) of x, y, theta."""
 
@@ -86,6 +97,7 @@ class TeamEstimate:
         odometry_level: how many times the sigma of a robot's odometry is what is configured, of
             late, as far as it must be feared; 1 where none is named.
         late_level: likewise, of the last seconds only.
+        lapses: of everybody.
         contradicted: pairs whose ranges of late do not fit the rest.
         boldness: by how much variances of pairs a < b that were claimed of late were too small
             (`revisions`), where they were.
@@ -113,6 +125,7 @@ class TeamEstimate:
     scatter: dict[tuple[int, int], float] = field(default_factory=dict)
     odometry_level: dict[int, float] = field(default_factory=dict)
     late_level: dict[int, float] = field(default_factory=dict)
+    lapses: tuple[Lapse, ...] = ()
     contradicted: frozenset[tuple[int, int]] = frozenset()
     boldness: dict[tuple[int, int], float] = field(default_factory=dict)
     is_explained: bool = True

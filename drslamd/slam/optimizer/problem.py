@@ -204,6 +204,25 @@ class Doubted:
 
 
 @dataclass(frozen=True)
+class Freed:
+    """A stretch of odometry along which wheels may have stood or spun.
+
+    Attributes:
+        robot: whose, as the problem numbers them.
+        links: (k,) rows of odometry, in the order of time.
+        added: (k, 3, 3) what their covariances have for that beside the noise of odometry.
+        stands: did its wheels stand, or spin?
+        is_settled: is it known for sure where the robot went meanwhile?
+    """
+
+    robot: int
+    links: Index
+    added: Array
+    stands: bool
+    is_settled: bool = False
+
+
+@dataclass(frozen=True)
 class Problem:
     """One connected group of robots.
 
@@ -215,6 +234,7 @@ class Problem:
         range_sigma: of a range, as configured, m.
         doubted: whose mountings are unknowns; those of the others are as configured.
         model: of its ranges.
+        freed: of what odometry says.
     """
 
     robot: Index
@@ -229,6 +249,7 @@ class Problem:
     doubted: Doubted
     range_sigma: float = 0.1
     model: RangeModel = LINKTRACK
+    freed: tuple[Freed, ...] = ()
 
 
 def pose_errors(poses: Array, factors: BetweenFactors, measured: Array) -> Array:

@@ -26,6 +26,7 @@ from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.banded.banded_solver import SETTLED
+from drslamd.slam.optimizer.banded.lapses.known_lapses import freed_again, lapse_of
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE
 from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.bias_prior import BiasPrior
@@ -149,6 +150,7 @@ def build_problem(
         range_sigma=numbers.range_sigma,
         model=numbers.model,
     )
+    problem = freed_again(problem, robots, previous.lapses if previous else ())
     by_gyro = {c.chain.robot for c in chains if c.model.noise.learns_gyro}
     start = _start(previous, known, pairs, robots, by_gyro)
     solved = {chain.chain: places.n[places.of_robot(chain.chain.robot)] for chain in chains}
@@ -294,9 +296,8 @@ def solved(
         scatter=dict(zip(team.pairs, solution.scatter.tolist(), strict=True)),
         odometry_level=_latest(team, solution.feared_level),
         late_level=_latest(team, solution.late_level),
-        contradicted=frozenset(
-            pair for pair, bad in zip(team.pairs, solution.contradicted, strict=True) if bad
-        ),
+        lapses=tuple(lapse_of(team.problem, list(mine), one) for one in solution.freed),
+        contradicted=frozenset(compress(team.pairs, solution.contradicted)),
         is_explained=solution.is_explained,
         cost=solution.cost,
         iterations=solution.iterations,

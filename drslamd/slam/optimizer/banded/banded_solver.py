@@ -15,10 +15,12 @@ import numpy as np
 from drslamd.slam import se2
 from drslamd.slam.optimizer.banded import claims
 from drslamd.slam.optimizer.banded.explanation import explain
+from drslamd.slam.optimizer.banded.lapses.known_lapses import still_freed
+from drslamd.slam.optimizer.banded.lapses.stretches import under
 from drslamd.slam.optimizer.banded.misfit import contradicted
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.banded.odometry_levels import raised
+from drslamd.slam.optimizer.banded.odometry_levels import FIRST_LEVEL, raised
 from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
@@ -48,7 +50,7 @@ def solve(
         most: bound on steps.
         tolerance: see `newton_descent.TOLERANCE`.
     """
-    equations = Equations(problem)
+    equations, known = Equations(problem), len(problem.freed)
     start = start or Calibration.zero(problem.pairs, len(problem.priors.scale))
     nominal = descend(equations, start, most, tolerance)
     explained = explain(equations, nominal, most, tolerance)
@@ -60,6 +62,12 @@ def solve(
     feared = Equations(raised(problem, explained.feared, point), like=equations)
     wanted = np.array(marginals, dtype=int)
     joint, spread = claims.covariances(feared, point, scatter, wanted)
+    freed = still_freed(problem, point)
+    is_same = len(freed) == len(problem.freed) == known
+    doubted = tuple(one for one in freed if not one.is_settled)
+    late = FIRST_LEVEL * under(problem, doubted, after_s=np.inf)
+    # nobody goes on from a solution with other stretches freed as from one that is as modelled
+    news = FIRST_LEVEL * under(problem, doubted if is_same else problem.freed)
     if explained.other is not None:
         joint += claims.disagreement(point, explained.other, wanted)
     return Solution(
@@ -71,10 +79,11 @@ def solve(
         scatter=scatter,
         joint=joint,
         spread=spread,
-        odometry_level=explained.level,
-        feared_level=np.sqrt(explained.feared),
-        late_level=np.sqrt(explained.lately),
+        odometry_level=np.maximum(explained.level, news),
+        feared_level=np.maximum(np.sqrt(explained.feared), news),
+        late_level=np.maximum(np.sqrt(explained.lately), late),
         is_explained=explained.other is None,
         contradicted=contradicted(problem, point),
         doubted=claims.still_doubted(problem.doubted, point.calibration, spread),
+        freed=freed,
     )

@@ -1,9 +1,9 @@
 """Is the model one of what was measured, and if not, what is?
 
 A solution as configured is asked three questions: does odometry fit, do ranges fit now, does some
-track or antenna ask to be another one? Most often all is well. Else mountings are tried
-(`mountings`), which explain a fault for good, and then odometry that was worse for a while
-(`odometry_levels`).
+track or antenna ask to be another one? Most often all is well. Else wheels that stood or spun are
+tried (`lapses`), then mountings (`mountings`), which explain a fault for good, and then odometry
+that was worse for a while (`odometry_levels`).
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import numpy as np
 
 from drslamd.slam.optimizer.banded import mountings, odometry_levels
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
+from drslamd.slam.optimizer.banded.lapses import lapse_search
+from drslamd.slam.optimizer.banded.lapses.known_lapses import settled
 from drslamd.slam.optimizer.banded.misfit import (
     Run,
     guessed_misfit,
@@ -76,15 +78,20 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
         nominal: the solution as configured, or with the mountings that were let go before.
         most, tolerance: of further solutions, see `descend`.
     """
+    equations, nominal = settled(equations, nominal, most, tolerance)
     check = _checked(equations, nominal)
-    if check.is_passed() and not check.scores.ask():
+    is_fine = check.is_passed() and not check.scores.ask()
+    if not is_fine or not _fits(equations, nominal):
+        lapse = _by_lapse(equations, nominal, most, tolerance)
+        if lapse is not None:
+            return lapse
+    if is_fine:
         return _as_is(equations, nominal, check.ratio)
     bases = [(equations, nominal, check)]
     if check.scores.ask():
         mounted, better = mountings.fitted(equations, nominal, check.scores, most, tolerance)
         again = _checked(mounted, better)
-        few = outlier_share(mounted.problem, better).max(initial=0) < FEW_OUTLIERS
-        if better.converged and few and again.is_passed():
+        if better.converged and _fits(mounted, better) and again.is_passed():
             return _as_is(mounted, better, again.ratio)
         if better.converged and _gain(equations, nominal, mounted, better) > MUCH:
             bases.insert(0, (mounted, better, again))
@@ -95,6 +102,25 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
             return Explanation(base, levels.point, None, seen, levels.feared, levels.lately)
     # what was tried last is what remains of the nominal solution
     return Explanation(equations, nominal, levels.point, seen, levels.feared, levels.lately)
+
+
+def _by_lapse(
+    equations: Equations, nominal: Point, most: int, tolerance: float
+) -> Explanation | None:
+    """Wheels stood or spun, if that explains all."""
+    found = lapse_search.best(equations, nominal, most, tolerance)
+    if found is None:
+        return None
+    freed, point = settled(found.equations, found.point, most, tolerance)
+    if not _fits(freed, point):
+        return None
+    check = _checked(freed, point)
+    return _as_is(freed, point, check.ratio) if check.is_passed() else None
+
+
+def _fits(equations: Equations, point: Point) -> bool:
+    """Are few ranges outliers?"""
+    return bool(outlier_share(equations.problem, point).max(initial=0) < FEW_OUTLIERS)
 
 
 def _as_is(equations: Equations, point: Point, ratio: Array) -> Explanation:

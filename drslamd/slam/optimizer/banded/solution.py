@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from drslamd.slam.optimizer.problem import Doubted
+from drslamd.slam.optimizer.problem import Doubted, Freed
 from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.se2 import Array
 
@@ -23,6 +23,7 @@ class Solution:
         odometry_level: (m,) sigmas of the links of odometry over what was configured, as far as
             it was seen; feared_level: as far as it must be feared; late_level: of the last seconds.
         doubted: whose mountings were let go.
+        freed: stretches along which wheels stood or spun.
         is_explained: is the model, with these levels, one of what was measured?
         contradicted: (pairs,) whose ranges of late do not fit.
     """
@@ -41,3 +42,4 @@ class Solution:
     is_explained: bool = True
     contradicted: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     doubted: Doubted = field(default_factory=lambda: Doubted.none(0))
+    freed: tuple[Freed, ...] = ()

@@ -188,4 +188,5 @@ def _said(
         late_level=level,
         contradicted=quick_check.lately_wrong(problem, point),
         doubted=claims.still_doubted(problem.doubted, point.calibration, spread),
+        freed=problem.freed,
     )

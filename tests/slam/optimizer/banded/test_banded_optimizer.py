@@ -24,7 +24,7 @@ from slam_scenes import (
 )
 
 from drslamd.conventions import Chain, Segment
-from drslamd.slam.graph.estimate import Learned, TeamEstimate, Trajectory
+from drslamd.slam.graph.estimate import Lapse, Learned, TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
@@ -37,7 +37,7 @@ from drslamd.slam.optimizer.banded.banded_optimizer import (
 )
 from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.bias_prior import BiasPrior
-from drslamd.slam.optimizer.problem import Doubted
+from drslamd.slam.optimizer.problem import Doubted, Freed
 from drslamd.slam.range_model import LINKTRACK
 from drslamd.slam.robot_model import RobotModel
 
@@ -139,6 +139,36 @@ def test_who_was_not_solved_before_begins_with_the_mountings_of_its_closures() -
     # of robot 2 two of two say so, of robot 1 half: those that it made itself
     assert built.start.turn.tolist() == [0, 0.2, 0.4]
     assert built.start.scale.tolist() == [0, 0.05, 0.1]
+
+
+def test_the_next_solution_begins_with_the_lapses_that_were_found() -> None:
+    team = small_team(1, count=12)
+    first, last = (int(team.n[1][k]) for k in (4, 7))
+    lapse = Lapse(1, first, last, stood=True)
+    previous = replace(mounted(), lapses=(lapse,))
+    built = build_problem(team.graph, group_of(team.graph), previous, BANDED)
+    (freed,) = built.problem.freed
+    odometry = built.problem.odometry
+    assert (odometry.robot[freed.links] == 1).all()
+    assert built.problem.n[odometry.i[freed.links]].tolist() == team.n[1][4:7].tolist()
+    assert build_problem(team.graph, group_of(team.graph), None, BANDED).problem.freed == ()
+
+
+def test_a_lapse_is_named_by_its_robot_and_keyframes(monkeypatch: pytest.MonkeyPatch) -> None:
+    team = small_team(1, count=12)
+    group = group_of(team.graph)
+    built = build_problem(team.graph, group, None, BANDED)
+    odometry = built.problem.odometry
+    links = np.flatnonzero(odometry.robot == 2)[3:5]
+    freed = Freed(2, links, np.zeros((2, 3, 3)), stands=False)
+    solve = banded_solver.solve
+
+    def freeing(*args: Any, **named: Any) -> Solution:
+        return replace(solve(*args, **named), freed=(freed,))
+
+    monkeypatch.setattr(banded_solver, "solve", freeing)
+    first, last = int(team.n[2][3]), int(team.n[2][5])
+    assert solved(team.graph, group).lapses == (Lapse(2, first, last, stood=False),)
 
 
 def test_mountings_that_are_still_in_doubt_are_named_by_their_robots(

@@ -35,10 +35,12 @@ from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.banded_solver import solve
 from drslamd.slam.optimizer.banded.claims import UNKNOWN, covariances
 from drslamd.slam.optimizer.banded.explanation import explain
+from drslamd.slam.optimizer.banded.lapses.stretches import with_freed
 from drslamd.slam.optimizer.banded.misfit import guessed_misfit
 from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.problem import Doubted, OdometryFactors, Problem
+from drslamd.slam.optimizer.banded.odometry_levels import FIRST_LEVEL
+from drslamd.slam.optimizer.problem import Doubted, Freed, OdometryFactors, Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration, Priors
 
 gtsam = pytest.importorskip("gtsam", reason="gtsam has no wheel for this Python")
@@ -235,6 +237,41 @@ def test_where_somebody_slipped_the_solution_is_the_one_that_explains_it() -> No
     for number, k in enumerate((4 * 44 + 1, 4 * 44 + 2)):
         block = slice(3 * number, 3 * number + 3)
         assert error[k] @ np.linalg.solve(solution.joint[block, block], error[k]) < 14.2
+
+
+@pytest.mark.parametrize(("count", "is_news"), [(41, True), (45, False)])
+def test_a_stretch_that_was_freed_is_told_and_feared_until_ranges_have_shown_where_it_led(
+    count: int, is_news: bool
+) -> None:
+    """It ends with keyframe 32. Who knew of it before relies on the solution ten seconds later."""
+    problem, truth = team_problem(3, robots=3, count=count, closures=6)
+    first = solve(slipping(held_at(problem, truth), 1, 25, 31), most=60)
+    (freed,) = first.freed
+    slipped = links_of(problem, 1, 24, 32)
+    assert sorted(freed.links.tolist()) == slipped.tolist()
+    others = np.setdiff1d(np.arange(len(problem.odometry)), slipped)
+    # a solution with news is none to go on from
+    assert (first.odometry_level[slipped] == FIRST_LEVEL).all()
+    assert (first.odometry_level[others] == 1).all()
+    assert freed.is_settled is not is_news
+    wider = with_freed(slipping(held_at(problem, truth), 1, 25, 31), freed)
+    again = solve(wider, most=60)
+    assert [one.links.tolist() for one in again.freed] == [freed.links.tolist()]
+    assert (again.odometry_level[slipped] == (FIRST_LEVEL if is_news else 1)).all()
+    assert (again.feared_level >= again.odometry_level).all()
+    late = np.flatnonzero(again.late_level == FIRST_LEVEL)
+    assert late.tolist() == (links_of(problem, 1, 24, 41).tolist() if is_news else [])
+
+
+def test_a_stretch_along_which_wheels_were_right_is_freed_no_longer() -> None:
+    problem, truth = team_problem(3, robots=3, count=45, closures=6)
+    problem = held_at(problem, truth)
+    # (between two keyframes with ranges little is left to freedom)
+    links = links_of(problem, 1, 10, 11)
+    freed = Freed(1, links, 0.02**2 * np.eye(3)[None], stands=False)
+    solution = solve(with_freed(problem, freed), most=60)
+    assert solution.freed == ()
+    assert (solution.odometry_level[links] == FIRST_LEVEL).all()
 
 
 def test_where_nobody_can_say_who_is_wrong_poses_stay_and_their_covariances_grow() -> None:

@@ -22,6 +22,7 @@ from slam_scenes import Array
 from drslamd.slam.optimizer.banded import explanation, mountings, odometry_levels
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.explanation import MUCH, Explanation, explain
+from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.misfit import (
     Misfit,
     Run,
@@ -67,6 +68,12 @@ def ratio_of(problem: Problem, point: Point, is_guessed: bool = False) -> Array:
 
 def worst(point: Point, truth: Array) -> float:
     return float(np.hypot(*(point.poses - truth)[:, :2].T).max())
+
+
+@pytest.fixture
+def nowhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wheels say nothing of where they may have stood or spun."""
+    monkeypatch.setattr(lapse_search, "likely_stretches", lambda _: [])
 
 
 # as configured
@@ -143,6 +150,7 @@ def test_of_poses_that_nothing_holds_nothing_is_asked() -> None:
 # odometry that was worse for a while
 
 
+@pytest.mark.usefixtures("nowhere")
 @pytest.mark.parametrize(("times", "is_raised"), [(1.001, False), (0.999, True)])
 def test_a_robot_that_stands_out_is_believed_less(
     times: float, is_raised: bool, monkeypatch: pytest.MonkeyPatch
@@ -180,6 +188,7 @@ def test_a_burst_is_not_looked_into_and_a_run_is(count: int, is_found: bool) -> 
     assert found.equations is equations
 
 
+@pytest.mark.usefixtures("nowhere")
 def test_who_slipped_is_believed_less_by_sigmas_as_it_was_seen_and_by_variances_as_is_feared() -> (
     None
 ):
@@ -195,6 +204,62 @@ def test_who_slipped_is_believed_less_by_sigmas_as_it_was_seen_and_by_variances_
     assert np.array_equal(found.feared, levels.feared)
     assert worst(point, truth) > 1.5
     assert worst(found.point, truth) < 0.7
+
+
+# wheels that stood or spun
+
+
+@pytest.mark.parametrize("fault", [stuck, slipping])
+def test_wheels_that_stood_or_spun_explain_it_and_the_rest_is_as_configured(fault: object) -> None:
+    problem, truth = a_team(2)
+    problem = fault(problem, 1, *FAULT)  # type: ignore[operator]
+    point = nominal(problem)
+    found = explained(problem, point)
+    (freed,) = found.equations.problem.freed
+    assert (freed.robot, freed.stands) == (1, fault is stuck)
+    assert found.other is None
+    assert (found.level == 1).all()
+    assert found.feared.max() < 2
+    assert np.array_equal(found.lately, found.feared)
+    assert worst(point, truth) > 1.5
+    assert worst(found.point, truth) < 1
+
+
+@pytest.mark.parametrize("share", [0.05, 0.07])
+def test_a_stretch_that_leaves_many_outliers_is_no_reason(
+    share: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = slipping(a_team(2)[0], 1, *FAULT)
+    monkeypatch.setattr(explanation, "outlier_share", lambda *_: np.array([0.0, share]))
+    assert bool(explained(problem).equations.problem.freed) is (share < 0.06)
+
+
+def test_a_stretch_that_leaves_another_robot_at_fault_is_no_reason() -> None:
+    problem = slipping(a_team(2)[0], 1, *FAULT)
+    links = links_of(problem, 2, 10, 16)
+    turned = problem.odometry.measured[links] + [0.0, 0.0, 0.3]
+    found = explained(mismeasured(problem, links, turned))
+    assert found.equations.problem.freed == ()
+    assert found.level.max() > 5
+
+
+@pytest.mark.parametrize("share", [0.05, 0.07])
+def test_many_outliers_are_looked_into_where_wheels_stood(
+    share: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Though odometry fits: it was bent until it did."""
+    problem = stuck(a_team(3)[0], 1, 25, 29)
+    point = nominal(problem)
+    passed = explanation._Check(np.ones(ROBOTS), [], Scores(np.zeros(ROBOTS), np.zeros(ROBOTS)))
+    monkeypatch.setattr(explanation, "_checked", lambda *_: passed)
+    monkeypatch.setattr(
+        explanation,
+        "outlier_share",
+        lambda _, at: np.array([share if at is point else 0.0]),
+    )
+    found = explained(problem, point)
+    assert bool(found.equations.problem.freed) is (share > 0.06)
+    assert (found.point is point) is (share < 0.06)
 
 
 # mountings

@@ -1,0 +1,162 @@
+"""Where wheels may have stood or spun, as they show it themselves, and problems with that freed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drslamd.conventions import GRID_HZ
+from drslamd.slam.optimizer.problem import Freed, OdometryFactors, Problem
+from drslamd.slam.se2 import Array, Index
+
+STANDS_S = 2.0
+"""Who stands for less is back before anything can be seen of it."""
+STILL_MPS, STILL_RADPS = 0.05, 0.1
+"""Wheels that stand."""
+MOVES_MPS = 0.1
+"""Links slower than this say nothing of how fast a robot drives."""
+FASTER = 1.25
+"""Times its usual speed: wheels that spin, or somebody in a hurry, who fits without."""
+APART_S = 4.0
+"""Between fast links of one stretch: a robot whose wheels spin slows down to turn."""
+LEAST_MPS, MOST_RADPS = 0.2, 0.5
+"""A robot whose wheels do not count may drive as fast as it usually does, or so fast, and turn."""
+UNKNOWN_M = 100.0
+"""Sigma of a range that says nothing."""
+MOST_TRIED = 4
+"""Stretches of each robot, the latest ones."""
+
+
+def likely_stretches(problem: Problem) -> list[Freed]:
+    """Where wheels may have stood or spun: of all robots, those of each in the order of time."""
+    out = []
+    for robot in range(len(problem.priors.scale)):
+        mine = np.flatnonzero(problem.odometry.robot == robot)
+        mine = mine[np.argsort(problem.n[problem.odometry.j[mine]], kind="stable")]
+        out += _of_robot(problem, robot, mine)[-MOST_TRIED:]
+    return out
+
+
+def _of_robot(problem: Problem, robot: int, mine: Index) -> list[Freed]:
+    """Of its links (k,)."""
+    odometry = problem.odometry
+    seconds = _seconds(problem, mine)
+    speed = np.hypot(*odometry.measured[mine, :2].T) / seconds
+    turning = np.abs(odometry.measured[mine, 2]) / seconds
+    # (who moves makes a keyframe each second)
+    stands = (seconds >= STANDS_S) | ((speed < STILL_MPS) & (turning < STILL_RADPS))
+    until = np.cumsum(seconds)
+    stood = [
+        (first, last, True)
+        for first, last in _stretches(stands, until, 0.0)
+        if seconds[first : last + 1].sum() >= STANDS_S
+    ]
+    is_fast = speed > FASTER * _usual_speed(speed)
+    spun = [(first, last, False) for first, last in _stretches(is_fast, until, APART_S)]
+    # each began and ended somewhere in the links beside
+    return [
+        freed_links(problem, robot, mine[max(first - 1, 0) : last + 2], is_still)
+        for first, last, is_still in sorted(stood + spun)
+    ]
+
+
+def _seconds(problem: Problem, links: Index) -> Array:
+    """(k,) that links last."""
+    odometry = problem.odometry
+    return np.asarray((problem.n[odometry.j[links]] - problem.n[odometry.i[links]]) / GRID_HZ)
+
+
+def _usual_speed(speed: Array) -> float:
+    moving = speed[speed > MOVES_MPS]
+    return max(float(np.median(moving)), LEAST_MPS) if len(moving) else LEAST_MPS
+
+
+def _stretches(flagged: NDArray[np.bool_], until: Array, apart_s: float) -> list[tuple[int, int]]:
+    """First and last of the runs of flagged links; those that lie no farther apart are one.
+
+    Args:
+        until: (k,) s, when links end.
+    """
+    out: list[tuple[int, int]] = []
+    for k in np.flatnonzero(flagged).tolist():
+        if out and until[k - 1] - until[out[-1][1]] <= apart_s:
+            out[-1] = (out[-1][0], k)
+        else:
+            out.append((k, k))
+    return out
+
+
+def freed_links(problem: Problem, robot: int, links: Index, stands: bool) -> Freed:
+    mine = problem.odometry.robot == robot
+    seconds = _seconds(problem, np.flatnonzero(mine))
+    usual = _usual_speed(np.hypot(*problem.odometry.measured[mine, :2].T) / seconds)
+    added = _freedom(problem.odometry, links, usual, _seconds(problem, links), stands)
+    return Freed(robot, links, added, stands)
+
+
+def _freedom(
+    odometry: OdometryFactors, links: Index, speed: float, seconds: Array, stands: bool
+) -> Array:
+    """(k, 3, 3) what a robot can do beside what wheels say: anything where they stand, and another
+    way in the same direction where they spin.
+
+    Args:
+        speed: m/s at which it drives; seconds: (k,) that links last.
+    """
+    out = np.zeros((len(links), 3, 3))
+    way = (speed * seconds) ** 2
+    if stands:
+        out[:, 0, 0] = out[:, 1, 1] = way
+        out[:, 2, 2] = (MOST_RADPS * seconds) ** 2
+        return out
+    chord = odometry.measured[links, :2]
+    along = chord / np.maximum(np.hypot(*chord.T), 1e-9)[:, None]
+    out[:, :2, :2] = way[:, None, None] * along[:, :, None] * along[:, None, :]
+    return out
+
+
+def with_freed(problem: Problem, freed: Freed) -> Problem:
+    """With a stretch freed, and without what was ranged along it while no keyframe was made."""
+    covariance = problem.odometry.covariance.copy()
+    covariance[freed.links] += freed.added
+    odometry = replace(problem.odometry, covariance=covariance)
+    ranges = problem.ranges
+    if freed.stands:
+        sigma = np.where(_ranged_later(problem, freed), UNKNOWN_M, ranges.sigma)
+        ranges = replace(ranges, sigma=sigma)
+    return replace(problem, odometry=odometry, ranges=ranges, freed=(*problem.freed, freed))
+
+
+def _ranged_later(problem: Problem, freed: Freed) -> NDArray[np.bool_]:
+    """(m,) ranges that name a keyframe of a robot whose wheels stood, measured when the other robot
+    had made more of its own: nobody knows where that one was by then."""
+    odometry, ranges = problem.odometry, problem.ranges
+    out = np.zeros(len(ranges), dtype=bool)
+    for pose in odometry.i[freed.links[_seconds(problem, freed.links) >= STANDS_S]].tolist():
+        for mine, other in ((ranges.i, ranges.j), (ranges.j, ranges.i)):
+            for robot in np.unique(problem.robot[other[mine == pose]]).tolist():
+                later = np.flatnonzero(problem.robot == robot)
+                later = later[later > pose]
+                is_its = (mine == pose) & (problem.robot[other] == robot)
+                if len(later):
+                    out |= is_its & (problem.n[other] >= problem.n[later[0]] + GRID_HZ)
+    return out
+
+
+def span(problem: Problem, freed: Freed) -> tuple[int, int]:
+    odometry = problem.odometry
+    return int(problem.n[odometry.i[freed.links[0]]]), int(problem.n[odometry.j[freed.links[-1]]])
+
+
+def under(problem: Problem, freed: Iterable[Freed], after_s: float = 0.0) -> NDArray[np.bool_]:
+    """(m,) the links of their robots along some of them and for some seconds after."""
+    odometry = problem.odometry
+    n = problem.n[odometry.i]
+    out = np.zeros(len(n), dtype=bool)
+    for one in freed:
+        first, last = span(problem, one)
+        out |= (odometry.robot == one.robot) & (n >= first) & (n < last + after_s * GRID_HZ)
+    return out

@@ -1,0 +1,94 @@
+"""Which stretch explains what does not fit, and when none does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lapse_scenes import FAULT, FROM_TO, a_team, nominal, worst
+from slam_problems import links_of, mismeasured, slipping, stuck
+
+from drslamd.slam.graph.estimate import Lapse
+from drslamd.slam.optimizer.banded.lapses import lapse_search
+from drslamd.slam.optimizer.banded.lapses.known_lapses import lapse_of
+from drslamd.slam.optimizer.banded.lapses.lapse_search import GAIN, Tried, best
+from drslamd.slam.optimizer.banded.lapses.stretches import likely_stretches
+from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE
+from drslamd.slam.optimizer.banded.normal_equations import Equations
+from drslamd.slam.optimizer.problem import Problem
+
+
+def tried(problem: Problem) -> Tried | None:
+    return best(Equations(problem), nominal(problem), 60, TOLERANCE)
+
+
+@pytest.mark.parametrize("fault", [stuck, slipping])
+@pytest.mark.parametrize("robots", [2, 3])
+def test_the_stretch_is_found_and_behind_it_poses_are_as_if_nothing_had_been(
+    robots: int, fault: object
+) -> None:
+    problem, truth = a_team(7, robots)
+    clean = worst(nominal(problem).poses, truth)
+    problem = fault(problem, 1, *FAULT)  # type: ignore[operator]
+    answer = tried(problem)
+    assert answer is not None
+    assert worst(nominal(problem).poses, truth) > 1.5
+    assert answer.gain > 10 * GAIN
+    (freed,) = answer.equations.problem.freed
+    assert lapse_of(problem, [4, 6, 9], freed) == Lapse(6, *FROM_TO, fault is stuck)
+    outside = np.ones(len(truth), dtype=bool)
+    outside[robots * FAULT[0] : robots * FAULT[1]] = False
+    assert worst(answer.point.poses[outside], truth[outside]) < clean + 0.5
+
+
+def test_of_several_stretches_the_one_that_explains_most_is_taken() -> None:
+    """Robot 0 slipped a little."""
+    problem, _ = a_team(7)
+    both = stuck(problem, 1, *FAULT)
+    measured = both.odometry.measured.copy()
+    measured[links_of(both, 0, 5, 8)] *= [1.5, 1.5, 1.0]
+    both = replace(both, odometry=replace(both.odometry, measured=measured))
+    assert [freed.robot for freed in likely_stretches(both)] == [0, 1]
+    answer = tried(both)
+    assert answer is not None
+    assert answer.equations.problem.freed[0].robot == 1
+
+
+def test_where_nothing_stood_or_spun_nothing_is_freed() -> None:
+    problem, _ = a_team(7)
+    links = links_of(problem, 1, *FAULT)
+    turned = problem.odometry.measured[links] + [0.0, 0.0, 0.2]
+    assert tried(mismeasured(problem, links, turned)) is None
+
+
+@pytest.mark.parametrize(("times", "is_found"), [(1.01, False), (0.9, True)])
+def test_what_gains_little_is_no_reason(
+    times: float, is_found: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = slipping(a_team(7)[0], 1, *FAULT)
+    answer = tried(problem)
+    assert answer is not None
+    monkeypatch.setattr(lapse_search, "GAIN", times * answer.gain)
+    assert (tried(problem) is not None) is is_found
+
+
+def test_what_is_freed_already_is_not_tried_again() -> None:
+    problem = slipping(a_team(7)[0], 1, *FAULT)
+    answer = tried(problem)
+    assert answer is not None
+    assert tried(answer.equations.problem) is None
+
+
+def test_ranges_that_no_longer_count_are_no_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Robot 0 is said to have stood, so that nothing counts which contradicts robot 1."""
+    problem = slipping(a_team(7)[0], 1, *FAULT)
+    (freed,) = likely_stretches(problem)
+    silent = replace(problem.ranges, sigma=np.full(len(problem.ranges), 100.0))
+    useless = replace(freed, added=0.0 * freed.added)
+    monkeypatch.setattr(
+        lapse_search,
+        "with_freed",
+        lambda at, _: replace(at, ranges=silent, freed=(useless,)),
+    )
+    assert tried(problem) is None
