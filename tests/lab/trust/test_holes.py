@@ -23,8 +23,9 @@ def test_lines_count_only_who_was_localised_before() -> None:
 
 
 @pytest.mark.slow
-def test_one_hole_is_survived() -> None:
-    hole = play(3)
+@pytest.mark.parametrize("what", ["cable", "restart"])
+def test_one_hole_is_survived(what: str) -> None:
+    hole = play(what, 3)
     assert hole.was_localised
     assert hole.back_s <= 10
     assert hole.back_m < 0.5
