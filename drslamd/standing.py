@@ -101,7 +101,9 @@ class Standing:
         targets = point_targets(
             front.ranges.fresh(utime), neighbours, carrier, back.graph, back.estimate, utime
         )
-        places = front.points.look(targets, front.ranges, own, back.graph, back.estimate, utime)
+        places = front.points.look(
+            targets, front.ranges, own, back.graph, back.estimate, carrier, utime
+        )
         if places:
             yield Asked(POINTS, places, self._on_places)
 

@@ -71,13 +71,13 @@ class Hole:
     wrong: int = 0
 
 
-def play(what: str, seed: int) -> Hole:
+def play(what: str, seed: int, until_s: float = END_S) -> Hole:
     """One seed."""
     recording = _driven(seed, is_carried=what == "carried")
     back_s = BACK_S[what]
     cable = (SILENT_S, back_s) if what == "cable" else (END_S, END_S)
     simulator, hole = _cut(recording, seed, cable), Hole()
-    for now in np.arange(SILENT_S - 1, END_S, LOOK_S).tolist():
+    for now in np.arange(SILENT_S - 1, until_s, LOOK_S).tolist():
         simulator.run(now)
         if what != "cable" and now == SILENT_S:
             simulator.kill(simulator.members[ROBOT])
