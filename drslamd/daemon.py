@@ -48,10 +48,12 @@ from drslamd.io.watch.watchdog import Watchdog, slow_disk
 from drslamd.io.worker import Finished, Worker
 from drslamd.machine.folders import near_path, socket_path, state_dir
 from drslamd.parts import (
+    begun_robot,
     dbc_text,
     make_ports,
     make_recorder,
     make_transport,
+    outlived,
     taped_calibration,
     team_secret,
 )
@@ -59,7 +61,6 @@ from drslamd.recording.records import Beginning
 from drslamd.reports import graph_report
 from drslamd.robot import Robot
 from drslamd.slam import headway
-from drslamd.slam.calibration.sensor_calibration import SensorCalibration
 
 RESTARTS_APART_US = 30 * SECOND_US
 """Between two restarts in one process, twice as long after each: a robot that is lied to about its
@@ -83,13 +84,12 @@ class Daemon:
         self._store = StateStore(state_dir(config), config.robot.id)
         state = self._store.load()
         self._load_fault = self._store.fault
-        epochs = {int(robot): epoch for robot, epoch in state.get("epochs", {}).items()}
-        kept = SensorCalibration.of_state(state.get("calibration", {}))
         key, dbc, taped = team_key(secret), dbc_text(config), taped_calibration(config)
         self._make_robot = partial(Robot, config, key, dbc_text=dbc, taped=taped)
         self._recorder = make_recorder(config, self._clock, state_dir(config), dbc, key, taped)
-        last = {"epochs": epochs, "calibration": kept.state()}
-        self.robot = self._new_robot(self._store.begin(last, state.get("epoch", 0)), epochs, kept)
+        last = outlived(state)
+        epoch = self._store.begin(last, state.get("epoch", 0))
+        self.robot = self._new_robot(Beginning(epoch, **last))
         self._ends: Robot | None = None
         """The robot in whose place another one is about to begin."""
         self._may_restart_at, self._restart_apart = 0, RESTARTS_APART_US
@@ -172,10 +172,9 @@ class Daemon:
         self._wake()
         self._near.tell(self.robot.near)
 
-    def _new_robot(self, epoch: int, epochs: dict[int, int], kept: SensorCalibration) -> Robot:
-        beginning = Beginning(epoch, dict(epochs), kept.state())
-        self._recorder.begin(self._clock.now(), beginning)
-        return self._make_robot(epoch, epochs, kept)
+    def _new_robot(self, begun: Beginning) -> Robot:
+        self._recorder.begin(self._clock.now(), begun)
+        return begun_robot(self._make_robot, begun)
 
     def _answers(self, event: Event) -> list[Effect]:
         # recorded before it is tried, so that a bug can be replayed
@@ -241,7 +240,8 @@ class Daemon:
 
     def _succeed(self, old: Robot, epoch: int) -> None:
         """Begin again under a new epoch; ports and network stay as they are."""
-        self.robot = self._new_robot(epoch, old.team.seal.epochs, old.calibration.latest)
+        kept = {**old.memory.state(), "epoch": epoch, "epochs": dict(old.team.seal.epochs)}
+        self.robot = self._new_robot(Beginning(**kept))
         for state in (*old.ports.values(), old.network):
             if state is not None:
                 self.handle(state)

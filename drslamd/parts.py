@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,10 +24,13 @@ from drslamd.io.serial_port import SerialPort
 from drslamd.io.state_store import read_key
 from drslamd.io.transport import Transport
 from drslamd.recording.encoder import Encoder
+from drslamd.recording.records import Beginning
+from drslamd.robot import Robot
 from drslamd.sensors.wheels.dbc_file import decoded
 from drslamd.sensors.wheels.wheel_input import is_stamped
 from drslamd.setup.calibration_file import MAX_BYTES, Taped, UnusableCalibration, read
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
+from drslamd.slam.relocation.last_place import LastPlace
 
 Handle = Callable[[Any], None]
 """Takes an event."""
@@ -156,6 +159,25 @@ def make_recorder(
     encoder = Encoder(config.robot.id, is_framed=config.gossip.provider == "native")
     origin = provenance(config, dbc_text, key, taped)
     return Recorder(files, encoder, origin, partial(clocks, clock))
+
+
+def outlived(state: Mapping[str, Any]) -> dict[str, Any]:
+    """What of a state file a robot begins with, beside its epoch."""
+    return {
+        "epochs": {int(robot): epoch for robot, epoch in state.get("epochs", {}).items()},
+        "calibration": SensorCalibration.of_state(state.get("calibration", {})).state(),
+        "place": state.get("place", {}),
+    }
+
+
+def begun_robot(make: Callable[..., Robot], begun: Beginning) -> Robot:
+    """A robot that begins with that.
+
+    Args:
+        make: takes its epoch, those of its peers, and what the last start learned and where it was.
+    """
+    kept, place = SensorCalibration.of_state(begun.calibration), LastPlace.of_state(begun.place)
+    return make(begun.epoch, dict(begun.epochs), kept, place=place)
 
 
 def taped_calibration(config: Config) -> SensorCalibration:

@@ -63,6 +63,7 @@ from drslamd.slam.graph.estimate import PoseNow
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.peer_in_range import PeerInRange
+from drslamd.slam.relocation.last_place import LastPlace
 from drslamd.slam.settings import closure_method
 from drslamd.slam.tuning import DEFAULTS, Tuning
 from drslamd.standing import Standing
@@ -86,12 +87,14 @@ class Robot:
         dbc_text: str = "",
         tuning: Tuning = DEFAULTS,
         taped: SensorCalibration = UNLEARNED,
+        place: LastPlace | None = None,
     ) -> None:
         """
         Args:
             key: of `seal.team_key`.
             epoch: of this start, above all earlier ones. epochs: last known ones of the peers.
             kept: what the last start learned of our sensors; taped: what a person measured.
+            place: where the last start was.
             dbc_text: content of `wheels.dbc_file`, if there is one. tuning: of the estimator.
         """
         self.config = config
@@ -101,7 +104,7 @@ class Robot:
         self.team = Team(Seal(key, config.robot.id, epoch, epochs), config.gossip.max_bytes_per_s)
         uses_kept = closure_method(config.relative_pose).uses_calibration
         self.calibration = CalibrationStore(kept, uses_kept, taped)
-        self.front = FrontEnd(config, self.own, self.calibration.used, tuning)
+        self.front = FrontEnd(config, self.own, self.calibration.used, tuning, place)
         self.back = BackEnd(config, self.own, tuning)
         self.broadcast = Broadcast(config, self.team, self.front, self.back)
         self.standing = Standing(config, self.team, self.front, self.back)
@@ -114,7 +117,7 @@ class Robot:
         self.jobs = Jobs()
         self.modules = Modules(self.front, self.back, self.team, self.jobs, self.neighbours)
         self.timers = Timers(self._periods())
-        self.memory = Memory(self.own, self.team.seal, self.calibration)
+        self.memory = Memory(self.own, self.team.seal, self.calibration, place)
         self._speaking = {self._repeat, self._send_status, self._send_odometry, self._extend_log}
         self._handlers: dict[type[Any], Callable[[Any], list[Effect]]] = {
             SerialData: self._on_serial,
@@ -306,6 +309,7 @@ class Robot:
         self.team.forget_silent(utime)
         self.front.watch_ranges(self.neighbours(utime), self.back.graph, self.back.estimate, utime)
         self.back.exchange.keep({peer.chain for peer in self.team.peers.values()})
+        self._remember(utime)
         found = diagnosis.conditions(self, utime)
         notes: list[Effect] = [n for key, why in found for n in self.health.set(key, why, utime)]
         above = self.team.superseded_by
@@ -313,6 +317,12 @@ class Robot:
             return notes
         # our own memory was lost, or a lie is believed
         return [*notes, Restart(above, "peers know a later start of this robot")]
+
+    def _remember(self, utime: int) -> None:
+        place = self.standing.last_place(self.neighbours(utime), utime)
+        chain = self.back.graph.chains.get(self.own.robot)
+        if chain is not None:
+            self.memory.remember(place, int(chain.keyframes.n[-1]))
 
     # time passes, and ends
 
@@ -333,4 +343,5 @@ class Robot:
         state = self.whereabouts(event.utime).state
         goodbye = self.broadcast.make_status([], None, state, event.utime, leaving=True)
         sends = (self.team.send(goodbye, event.utime) for _ in range(GOODBYES))
+        self._remember(event.utime)
         return [*sends, Save(self.memory.state())]

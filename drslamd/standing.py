@@ -19,7 +19,8 @@ from drslamd.slam.points.points import Answer
 from drslamd.slam.points.site import Site, site_of
 from drslamd.slam.pose_now import pose_now
 from drslamd.slam.relative_pose.pair_end import PairEnd
-from drslamd.slam.relocation.relocation import Found
+from drslamd.slam.relocation.last_place import LastPlace, last_place
+from drslamd.slam.relocation.question import Found
 from drslamd.whereabouts import NOWHERE, Whereabouts, likely_speeds, whereabouts
 
 
@@ -88,6 +89,7 @@ class Standing:
         )
         if found and is_free(RELOCATION, utime):
             yield Asked(RELOCATION, found, self.on_relocated)
+        yield from self._resumed(neighbours, is_free, utime)
         if is_free(JOINING, utime):
             connected = [robot for robot, pair in front.pairs.items() if pair.connected]
             joined = front.joiner.look(back.graph, back.estimate, connected, utime)
@@ -99,9 +101,29 @@ class Standing:
         targets = point_targets(
             front.ranges.fresh(utime), neighbours, carrier, back.graph, back.estimate, utime
         )
-        places = front.points.look(targets, front.ranges, own, back.graph, back.estimate, utime)
+        places = front.points.look(
+            targets, front.ranges, own, back.graph, back.estimate, carrier, utime
+        )
         if places:
             yield Asked(POINTS, places, self._on_places)
+
+    def _resumed(
+        self, neighbours: list[PeerInRange], is_free: Callable[[str, int], bool], utime: int
+    ) -> Iterator[Asked]:
+        """Where ranges place us after a start of our own."""
+        front, back, own = self._front, self._back, self._own_end()
+        team = back.estimate or back.onlooked
+        found = front.resumption.look(neighbours, front.ranges, own, back.graph, team, utime)
+        back.beside = front.resumption.beside
+        if found and is_free(RELOCATION, utime):
+            yield Asked(RELOCATION, found, self.on_resumed)
+
+    def last_place(self, neighbours: list[PeerInRange], utime: int) -> LastPlace | None:
+        """What the next start should know of this place."""
+        estimate, where = self._back.estimate, self.whereabouts(utime)
+        if estimate is None or where.pose is None:
+            return None
+        return last_place(estimate, where.pose, neighbours, self._speed())
 
     def _own_end(self) -> PairEnd | None:
         data = self._back.graph.chains.get(self._robot)
@@ -121,6 +143,10 @@ class Standing:
     def on_relocated(self, found: Found, utime: int) -> bool:
         """See `Relocation.on_found`."""
         return self._front.relocation.on_found(found, self._own_end(), utime)
+
+    def on_resumed(self, found: Found, utime: int) -> bool:
+        """See `Resumption.on_found`."""
+        return self._front.resumption.on_found(found, self._own_end(), utime)
 
     def is_doubted(self) -> tuple[bool, bool]:
         """Does odometry of ours, or of anybody, say less than what was ranged?"""

@@ -9,21 +9,24 @@ from drslamd.conventions import SECOND_US, Chain, Segment
 from drslamd.events import SaveDone
 from drslamd.gossip.epochs import LAST_KEPT_EPOCH
 from drslamd.gossip.seal import Seal, team_key
-from drslamd.memory import Memory
+from drslamd.memory import MOVED, Memory
 from drslamd.slam.calibration.calibration_store import CalibrationStore
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
+from drslamd.slam.relocation.last_place import LastPlace, SeenFrom
 
 KEPT = SensorCalibration(Learned(0.1, 0.01), Learned(0.001, 0.0005), {4: Learned(-0.2, 0.05)})
+
+PLACE = LastPlace(0.5, (SeenFrom(Chain(4, 11), 120, 12_300_000, 1.5, -2.0, 0.2),))
 
 
 class Remembering:
     """Robot 2 in its start 7; it knew starts of robots 4 and 9 before."""
 
-    def __init__(self, kept: SensorCalibration = UNLEARNED) -> None:
+    def __init__(self, kept: SensorCalibration = UNLEARNED, place: LastPlace | None = None) -> None:
         self.seal = Seal(team_key(SECRET), 2, 7, {4: 11, 9: 12})
         self.calibration = CalibrationStore(kept, True)
-        self.memory = Memory(Chain(2, 7), self.seal, self.calibration)
+        self.memory = Memory(Chain(2, 7), self.seal, self.calibration, place)
 
     def learn(self, scale: float) -> None:
         estimate = TeamEstimate(Segment(2, 7, 0), {}, scale={2: Learned(scale, 0.005)})
@@ -32,7 +35,8 @@ class Remembering:
 
 def test_the_own_epoch_those_of_the_others_and_the_calibration_are_kept() -> None:
     state = Remembering(KEPT).memory.state()
-    assert state == {"epoch": 7, "epochs": {4: 11, 9: 12}, "calibration": KEPT.state()}
+    epochs = {4: 11, 9: 12}
+    assert state == {"epoch": 7, "epochs": epochs, "calibration": KEPT.state(), "place": {}}
 
 
 @pytest.mark.parametrize("above", [0, 1])
@@ -67,6 +71,27 @@ def test_what_was_learned_is_written_once_and_again_when_it_has_moved() -> None:
         assert save.state["calibration"] == scene.calibration.latest.state()
         assert scene.calibration.latest.scale.value == pytest.approx(scale)
         assert scene.memory.save() == []
+
+
+def test_a_place_is_kept_until_another_one_is_known() -> None:
+    memory = Remembering(place=PLACE).memory
+    assert memory.state()["place"] == PLACE.state()
+    memory.remember(None, 1_000)
+    assert memory.place is PLACE
+    later = LastPlace(0.7, PLACE.seen)
+    memory.remember(later, 1_000)
+    assert memory.state()["place"] == later.state()
+
+
+def test_where_a_robot_is_that_drove_on_is_written_and_where_one_stands_is_not() -> None:
+    memory = Remembering().memory
+    memory.remember(PLACE, MOVED - 1)
+    assert memory.save() == []
+    memory.remember(PLACE, MOVED)
+    (save,) = memory.save()
+    assert save.state["place"] == PLACE.state()
+    memory.remember(PLACE, 2 * MOVED - 1)
+    assert memory.save() == []
 
 
 @pytest.mark.row("S7")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import importlib.util
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +17,18 @@ from drslamd.io.multicast import Multicast
 from drslamd.io.recording.recorder import NoRecorder, Recorder
 from drslamd.io.serial_port import SerialPort
 from drslamd.parts import (
+    begun_robot,
     dbc_text,
     make_ports,
     make_recorder,
     make_transport,
     make_wheels,
+    outlived,
     taped_calibration,
     team_secret,
 )
+from drslamd.recording.records import Beginning
+from drslamd.robot import Robot
 from drslamd.setup.calibration_file import MAX_BYTES
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED
 from drslamd.slam.graph.estimate import Learned
@@ -178,6 +183,21 @@ def test_without_a_word_nothing_is_recorded() -> None:
 
 def named(path: Path) -> Config:
     return parse(CONFIG.replace("id = 1", f'id = 1\ncalibration = "{path}"'))
+
+
+def test_a_robot_begins_with_what_its_last_start_kept() -> None:
+    place = {"speed_mps": 0.5, "seen": [[4, 9, 120, 12_300_000, 1.5, -2.0, 0.2]]}
+    state = {"epoch": 3, "epochs": {"2": 7}, "calibration": {"scale": [0.1, 0.02]}, "place": place}
+    kept = outlived(state)
+    assert kept["epochs"] == {2: 7}
+    make = partial(Robot, configured(), bytes(32))
+    robot = begun_robot(make, Beginning(4, **kept))
+    assert robot.own.epoch == 4
+    assert robot.memory.state()["place"] == place
+    assert robot.calibration.latest.scale == Learned(0.1, 0.02)
+    assert robot.front.resumption.is_waiting
+    fresh = begun_robot(make, Beginning(4, **outlived({})))
+    assert not fresh.front.resumption.is_waiting
 
 
 def test_no_calibration_is_nothing_known() -> None:

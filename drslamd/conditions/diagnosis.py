@@ -172,26 +172,17 @@ def why_not_localised(robot: Stages, utime: int) -> str | None:
             "drive a metre or two"
         )
     if where.is_old:
-        seconds = where.age_us // SECOND_US
-        relocation = robot.front.relocation
-        if relocation.by_ranges(utime) is not None and relocation.verdict:
-            return (
-                f"odometry was interrupted {seconds} s ago: ranges say where it is, not yet how it "
-                f"stands ({relocation.verdict}); drive a metre or two"
-            )
-        if relocation.by_ranges(utime) is not None:
-            return (
-                f"no odometry for {seconds} s: the position is that of ranges to other robots, the "
-                "heading is not known; check the wheels"
-            )
-        return (
-            f"no odometry for {seconds} s: the pose is that of then, and its sigma grows as fast "
-            "as the robot drives; check the wheels"
-        )
+        return _why_old(robot, where.age_us, utime)
     if where.pose is not None:
         return None
     if robot.back.estimate is not None:
         return "not localised: the odometry was interrupted, and what follows it has no place yet"
+    if robot.back.onlooked is not None:
+        why = robot.front.resumption.verdict or "its odometry has just begun"
+        return (
+            "not localised: its last start was, and by ranges to robots that are it looks for the "
+            f"place of this one ({why}); drive a metre or two"
+        )
     peers = robot.team.everybody
     living = robot.team.living(utime)
     if not peers:
@@ -220,6 +211,26 @@ def why_not_localised(robot: Stages, utime: int) -> str | None:
         )
     reasons = [f"{_why_not_connected(pair)} (with robot {k})" for k, pair in owned]
     return f"not localised: {', '.join(reasons)}; drive curves, and not side by side"
+
+
+def _why_old(robot: Stages, age_us: int, utime: int) -> str:
+    """What is said of a pose that has no odometry since then."""
+    seconds = age_us // SECOND_US
+    relocation = robot.front.relocation
+    if relocation.by_ranges(utime) is not None and relocation.verdict:
+        return (
+            f"odometry was interrupted {seconds} s ago: ranges say where it is, not yet how it "
+            f"stands ({relocation.verdict}); drive a metre or two"
+        )
+    if relocation.by_ranges(utime) is not None:
+        return (
+            f"no odometry for {seconds} s: the position is that of ranges to other robots, the "
+            "heading is not known; check the wheels"
+        )
+    return (
+        f"no odometry for {seconds} s: the pose is that of then, and its sigma grows as fast "
+        "as the robot drives; check the wheels"
+    )
 
 
 def _why_not_connected(pair: PairTracker) -> str:

@@ -1,4 +1,4 @@
-"""What a robot keeps over a restart: epochs, what it learned of its sensors, the team key.
+"""What a robot keeps over a restart: epochs, what it learned of its sensors, its place, the key.
 
 The file is replaced whole or not at all, so a power cut leaves the old one or the new one. It is
 read as if a stranger had written it: bounded in size, depth and every number; and nothing is
@@ -24,6 +24,7 @@ from drslamd.host.owners import denied
 from drslamd.host.plain_file import read_plain
 from drslamd.io.clock import uptime_s, wall_s
 from drslamd.slam.calibration import sensor_calibration
+from drslamd.slam.relocation.last_place import is_kept_place
 
 SCHEMA = 1
 MAX_STATE_BYTES = 256 * 1024
@@ -127,6 +128,7 @@ def is_sound(state: Mapping[str, Any]) -> bool:
         and epochs.keys() <= ROBOT_NAMES
         and all(is_kept_epoch(epoch) for epoch in epochs.values())
         and sensor_calibration.is_sound(state.get("calibration", {}))
+        and is_kept_place(state.get("place", {}))
     )
 
 

@@ -163,7 +163,8 @@ class Decoder:
 
 def _beginning(content: dict[str, Any]) -> Beginning:
     epochs = {int(robot): int(epoch) for robot, epoch in content["epochs"].items()}
-    return Beginning(int(content["epoch"]), epochs, content["calibration"])
+    place = content.get("place", {})
+    return Beginning(int(content["epoch"]), epochs, content["calibration"], place)
 
 
 def _can(utime: int, data: bytes) -> CanFrame:

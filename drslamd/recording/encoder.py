@@ -191,7 +191,8 @@ class Encoder:
 
 def _of_beginning(beginning: Beginning) -> dict[str, Any]:
     epochs = {str(robot): epoch for robot, epoch in beginning.epochs.items()}
-    return {"epoch": beginning.epoch, "epochs": epochs, "calibration": dict(beginning.calibration)}
+    kept = {"calibration": dict(beginning.calibration), "place": dict(beginning.place)}
+    return {"epoch": beginning.epoch, "epochs": epochs, **kept}
 
 
 def _utf8(name: str) -> bytes:

@@ -38,12 +38,13 @@ class Beginning:
 
     Attributes:
         epochs: of its peers, as they were kept.
-        calibration: `SensorCalibration.state` of the start before.
+        calibration: `SensorCalibration.state` of the start before; place: `LastPlace.state` of it.
     """
 
     epoch: int
     epochs: Mapping[int, int] = field(default_factory=dict)
     calibration: Mapping[str, Any] = field(default_factory=dict)
+    place: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,8 @@ class BackEnd:
         history: where we were.
         group: segments and points that are connected to our current one, as the last job knew them.
         estimate: of that group; None while we are in none.
+        beside: starts of peers whose group is solved while we are in none: we were in it once.
+        onlooked: the estimate of that group.
         exchange: of public poses, with `rbcd`.
     """
 
@@ -61,6 +63,9 @@ class BackEnd:
         self.revisions = Revisions()
         self.group: set[Segment] = set()
         self.estimate: TeamEstimate | None = None
+        self.beside: Set[Chain] = frozenset()
+        self.onlooked: TeamEstimate | None = None
+        self._is_beside = False
         self._inserted = 0
         self._known = _Known()
         self._not_converged = 0
@@ -100,7 +105,8 @@ class BackEnd:
             talking: those of them that hear us as we hear them.
         """
         now = _Known(self._inserted, frozenset(present), self.exchange.news)
-        if now == self._known and (self.estimate is None or self.estimate.is_final):
+        solved = self.estimate or self.onlooked
+        if now == self._known and (solved is None or solved.is_final):
             self.exchange.rest(utime)
             return None
         if self._takes_turns and not self.exchange.begin(self._neighbours(talking), utime):
@@ -111,13 +117,18 @@ class BackEnd:
             return None
         current = Segment(*self._own, int(chain.keyframes.segment[-1]))
         members = team_frame.group_of(current, self.graph, self._looks_back)
+        if not members and self.beside:
+            members = team_frame.group_with(self.beside, self.graph)
         points: frozenset[Segment] = frozenset()
         if self._looks_back:
             members, points = standing_points.with_points(current, members, self.graph)
-        self.group = members | points
+        everything = members | points
+        self._is_beside = not self._is_in(everything)
+        self.group = set() if self._is_beside else everything
         gauge = team_frame.gauge_segment(members, present)
         if gauge is None:
-            self.estimate, self._known = None, now
+            self.estimate = self.onlooked = None
+            self._known = now
             return None
         same = self.exchange.held(gauge.chain)
         group = Group(members, gauge, points)
@@ -127,6 +138,9 @@ class BackEnd:
             return None
         self._known = now
         return job
+
+    def _is_in(self, group: set[Segment]) -> bool:
+        return any(segment.chain == self._own for segment in group)
 
     @property
     def is_urgent(self) -> bool:
@@ -149,16 +163,21 @@ class BackEnd:
         """From where to solve: the last solution; nothing where it leads nowhere again and again,
         so that who began in a wrong valley begins anew as a newcomer does."""
         leads_nowhere = self._not_converged and self._not_converged % PATIENCE == 0
-        return None if leads_nowhere and not self._takes_turns else self.estimate
+        solved = self.estimate or self.onlooked
+        return None if leads_nowhere and not self._takes_turns else solved
 
     def on_solution(self, result: TeamEstimate, utime: int = 0) -> list[PublicPoses]:
         """Module 3 has answered; what must be said of it."""
-        self.estimate = result = self._anchored(result)
         self._not_converged = 0 if result.converged else self._not_converged + 1
+        own = result.trajectories.get(self._own.robot)
+        if self._is_beside:
+            self.estimate, self.onlooked = None, result
+            return []
+        self.estimate, self.onlooked = self._anchored(result), None
+        result = self.estimate
         self.revisions.on_solution(result, self._own.robot)
         if bold := self.revisions.of_pairs:
             self.estimate = result = replace(result, boldness=bold)
-        own = result.trajectories.get(self._own.robot)
         if own is not None:
             self.history.update(own)
         if result.lifted is None:

@@ -33,7 +33,9 @@ from drslamd.slam.relative_pose.pair_end import PairEnd
 from drslamd.slam.relative_pose.range_buffer import RANGES_FRESH_US, RangeBuffers
 from drslamd.slam.relative_pose.range_sampler import RangeSampler
 from drslamd.slam.relative_pose.window_request import WindowRequest, request
+from drslamd.slam.relocation.last_place import LastPlace
 from drslamd.slam.relocation.relocation import Relocation
+from drslamd.slam.relocation.resumption import Resumption
 from drslamd.slam.relocation.sightings import Own
 from drslamd.slam.robot_model import with_gyro
 from drslamd.slam.se2 import Array
@@ -74,10 +76,12 @@ class FrontEnd:
         own: Chain,
         known: SensorCalibration = UNLEARNED,
         tuning: Tuning = DEFAULTS,
+        last: LastPlace | None = None,
     ) -> None:
         """
         Args:
             known: of our sensors, from before this start; it is taken out of what they say.
+            last: where we were then.
         """
         section = config.relative_pose
         self.own = own
@@ -93,9 +97,8 @@ class FrontEnd:
         self.ranges = RangeBuffers(self._nlos_db, self._range_model)
         self.pairs: dict[int, PairTracker] = {}
         self.watch = RangeWatch(section.range_sigma_m, tuning.ranges)
-        self.relocation = Relocation(
-            Own(own.robot, self.model, section.range_sigma_m, tuning.ranges)
-        )
+        who = Own(own.robot, self.model, section.range_sigma_m, tuning.ranges)
+        self.relocation, self.resumption = Relocation(who), Resumption(who, last)
         sensors = Sensors(RangeNoise(section.range_sigma_m, self._bias_sigma), tuning.ranges)
         self.points, self.joiner = Points(own, sensors), Joiner(own, sensors)
         self._keyframes = KeyframeSelector()
@@ -150,7 +153,7 @@ class FrontEnd:
     def needed(self, neighbours: list[PeerInRange], utime: int) -> set[int]:
         """Robots whose odometry our windows need."""
         mine = self.ranged(utime)
-        lost = self.relocation.is_lost
+        lost = self.relocation.is_lost or self.resumption.is_waiting
         return {p.chain.robot for p in neighbours if (lost or self._owns(p)) and p.uwb_id in mine}
 
     def update_pairs(self, neighbours: list[PeerInRange], graph: PoseGraph, utime: int) -> None:
@@ -341,4 +344,5 @@ class FrontEnd:
         """Closures to tell the team, and to withdraw."""
         every = not self._has_ranges_in_graph
         told = [c for pair in self.pairs.values() for c in pair.tell(every)]
-        return [*told, *self.relocation.tell(), *self.points.tell(), *self.joiner.tell()]
+        placed = [*self.relocation.tell(), *self.resumption.tell()]
+        return [*told, *placed, *self.points.tell(), *self.joiner.tell()]

@@ -11,11 +11,12 @@ from pair_scenes import BESIDE, asked_at, estimate_of
 from robot_scenes import RobotScene
 
 from drslamd.conditions.diagnosis import conditions, why_not_localised
-from drslamd.conventions import SECOND_US
+from drslamd.conventions import SECOND_US, Segment
 from drslamd.events import ChannelMessage, JobDone, NetworkState, PortCondition, PortState, Send
 from drslamd.gossip import messages
 from drslamd.gossip.message_types import Heard
 from drslamd.jobs import OPTIMIZER, RELATIVE_POSE, Job
+from drslamd.slam.graph.estimate import TeamEstimate
 
 
 def said(scene: RobotScene, key: str) -> str | None:
@@ -320,3 +321,11 @@ def test_a_pair_that_is_connected_waits_for_the_graph() -> None:
     answered(scene, 4, 1)
     scene.robot.front.pairs[4].connected = True
     assert why(scene) == told("connected, the graph is about to be solved (with robot 4)")
+
+
+def test_who_began_again_says_that_it_looks_for_its_place() -> None:
+    scene = RobotScene()
+    scene.robot.back.onlooked = TeamEstimate(Segment(1, 1, 0), {})
+    assert "its last start was" in why(scene)
+    scene.robot.front.resumption.verdict = "not enough motion"
+    assert "the place of this one (not enough motion); drive a metre" in why(scene)

@@ -13,6 +13,7 @@ from lab.recordings.recording import Recording
 from lab.score.outcome import Outcome, score
 
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
+from drslamd.slam.relocation.last_place import LastPlace
 from drslamd.slam.tuning import DEFAULTS, Tuning
 
 EASY = world.Scene(
@@ -58,6 +59,7 @@ class VirtualTeam:
         epoch: int = 1,
         epochs: dict[int, int] | None = None,
         kept: SensorCalibration = UNLEARNED,
+        place: LastPlace | None = None,
     ) -> Member:
         """Switch a robot on, now; its devices print from now on."""
         device = self.hardware[robot]
@@ -65,9 +67,8 @@ class VirtualTeam:
         extra = self._extra
         if secret is not None:
             extra += '[team]\nkey_file = "team.key"\n'
-        member = self.simulator.add(
-            robot_config(device, extra), self._clocks[robot], device, secret, epoch, epochs, kept
-        )
+        config, clock = robot_config(device, extra), self._clocks[robot]
+        member = self.simulator.add(config, clock, device, secret, epoch, epochs, kept, place=place)
         now = self.simulator.now / 1e6
         chunks = [c for c in device.chunks() if c.t >= now]
         self.simulator.play(member, [c for c in chunks if not self.cut(robot, c.port, c.t)])

@@ -145,6 +145,7 @@ def test_a_missing_key_file_is_named(tmp_path: Path) -> None:
         {"epochs": {"one": 5}},
         {"epochs": {"1": "5"}},
         {"calibration": {"scale": "wide"}},
+        {"place": {"speed_mps": 0.5, "seen": [[1, 2, 3]]}},
     ],
 )
 def test_a_state_file_with_a_wrong_kind_of_value_is_not_used(tmp_path: Path, state: Any) -> None:

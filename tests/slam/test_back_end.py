@@ -325,3 +325,56 @@ def test_what_is_solved_is_thinned_and_what_was_said_is_held() -> None:
     back.insert(Chain(0, 10), GraphEntry(0, keyframes=keyframes(range(0, 9000, 10), path)))
     assert len(back.graph.chains[0].keyframes) == 900
     assert len(back.graph.view.chains[0].keyframes) < 600
+
+
+# a robot that was in a group before this start
+
+
+def newcomer(team: SmallTeam) -> BackEnd:
+    """One that nothing joins to the team, and that holds what the team said."""
+    back, _ = back_end(team, 0)
+    back._own = Chain(7, 1)
+    back.insert(back._own, GraphEntry(0, keyframes=(Keyframe(0, 0, 0, 0, 0),)))
+    return back
+
+
+def test_who_knew_a_group_solves_it_and_is_in_none(team: SmallTeam) -> None:
+    back = newcomer(team)
+    assert begin(back) is None
+    back.beside = {team.chains[1]}
+    run = begin(back, EVERYBODY | {7})
+    assert run is not None
+    back.on_solution(run())
+    assert back.estimate is None
+    assert back.onlooked is not None
+    assert back.onlooked.frame == min(FIRST)
+    assert back.group == set()
+    assert begin(back, EVERYBODY | {7}) is None
+
+
+def test_once_it_is_in_a_group_that_is_its_own(team: SmallTeam) -> None:
+    back = newcomer(team)
+    back.beside = {team.chains[1]}
+    run = begin(back)
+    assert run is not None
+    back.on_solution(run())
+    item = closure(0, 0, team.chains[0], 0, (1.0, 2.0, 0.3))
+    back.insert(Chain(7, 1), GraphEntry(1, closures=(item,)))
+    run = begin(back)
+    assert run is not None
+    assert back._optimizer.previous is back.onlooked  # type: ignore[attr-defined]
+    back.on_solution(run())
+    assert back.estimate is not None
+    assert back.onlooked is None
+    assert Segment(7, 1, 0) in back.group
+
+
+def test_without_its_peers_there_is_nothing_beside_it(team: SmallTeam) -> None:
+    back = newcomer(team)
+    back.beside = {team.chains[1]}
+    run = begin(back)
+    assert run is not None
+    back.on_solution(run())
+    back.beside = set()
+    assert begin(back, {7}) is None
+    assert back.onlooked is None

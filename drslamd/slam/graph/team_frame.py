@@ -9,14 +9,14 @@ known, and a trajectory that was never placed is placed by its closures.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
-from drslamd.conventions import Segment
+from drslamd.conventions import Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.pose_graph import PoseGraph
@@ -74,6 +74,12 @@ def group_of(current: Segment, graph: PoseGraph, looks_back: bool) -> set[Segmen
     mine = {s for group in found for s in group if s.chain == current.chain and s <= current}
     last = max(mine, default=None) if looks_back else current
     return next((group for group in found if last in group), set())
+
+
+def group_with(chains: Set[Chain], graph: PoseGraph) -> set[Segment]:
+    """The first group that has one of these starts in it, empty where there is none."""
+    found = [group for group in groups(graph) if any(s.chain in chains for s in group)]
+    return min(found, key=min, default=set())
 
 
 class Joint(NamedTuple):

@@ -3,7 +3,8 @@
 What is said of it are a closure without a heading, and then ranges: those that led to its place,
 and one a second while the robot moves. Whether it still stands there, ranges of the last seconds
 say: a node that somebody moves is noticed as soon as they do not fit for some seconds, its closure
-is withdrawn, and it is looked for anew as if it had never been seen.
+is withdrawn, and it is looked for anew as if it had never been seen. Meanwhile no range is said
+that may be to another place, or the team would bend until all of them fit.
 """
 
 from __future__ import annotations
@@ -43,6 +44,8 @@ SAID_AT_ONCE = 40
 """Ranges that led to a place, told with it: 1.2 kB."""
 OFF_SIGMAS, OFF_M = 3.0, 0.4
 """A range that is off by more of both does not fit."""
+HELD_SIGMAS, HELD_M = 2.0, 0.25
+"""A range that is off by more of both is not said."""
 MOST_BIAS_M = 0.15
 """What a bias is known to as soon as a place is."""
 OFF_S = 6
@@ -89,7 +92,7 @@ class PointTracker:
         self._since = target.since_us
         self._before: Array | None = None
         self._place: Array | None = None
-        self._off = 0
+        self._off, self._is_held = 0, False
         self._closures: list[ClosureMeasurement] = []
         self._ranges: list[RangeMeasurement] = []
 
@@ -192,8 +195,9 @@ class PointTracker:
 
     def sample(self, own: PairEnd, ranges: RangeBuffer) -> None:
         """The range of this second, once the place is told and while we move."""
-        if self.told is None or ranges.newest is None or not is_node(self.target.chain.robot):
-            return  # (ranges to robots are those of the pair)
+        is_pair = not is_node(self.target.chain.robot)  # (whose ranges are said anyway)
+        if self.told is None or ranges.newest is None or is_pair or self._is_held:
+            return
         last = min(own.last_us, ranges.newest)
         if last - self._sampled >= EVERY_US:
             self._say(own, ranges.between(max(last - SECOND_US, own.first_us), last))
@@ -229,10 +233,13 @@ class PointTracker:
 
     def watch(self, estimate: TeamEstimate, own: PairEnd, ranges: RangeBuffer) -> bool:
         """Once a second: has it been moved?"""
-        off = self._is_off(estimate, own, ranges) if self.told is not None else None
-        if off is None:
+        misfit = self._misfit(estimate, own, ranges) if self.told is not None else None
+        if misfit is None:
             return False
-        self._off = max(0, self._off + (1 if off else -1))
+        metres, sigmas = misfit
+        is_off = metres > OFF_M and sigmas > OFF_SIGMAS
+        self._off = max(0, self._off + (1 if is_off else -1))
+        self._is_held = self._off > 0 or (metres > HELD_M and sigmas > HELD_SIGMAS)
         return self._off >= OFF_S
 
     def is_outdated(self, graph: PoseGraph) -> bool:
@@ -245,10 +252,13 @@ class PointTracker:
         if self.told is not None:
             self._closures.append(replace(self.told, kept=False))
         self.told = self.found = self._before = None
-        self._since, self._off = utime, 0
+        self._since, self._off, self._is_held = utime, 0, False
 
-    def _is_off(self, estimate: TeamEstimate, own: PairEnd, ranges: RangeBuffer) -> bool | None:
-        """Do the ranges of the last second not fit? None where that cannot be said."""
+    def _misfit(
+        self, estimate: TeamEstimate, own: PairEnd, ranges: RangeBuffer
+    ) -> tuple[float, float] | None:
+        """By how many metres, and sigmas, the ranges of the last second do not fit; None where that
+        cannot be said."""
         robot, number = own.data.chain.robot, self.target.chain.robot
         solved, there = estimate.trajectories.get(robot), estimate.everybody.get(number)
         joint = estimate.joint_of(robot, number)
@@ -271,7 +281,7 @@ class PointTracker:
         noise, model = self._sensors
         variance = u @ joint @ u + noise.sigma**2 + float(model.near_range_sigma(distance)) ** 2
         variance += min(bias.sigma, MOST_BIAS_M) ** 2
-        return abs(off) > max(OFF_M, OFF_SIGMAS * float(np.sqrt(variance)))
+        return abs(off), abs(off) / float(np.sqrt(variance))
 
 
 def _searched(

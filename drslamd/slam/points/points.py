@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -12,7 +13,7 @@ from drslamd.conventions import SECOND_US, Chain, is_node
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import ClosureMeasurement, RangeMeasurement
-from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.graph.pose_graph import MAX_NODES, PoseGraph
 from drslamd.slam.points.point_search import PlaceFound
 from drslamd.slam.points.point_tracker import AGREE_M, PointTracker, Sensors, Target
 from drslamd.slam.relative_pose.pair_end import PairEnd
@@ -49,6 +50,8 @@ class Points:
         self._number = FIRST_NUMBER
         self._looked = 0
         self._let_go: list[ClosureMeasurement] = []
+        self._left: dict[int, ClosureMeasurement] = {}
+        """What is told of modules that are not followed any more, by UWB id."""
 
     def look(
         self,
@@ -57,16 +60,18 @@ class Points:
         own: PairEnd,
         graph: PoseGraph,
         estimate: TeamEstimate | None,
+        carrier: Callable[[int], int | None],
         utime: int,
     ) -> Callable[[], list[Answer]] | None:
         """Once a second: follow what stands; the searches that are due.
 
         Args:
-            targets: what is heard and may stand, by UWB id.
+            targets: what is heard and may stand, by UWB id; carrier: which robot carries a module.
         """
         if utime - self._looked < EVERY_US:
             return None
         self._looked = utime
+        self._withdraw_robots(carrier, graph, utime)
         self._follow(targets, utime)
         runs = []
         for uwb_id, tracker in self.trackers.items():
@@ -82,6 +87,18 @@ class Points:
             if run is not None:
                 runs.append((uwb_id, tracker.target, run))
         return partial(_answers, runs) if runs else None
+
+    def _withdraw_robots(
+        self, carrier: Callable[[int], int | None], graph: PoseGraph, utime: int
+    ) -> None:
+        """What was a module alone is a robot as soon as its log has begun, in sight or not."""
+        told = {u: t for u, t in self.trackers.items() if is_node(t.target.chain.robot)}
+        for uwb_id in [u for u in (*told, *self._left) if carrier(u) in graph.chains]:
+            if uwb_id in told:
+                told[uwb_id].let_go(utime)
+                self._let_go += self.trackers.pop(uwb_id).tell()
+            if uwb_id in self._left:
+                self._let_go.append(replace(self._left.pop(uwb_id), kept=False))
 
     def _follow(self, targets: Mapping[int, Target], utime: int) -> None:
         for uwb_id, target in targets.items():
@@ -106,8 +123,14 @@ class Points:
     def _make_room(self, heard: Mapping[int, Target]) -> None:
         """Forget one that is not heard; what was told of it stays told."""
         away = next((uwb_id for uwb_id in self.trackers if uwb_id not in heard), None)
-        if away is not None:
-            self._let_go += self.trackers.pop(away).tell()
+        if away is None:
+            return
+        tracker = self.trackers.pop(away)
+        self._let_go += tracker.tell()
+        if tracker.told is not None and is_node(tracker.target.chain.robot):
+            self._left[away] = tracker.told
+            if len(self._left) > MAX_NODES:
+                del self._left[next(iter(self._left))]
 
     def on_found(
         self,

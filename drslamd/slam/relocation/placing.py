@@ -25,6 +25,8 @@ HEADINGS = 12
 """Of starts at each place: a basin is wider than 30 degrees unless the way is long."""
 RINGS = (0.0, 0.5, 1.0)
 """Starts lie on these shares of how far the robot may have come, six on each ring."""
+AROUND = 24
+"""Starts around a peer, where nothing says on which side of it the robot is."""
 FIRST_STEPS, STEPS = 4, 16
 CARRIED = 32
 """Starts that are carried on after the first steps."""
@@ -45,7 +47,7 @@ FEWEST = 10
 
 class Prior(NamedTuple):
     """Where the robot was when the segment began: (2,) in w, (2, 2), and how far from there the
-    search must look, m.
+    search must look, m; or does it look wherever ranges allow?
 
     It is a witness among others: what it says against a minimum grows like a logarithm.
     """
@@ -53,6 +55,7 @@ class Prior(NamedTuple):
     place: Array
     covariance: Array
     reach_m: float
+    is_anywhere: bool = False
 
 
 @dataclass(frozen=True)
@@ -126,17 +129,30 @@ class _Problem:
 
     def starts(self) -> Array:
         """(m, 3)."""
+        headings = np.arange(HEADINGS) * 2 * np.pi / HEADINGS
+        if self._prior.is_anywhere:
+            at = np.repeat(self._in_sight(), HEADINGS)
+            return np.column_stack([at.real, at.imag, np.tile(headings, AROUND)])
         angles = np.arange(6) * np.pi / 3
         ring = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         places = [
             self._prior.place + share * self._prior.reach_m * ring[: 6 if share else 1]
             for share in RINGS
         ]
-        headings = np.arange(HEADINGS) * 2 * np.pi / HEADINGS
         at = np.repeat(np.concatenate(places), HEADINGS, axis=0)
         theta = np.tile(headings, len(at) // HEADINGS)
         middle = _complex(at) - np.exp(1j * theta) * self._begin
         return np.column_stack([middle.real, middle.imag, theta])
+
+    def _in_sight(self) -> Array:
+        """(AROUND,) around the nearest peer, as far away as the middle one of its ranges: one of
+        them is where the robot is."""
+        seen = self._seen
+        near = seen.peer[np.argmin(seen.range_m)]
+        its = np.flatnonzero(seen.peer == near)
+        middle = its[len(its) // 2]
+        angle = np.arange(AROUND) * 2 * np.pi / AROUND
+        return np.asarray(self._p[middle] + seen.range_m[middle] * np.exp(1j * angle))
 
     def _linear(self, x: Array) -> tuple[Array, Array]:
         """Residuals (m, k) and their derivatives (m, k, 3)."""

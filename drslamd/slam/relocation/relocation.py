@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -23,22 +22,25 @@ from drslamd.slam.graph.measurements import ClosureMeasurement
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.odometry.track import Track
 from drslamd.slam.peer_in_range import PeerInRange
-from drslamd.slam.range_model import RangeModel
 from drslamd.slam.relative_pose.pair_end import PairEnd
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 from drslamd.slam.relocation.cloud import STEP_S, Cloud
-from drslamd.slam.relocation.placing import Placed, Prior, WayUnder, place
-from drslamd.slam.relocation.sightings import Beacon, Own, Sightings, path_in_team, sightings
+from drslamd.slam.relocation.placing import Prior
+from drslamd.slam.relocation.question import (
+    Found,
+    closure,
+    known_until,
+    last_keyframe,
+    localised_peers,
+    question,
+)
+from drslamd.slam.relocation.sightings import Beacon, Own, sightings
 from drslamd.slam.se2 import Array
 
 LOST_US = SECOND_US
 """Odometry that is silent for longer has a hole."""
-LATE_US = 5 * SECOND_US // 2
-"""Odometry of a peer that is later than this is not waited for."""
 BLIND_US = 3 * SECOND_US
 """After so long without a range the cloud says nothing any more."""
-LONGEST_US = 10 * SECOND_US
-"""Of the odometry after the hole that is placed at once."""
 FIRST_NUMBER = 2**30
 """Of closures; windows count from 0 and never come so far."""
 AGAIN_US = 4 * SECOND_US
@@ -62,16 +64,6 @@ class ByRanges(NamedTuple):
 
     pose: PoseNow
     age_us: int
-
-
-@dataclass(frozen=True)
-class Found:
-    """What a computation found, and of what: the solution and the first sample of the segment."""
-
-    estimate: TeamEstimate
-    segment_start: int
-    peers: tuple[int, ...]
-    answer: Placed | str
 
 
 class Relocation:
@@ -130,9 +122,8 @@ class Relocation:
         if self._hole is None or self._hole.frame != hole.frame:
             self._cloud, self._prior = None, None
         self._hole, self._speed = hole, speed()
-        beacons = _beacons(neighbours, ranges, graph, estimate)
-        known_us = [b.end.last_us for b in beacons if utime - b.end.last_us < LATE_US]
-        until = min([utime, *known_us]) if known_us else utime - LATE_US
+        beacons = localised_peers(neighbours, ranges, graph, estimate)
+        until = known_until(beacons, utime)
         self._carry(beacons, estimate, own, until, utime)
         return self._placing(beacons, estimate, own, until, utime)
 
@@ -201,72 +192,25 @@ class Relocation:
         start = own.track.segment_start
         if self._prior is None or self._prior_start != start or start < own.track.n0 or is_told:
             return None
-        first = max(own.first_us, until - LONGEST_US)
-        last = min(until, own.last_us)
-        seen = sightings(beacons, estimate, self._own, first, last)
-        stretch = _stretch(own, estimate, self._own, seen)
-        peers = tuple(sorted(set(seen.peer.tolist())))
-        return partial(_found, estimate, start, peers, seen, stretch, self._prior, self._own.ranges)
+        return question(beacons, estimate, own, self._own, self._prior, until)
 
     def on_found(self, found: Found, own: PairEnd | None, utime: int) -> bool:
         """A computation has ended: is there a closure to tell?"""
         if isinstance(found.answer, str):
             self.verdict = found.answer
             return False
-        if self._hole is None or own is None or own.track.segment_start != found.segment_start:
-            return False
-        keyframes = own.data.keyframes
-        mine = np.flatnonzero(keyframes.n >= found.segment_start)
-        if not len(mine):
+        n = last_keyframe(found, own) if own is not None else None
+        if self._hole is None or own is None or n is None:
             return False
         self.verdict, self._told_at = "", utime
-        self._closures.append(self._closure(found, found.answer, own, int(keyframes.n[mine[-1]])))
+        self._number += 1
+        self._closures.append(closure(found, found.answer, own, n, self._number))
         return True
 
     def tell(self) -> list[ClosureMeasurement]:
         """Closures for our log."""
         out, self._closures = self._closures, []
         return out
-
-    def _closure(self, found: Found, placed: Placed, own: PairEnd, n: int) -> ClosureMeasurement:
-        """Between our keyframe n and the last one of a peer."""
-        estimate, robot = found.estimate, self._own.robot
-        path = _path(own, estimate, robot)
-        w_T_k = se2.compose(placed.w_T_o, path[n - own.track.segment_start])
-        peer = estimate.trajectories[found.peers[0]]
-        w_T_b = peer.poses[-1]
-        a_T_b = se2.between(w_T_k, w_T_b)
-        middle = se2.transform(placed.w_T_o, placed.at)
-        lever = np.eye(3)
-        lever[0, 2], lever[1, 2] = -(w_T_b - [*middle, 0])[1], (w_T_b - [*middle, 0])[0]
-        spread = se2.turned(lever @ placed.covariance @ lever.T, -w_T_k[2])
-        corrections = [
-            estimate.correction(r) if r in estimate.turn else None for r in (robot, found.peers[0])
-        ]
-        corrected = [(c.scale, c.turn) if c else (0.0, 0.0) for c in corrections]
-        self._number += 1
-        return ClosureMeasurement(
-            number=self._number,
-            kept=True,
-            a_n=n,
-            peer=peer.chain,
-            b_n=int(peer.n[-1]),
-            a_T_b=(float(a_T_b[0]), float(a_T_b[1]), float(se2.wrap(a_T_b[2]))),
-            covariance=se2.packed(spread),
-            corrected=(*corrected[0], *corrected[1]),
-        )
-
-
-def _found(
-    estimate: TeamEstimate,
-    start: int,
-    peers: tuple[int, ...],
-    seen: Sightings,
-    stretch: WayUnder,
-    prior: Prior,
-    model: RangeModel,
-) -> Found:
-    return Found(estimate, start, peers, place(seen, stretch, prior, model))
 
 
 def _hole(estimate: TeamEstimate | None, own: Own, track: Track, utime: int) -> _Hole | None:
@@ -285,45 +229,3 @@ def _hole(estimate: TeamEstimate | None, own: Own, track: Track, utime: int) -> 
     step = se2.between(way[0], way[end - 1])
     pose = se2.compose(solved.poses[-1], step)
     return _Hole(estimate.frame, pose, known, (last + end - 1) * GRID_US)
-
-
-def _beacons(
-    neighbours: list[PeerInRange],
-    ranges: Mapping[int, RangeBuffer],
-    graph: PoseGraph,
-    estimate: TeamEstimate,
-) -> list[Beacon]:
-    out = []
-    for peer in neighbours:
-        data, found = graph.chains.get(peer.chain.robot), ranges.get(peer.uwb_id)
-        is_known = data is not None and data.chain == peer.chain and peer.ahead_us is not None
-        if not is_known or found is None or peer.frame != estimate.frame.robot:
-            continue
-        assert data is not None
-        assert peer.ahead_us is not None
-        end = PairEnd(peer.track, data, peer.ahead_us)
-        if path_in_team(end, estimate) is not None:
-            out.append(Beacon(end, found))
-    return out
-
-
-def _path(own: PairEnd, estimate: TeamEstimate, robot: int) -> Array:
-    """(k, 3) the odometry since the hole, without its known errors."""
-    start = own.track.segment_start - own.track.n0
-    return estimate.correction(robot).path(own.track.poses[start:])
-
-
-def _stretch(own: PairEnd, estimate: TeamEstimate, who: Own, seen: Sightings) -> WayUnder:
-    path = _path(own, estimate, who.robot)
-    at = np.clip(own.grid(seen.utime) - own.track.segment_start, 0, len(path) - 1)
-    left = np.minimum(at.astype(int), max(len(path) - 2, 0))
-    right = np.minimum(left + 1, len(path) - 1)
-    body = path[left] + (path[right] - path[left]) * (at - left)[:, None]
-    steps = np.hypot(*np.diff(path[:, :2], axis=0).T) if len(path) > 1 else np.zeros(0)
-    way = np.append(0.0, np.cumsum(steps))
-    scale = estimate.scale.get(who.robot)
-    noise = who.model.noise
-    if scale is not None:
-        noise = replace(noise, scale=min(noise.scale, float(np.hypot(scale.sigma, 0.01))))
-    antenna = who.model.antenna
-    return WayUnder(se2.transform(body, antenna), path[0, :2], way[np.round(at).astype(int)], noise)

@@ -24,8 +24,18 @@ def test_lines_count_only_who_was_localised_before() -> None:
 
 @pytest.mark.slow
 def test_one_hole_is_survived() -> None:
-    hole = play(3)
+    hole = play("cable", 3)
     assert hole.was_localised
     assert hole.back_s <= 10
     assert hole.back_m < 0.5
+    assert hole.wrong == 0
+
+
+@pytest.mark.slow
+def test_one_restart_is_survived() -> None:
+    """What is known a second after it is back is vague, and says so."""
+    hole = play("restart", 3, until_s=50.0)
+    assert hole.was_localised
+    assert hole.back_s <= 12
+    assert hole.back_m < 1.0
     assert hole.wrong == 0

@@ -30,6 +30,7 @@ from drslamd.slam.graph.team_frame import (
     by_odometry,
     gauge_segment,
     group_of,
+    group_with,
     groups,
     placed,
 )
@@ -55,6 +56,15 @@ def team_of(*joined: tuple[Chain, Chain], breaks: tuple[Chain, ...] = ()) -> Pos
         item = closure(number, 10, b, 10, (1, 2, 0.3))
         graph.insert(a, GraphEntry(1 + number, closures=(item,)))
     return graph
+
+
+def test_a_group_is_found_by_any_start_in_it() -> None:
+    graph = team_of((A, B), (C, D))
+    assert group_with({D, E}, graph) == {segment(C), segment(D)}
+    assert group_with({E}, graph) == group_with(set(), graph) == set()
+    # of two groups the lower one, on all robots alike
+    assert group_with({D, B}, graph) == {segment(A), segment(B)}
+    assert group_with({Chain(0, 9)}, graph) == set()
 
 
 def in_frame(graph: PoseGraph, members: set[Segment], frame: Segment) -> Group:

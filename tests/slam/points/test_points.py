@@ -34,6 +34,7 @@ class Robot:
         self.scene, self.points = PassingScene(PLACE), Points(OWN, SENSORS)
         self.targets = {UWB_ID: Target(NODE)}
         self.estimate: TeamEstimate | None = None
+        self.carried: dict[int, int] = {}
         self.told = 0
 
     def drive(self, seconds: int, is_solved: bool = False) -> None:
@@ -44,9 +45,8 @@ class Robot:
             ranges = {UWB_ID: scene.ranges}
             if is_solved:
                 self.estimate = scene.estimate(NODE.robot, PLACE)
-            run = points.look(
-                self.targets, ranges, scene.own, scene.graph, self.estimate, scene.utime
-            )
+            known = scene.own, scene.graph, self.estimate
+            run = points.look(self.targets, ranges, *known, self.carried.get, scene.utime)
             if run is not None:
                 points.on_found(run(), ranges, scene.own, scene.graph, self.estimate)
             closures, told = points.tell(), points.tell_ranges()
@@ -80,12 +80,54 @@ def test_a_module_that_is_moved_gets_another_place() -> None:
     assert robot.kept() == [(FIRST_NUMBER + 2, 1)]
 
 
+@pytest.mark.parametrize(("moved", "said"), [((2.0, -2.0), 0), ((2.0, 2.0), 3)])
+def test_a_range_that_may_be_to_another_place_is_not_said(
+    moved: tuple[float, float], said: int
+) -> None:
+    """Across the line of sight a move shows in the fourth second, by 0.5 m and 2.7 sigmas: not yet
+    enough to say that it was one."""
+    robot = Robot()
+    robot.drive(45)
+    robot.drive(2, is_solved=True)
+    counts = []
+    for seconds in (1, 4):
+        robot.drive(seconds, is_solved=True)
+        counts.append(len(robot.scene.graph.pairs[OWN.robot, NODE.robot].ranges))
+        robot.scene.node = PLACE + moved
+    assert counts[1] - counts[0] == said
+    assert robot.kept() == [(FIRST_NUMBER + 1, 0)]
+
+
 def test_a_module_that_turns_out_to_be_a_robots_is_withdrawn() -> None:
     robot = Robot()
     robot.drive(45)
     robot.targets = {UWB_ID: Target(Chain(5, 1), 3)}
     robot.drive(1)
     assert robot.kept() == []
+
+
+@pytest.mark.parametrize("is_followed", [True, False])
+def test_a_module_whose_robot_is_switched_on_is_withdrawn_wherever_that_is_known(
+    is_followed: bool,
+) -> None:
+    """A robot that has its pose by then is no target, nor is one that is out of sight."""
+    robot = Robot()
+    robot.drive(45)
+    robot.targets = {}
+    if not is_followed:
+        robot.targets = {k: Target(node_chain(k)) for k in range(100, 100 + MOST)}
+    robot.drive(1)
+    assert (UWB_ID in robot.points.trackers) is is_followed
+    robot.carried = {UWB_ID: 5}
+    robot.drive(1)
+    assert robot.kept() == [(FIRST_NUMBER + 1, 0)]
+    # its log has begun
+    robot.scene.graph.insert(Chain(5, 1), GraphEntry(0, keyframes=keyframes([0], [(0, 0, 0)])))
+    robot.drive(1)
+    assert robot.kept() == []
+    assert UWB_ID not in robot.points.trackers
+    robot.drive(1)
+    assert robot.told == 2
 
 
 def test_a_robot_that_drives_to_another_place_is_followed_there_and_stays_told_here() -> None:

@@ -40,6 +40,7 @@ from drslamd.gossip import lc02
 from drslamd.gossip.seal import team_key
 from drslamd.robot import Robot
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
+from drslamd.slam.relocation.last_place import LastPlace
 from drslamd.slam.tuning import DEFAULTS, Tuning
 from lab.play.playback import Chunk, Hardware
 
@@ -180,12 +181,13 @@ class Simulator:
         dbc_text: str = "",
         taped: SensorCalibration = UNLEARNED,
         disk: Disk | None = None,
+        place: LastPlace | None = None,
     ) -> Member:
         """Switch a robot on, now."""
 
         def renew(fresh: int) -> Robot:
             key, known = team_key(secret), dict(epochs or {})
-            return Robot(config, key, fresh, known, kept, dbc_text, self._tuning, taped)
+            return Robot(config, key, fresh, known, kept, dbc_text, self._tuning, taped, place)
 
         member = Member(renew(epoch), renew, clock or Clock(), hardware, Traces(), disk or Disk())
         self.members[config.robot.id] = member

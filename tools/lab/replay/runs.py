@@ -19,6 +19,7 @@ from drslamd.recording.records import Beginning, Opening, Record, Told
 from drslamd.robot import Robot
 from drslamd.slam.calibration import sensor_calibration
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
+from drslamd.slam.relocation.last_place import LastPlace, is_kept_place
 from lab.recordings.recording import BadRecording
 
 
@@ -152,12 +153,20 @@ def make_robot(config: Config, run: Run, key: bytes, beginning: Beginning | None
         calibration_of(began.calibration),
         run.opening.provenance.get("dbc", ""),
         taped=taped_of(run, config),
+        place=place_of(began.place),
     )
 
 
 def taped_of(run: Run, config: Config) -> SensorCalibration:
     """What a tape said when the run was recorded, if this configuration still names a file."""
     return calibration_of(run.opening.provenance.get("taped") if config.robot.calibration else {})
+
+
+def place_of(state: object) -> LastPlace | None:
+    """As it was recorded; nothing where that is damaged."""
+    if not isinstance(state, dict) or not is_kept_place(state):
+        return None
+    return LastPlace.of_state(state)
 
 
 def calibration_of(state: object) -> SensorCalibration:
