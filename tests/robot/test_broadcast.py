@@ -119,6 +119,7 @@ def test_a_pose_that_moved_less_than_it_is_uncertain_waits_for_its_second(
     assert broadcast.pose(at(first + moved), 3 * SECOND_US)
 
 
+@pytest.mark.slow
 def test_odometry_that_was_lost_is_said_again_so_that_no_hole_remains() -> None:
     team = VirtualTeam(EASY, network=Network(loss=0.3))
     team.run(40.0)

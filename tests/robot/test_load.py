@@ -12,13 +12,9 @@ from drslamd.conventions import SECOND_US
 @pytest.mark.row("O9")
 @pytest.mark.parametrize(
     ("solve_ms", "cycle_s", "said"),
-    [
-        (100, 1.0, False),
-        pytest.param(390, 2.0, False, marks=pytest.mark.slow),
-        pytest.param(560, 3.0, True, marks=pytest.mark.slow),
-    ],
+    [(100, 1.0, False), (390, 2.0, False), (560, 3.0, True)],
 )
-@pytest.mark.row("O9")
+@pytest.mark.slow
 def test_a_module_takes_a_fifth_of_a_core_at_most_and_names_its_pace(
     solve_ms: int, cycle_s: float, said: bool
 ) -> None:

@@ -148,6 +148,7 @@ def test_a_robot_that_leaves_in_order_is_gone_within_two_heartbeats() -> None:
 
 
 @pytest.mark.row("N6")
+@pytest.mark.slow
 def test_a_partition_heals() -> None:
     def connected(a: int, b: int, t_us: int) -> bool:
         return not (25e6 < t_us < 45e6 and 2 in (a, b))
@@ -314,6 +315,7 @@ def test_closures_alone_bring_the_team_together_too() -> None:
     assert "PUBLIC" not in kinds_sent(team, 0)
 
 
+@pytest.mark.slow
 def test_a_robot_needs_none_of_its_modules_to_run_as_often_as_the_others() -> None:
     rates = (
         "[relative_pose]\nrate_hz = 0.5\n[consistency]\nrate_hz = 2\n[optimizer]\nrate_hz = 0.2\n"
@@ -326,6 +328,7 @@ def test_a_robot_needs_none_of_its_modules_to_run_as_often_as_the_others() -> No
     assert 5 <= solved["optimizer"] <= 13
 
 
+@pytest.mark.slow
 def test_antennas_at_different_heights_are_told_to_the_peers() -> None:
     """A tall robot and a low one, half a metre to five metres apart."""
     team = VirtualTeam(on=())
