@@ -160,7 +160,7 @@ class Broadcast:
         found = self._front.places_left(unknown, self._back.graph, utime)
         if not found:
             return None
-        here = track.poses[-1]
+        here = track.at(track.end - 1)
         away = [float(np.hypot(*(here[:2] - left.places[0].pose[:2]))) for left in found]
         nearest = [left for _, left in sorted(zip(away, found, strict=True), key=lambda p: p[0])]
         x, y, theta = here.tolist()

@@ -138,7 +138,7 @@ def _advice(motion: DecidingMotion | None, own: int) -> str:
 
 def _turns(motion: DecidingMotion) -> str:
     left, right = motion.left, motion.right
-    if 0.0 in (left[0], right[0]):
+    if left[0] == right[0] == 0.0:
         return ""
     if left != NO_TURN and right != NO_TURN:
         if max(abs(a - b) for a, b in zip(left, right, strict=True)) < SAME_TURN:
@@ -149,6 +149,8 @@ def _turns(motion: DecidingMotion) -> str:
 
 def _by(sector: Sector) -> str:
     least, largest = (math.degrees(turn) for turn in sector)
+    if not least:
+        return f"up to {largest:.0f} degrees"
     if sector[1] > ALL_ROUND:
         return f"{least:.0f} degrees or more"
     return f"{least:.0f} to {largest:.0f} degrees"

@@ -197,7 +197,7 @@ motions = st.builds(
     st.floats(0.125, 8, width=32),
     sectors,
     sectors,
-    st.integers(1, 20),
+    st.integers(1, 4),
 )
 hypotheses = st.builds(
     Hypotheses,

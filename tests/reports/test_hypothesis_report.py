@@ -7,6 +7,8 @@ import math
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from message_strategies import hypotheses
 
 from drslamd.gossip.message_types import Hypotheses
 from drslamd.reports.hypothesis_report import rows
@@ -50,6 +52,14 @@ def advice(
 def test_where_nothing_is_said_there_are_no_rows() -> None:
     assert rows(None, 1, 0) == []
     assert rows(Hypotheses(0, HERE), 1, 0) == []
+
+
+@settings(derandomize=True, max_examples=50, deadline=None)
+@given(hypotheses)
+def test_whatever_can_be_said_without_a_key_is_sentences(said: Hypotheses) -> None:
+    for row in rows(said, 1, 0):
+        json.dumps(row, allow_nan=False)
+        assert row["what"].startswith(f"robot {row['robot']} is ")
 
 
 def test_numbers_are_seen_from_where_we_are_now() -> None:
@@ -113,8 +123,9 @@ def test_a_single_place_waits_for_other_windows() -> None:
             (math.radians(90), math.pi),
             "turn left by 30 to 150 degrees or right by 90 degrees or more and drive 1.5 m",
         ),
-        ((0.0, 1.0), NO_TURN, "drive 1.5 m straight on"),
-        (NO_TURN, (0.0, 1.0), "drive 1.5 m straight on"),
+        ((0.0, 1.0), (0.0, 0.6), "drive 1.5 m straight on"),
+        ((0.0, 1.0), NO_TURN, "turn left by up to 57 degrees and drive 1.5 m"),
+        (NO_TURN, (0.0, 1.0), "turn right by up to 57 degrees and drive 1.5 m"),
     ],
 )
 def test_the_advice_says_how_to_turn(

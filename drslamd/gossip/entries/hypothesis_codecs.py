@@ -16,6 +16,7 @@ from drslamd.gossip.bounds import bounded
 from drslamd.gossip.message_types import MAX_MOTIONS, MAX_PLACES, Hypotheses
 from drslamd.slam.hypotheses.deciding_motion import NO_TURN, WAYS_M, DecidingMotion, Sector
 from drslamd.slam.hypotheses.places_left import PossiblePlace
+from drslamd.slam.relative_pose.solver import HYPOTHESES
 
 ROUNDING = 1e-6
 """Of shares and turns, in 32 bits."""
@@ -79,7 +80,7 @@ def _read_motion(raw: Any) -> DecidingMotion:
         raw.way,
         _read_sector(raw.left),
         _read_sector(raw.right),
-        bounded("places left", raw.leaves, 1, MAX_PLACES),
+        bounded("places left", raw.leaves, 1, HYPOTHESES),
     )
 
 

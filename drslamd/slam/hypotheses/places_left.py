@@ -120,7 +120,7 @@ def _decision(places: list[PossiblePlace], a: PairEnd, sigma: float) -> Deciding
     """What we can do, or the peer, if that leaves fewer places."""
     o_T_b = np.array([place.pose for place in places])
     known = se2.unpacked(np.array([place.covariance for place in places]))
-    peer, own, o_T_a = places[0].peer, a.data.chain.robot, a.track.poses[-1]
+    peer, own, o_T_a = places[0].peer, a.data.chain.robot, a.track.at(a.track.end - 1)
     a_T_b = se2.between(o_T_a[None], o_T_b)
     known = se2.turned(known, -o_T_a[2])
     b_T_a = se2.inverse(a_T_b)

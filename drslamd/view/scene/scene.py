@@ -112,6 +112,7 @@ class Scene:
         del self.robots[robot]
         for key in [key for key in self.pairs if robot in key]:
             del self.pairs[key]
+        self.modules.forget(robot)
         self._forgotten.add((robot,))
         return True
 

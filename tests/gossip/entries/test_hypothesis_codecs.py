@@ -42,6 +42,8 @@ def moved(**other: Any) -> Hypotheses:
         moved(left=(0.0, math.pi)),
         moved(way_m=float(WAYS_M[-1])),
         moved(way_m=float(WAYS_M[0])),
+        moved(leaves=1),
+        moved(leaves=4),
     ],
     ids=repr,
 )
@@ -76,7 +78,7 @@ def test_what_a_robot_can_have_said_is_taken(said: Hypotheses) -> None:
         moved(right=(0.0, 3.2)),
         moved(right=(math.nan, 1.0)),
         moved(leaves=0),
-        moved(leaves=21),
+        moved(leaves=5),
     ],
     ids=repr,
 )
