@@ -1,4 +1,4 @@
-"""How old a pose is when whoever steers has it, and what it costs: a real daemon, real time."""
+"""How old a pose is for whoever steers, and what telling it costs: a real daemon, real time."""
 
 from __future__ import annotations
 
@@ -22,17 +22,13 @@ from lab.recordings import world
 from lab.recordings.recording import Array
 
 START_S = 60.0
-TICK_S = os.sysconf("SC_CLK_TCK")
 
 
-async def measured(
-    robots: int, seconds: float, computes: bool, reads: bool = True
-) -> tuple[list[float], float]:
-    """Ages of the poses in ms, and the share of a core that the daemon took.
+async def measured(robots: int, seconds: float, computes: bool = True) -> tuple[list[float], float]:
+    """Ages of the poses in ms, and how long telling one takes, us of a core.
 
     Args:
         computes: module 3 of such a team, without a pause.
-        reads: is anybody connected?
     """
     hardware = equip(world.simulate(world.Scene(robots=1, seconds=seconds + 2), 1))[0]
     with tempfile.TemporaryDirectory(prefix="drslamd-near-") as name:
@@ -48,7 +44,7 @@ async def measured(
         word = "compute" if computes else "rest"
         process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "lab.near.busy_daemon", str(config), str(robots), word),
-            stdout=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE,
             env={
                 **os.environ,
                 "OPENBLAS_NUM_THREADS": "1",
@@ -58,19 +54,16 @@ async def measured(
         try:
             await _ready(folder / "socket")
             chunks = [c for c in hardware.chunks() if c.port == "wheels" and c.t < seconds]
-            before, began = _cpu_s(process.pid), time.monotonic()
             playing = asyncio.ensure_future(_play(wheels, chunks))
-            read = np.zeros((0, 2))
-            if reads:
-                read = await asyncio.to_thread(_read, folder / "socket", seconds - 1.0)
+            read = await asyncio.to_thread(_read, folder / "socket", seconds - 1.0)
             written = await playing
-            share = (_cpu_s(process.pid) - before) / (time.monotonic() - began)
         finally:
             process.terminate()
-            await process.wait()
+            said, _ = await process.communicate()
             uwb.pull()
             wheels.pull()
-    return _ages(read, written), share
+    spent_s, times = said.decode().splitlines()[-1].split()
+    return _ages(read, written), 1e6 * float(spent_s) / float(times)
 
 
 async def _ready(path: Path) -> None:
@@ -116,8 +109,3 @@ def _read(path: Path, seconds: float) -> Array:
             if near.peers.robots:
                 rows.append([now, near.utime])
     return np.array(rows, dtype=float).reshape(-1, 2)
-
-
-def _cpu_s(pid: int) -> float:
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / TICK_S
