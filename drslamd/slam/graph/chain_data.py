@@ -57,6 +57,10 @@ class ChainData:
         """Are keyframes first .. end - 1 those of when there were so many `changes`?"""
         return self._said.is_same(changes, first, end)
 
+    def unchanged_before(self, changes: int) -> int:
+        """Keyframes before this sample are those of when there were so many `changes`."""
+        return self._said.unchanged_before(changes)
+
     @property
     def keyframes(self) -> KeyframeTable:
         """All of them; the same table until one is added."""

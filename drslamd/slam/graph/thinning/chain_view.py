@@ -8,6 +8,7 @@ the nearest one that stayed.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from drslamd.slam.graph.tables import KeyframeTable
 from drslamd.slam.graph.thinning.time_cells import Kind, Stretch, stretches, with_edge
 from drslamd.slam.graph.timed_rows import NEVER
 from drslamd.slam.odometry.gyro_noise import GyroNoise
-from drslamd.slam.odometry.noise import SUMS, seen_from, step_sums
+from drslamd.slam.odometry.noise import SUMS, step_sums
 from drslamd.slam.se2 import Array, Index
 
 
@@ -54,6 +55,10 @@ class Carried:
     keyframe_T_body: Array
     sums: Array
     is_after: NDArray[np.bool_]
+
+    def chosen(self, which: Index) -> Carried:
+        columns = (self.n, self.keyframe_T_body, self.sums, self.is_after)
+        return Carried(*(column[which] for column in columns))
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,15 +166,36 @@ class OldParts:
         self.near = np.concatenate([none, *(part.near + start for part, start in each)])
         self.steps = np.concatenate([*(part.steps for part in parts), np.zeros((1, SUMS))])
 
-    def sums_between(self, first: Index, end: Index) -> Array:
-        """(m, 13) sums of the steps first .. end - 1, each of one cell and of one at least."""
-        if not len(first):
-            return np.zeros((0, SUMS))
-        order = np.argsort(first, kind="stable")
-        ends = np.stack([first[order], end[order]], axis=-1).ravel()
-        out = np.empty((len(first), SUMS))
-        out[order] = np.add.reduceat(self.steps[: ends.max() + 1], ends)[::2]
-        return out
+
+def summed_between(steps: Array, first: Index, end: Index) -> Array:
+    """(m, 13) sums of steps first .. end - 1 of (r, 13), each of one step at least.
+
+    What is the `end` of one must be the number of a step as well.
+    """
+    if not len(first):
+        return np.zeros((0, SUMS))
+    order = np.argsort(first, kind="stable")
+    ends = np.stack([first[order], end[order]], axis=-1).ravel()
+    out = np.empty((len(first), SUMS))
+    out[order] = np.add.reduceat(steps[: ends.max() + 1], ends)[::2]
+    return out
+
+
+class HeldRows(NamedTuple):
+    """Some rows (r,) of what a chain holds, and all that they are seen from.
+
+    Attributes:
+        held: (r, 5) of `KeyframeTable`.
+        is_old: (r,) do they lie in times that are thinned?
+        own, near: (r,) of these rows, see `ChainPart`; where nothing is thinned each is its own.
+        steps: (r, 13) likewise, zero there.
+    """
+
+    held: Array
+    is_old: NDArray[np.bool_]
+    own: Index
+    near: Index
+    steps: Array
 
 
 class ChainView:
@@ -206,27 +232,22 @@ class ChainView:
         parts = self._old.parts
         return tuple(p for p in parts if p.stretch.first <= last and first < p.stretch.end)
 
-    def is_old(self, rows: Index) -> NDArray[np.bool_]:
-        """Which rows (m,) of `held` lie in times that are thinned."""
-        return np.asarray(rows < len(self._old.near))
-
-    def standing_for(self, rows: Index) -> Index:
-        """The rows of `held` that stand for rows (m,)."""
-        out, old = rows.copy(), self.is_old(rows)
-        out[old] = self._old.near[rows[old]]
-        return np.asarray(out)
-
-    def carried(self, rows: Index) -> Carried:
-        """Where the bodies of rows (m,) of `held` were, seen from the keyframes that stay."""
-        near, held = self.standing_for(rows), self.held
-        sums, is_after = np.zeros((len(rows), SUMS)), rows >= near
-        for which, first, end in ((rows > near, near, rows), (rows < near, rows, near)):
-            sums[which] = self._old.sums_between(first[which], end[which])
-        # the sums of a way are in the frame of the cell that it crosses
-        before = np.flatnonzero(~is_after)
-        here, start = held.poses[near], held.poses[self._old.own[rows[before]]]
-        sums[before] = seen_from(sums[before], se2.between(here[before], start))
-        return Carried(held.rows[near, 0], se2.between(here, held.poses[rows]), sums, is_after)
+    def rows_about(self, first: int, last: int) -> HeldRows:
+        """What is held of samples first .. last, and of what these are seen from."""
+        old = self._old
+        between = self.held.between(first, last + 1)
+        low, high = between.start, between.stop
+        if low < min(high, len(old.near)):
+            low = int(old.own[low])
+        if low < high <= len(old.near):
+            high = max(high, int(old.near[high - 1]) + 1)
+        end = min(high, len(old.near))
+        rows = np.arange(low, high)
+        own, near, steps = rows.copy(), rows.copy(), np.zeros((len(rows), SUMS))
+        count = max(end - low, 0)
+        own[:count], near[:count] = old.own[low:end], old.near[low:end]
+        steps[:count] = old.steps[low:end]
+        return HeldRows(self.held.rows[low:high], rows < end, own - low, near - low, steps)
 
 
 def whole(data: ChainData) -> ChainView:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from hashlib import blake2b
-
-import numpy as np
+from itertools import islice
 
 from drslamd.conventions import Chain, Segment, is_node
 from drslamd.slam.graph import clocks
@@ -15,12 +14,9 @@ from drslamd.slam.graph.pair_data import PairData
 from drslamd.slam.graph.tables import KeyframeTable
 from drslamd.slam.graph.thinning.chain_view import ChainThinning, ChainView
 from drslamd.slam.graph.thinning.pair_view import PairThinning, PairView
+from drslamd.slam.graph.thinning.rounding import as_digested
+from drslamd.slam.graph.thinning.thinned_pairs import thinned_pairs
 from drslamd.slam.graph.thinning.time_cells import ages, recent_s
-from drslamd.slam.se2 import Array
-
-RESOLUTION = 1e-6
-"""m, rad and their squares: what differs by less counts as equal in a digest, because sines and
-cosines of different processors differ in their last digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,16 +47,11 @@ class GraphView:
                 h.update(repr((view.chain, view.model.numbers())).encode())
                 links = view.links
                 for values in (view.keyframes.rows, links.measured, links.sums, links.by_turn):
-                    h.update(_rounded(values))
+                    h.update(as_digested(values))
         for pair in self.pairs:
             if {pair.a.robot, pair.b.robot} <= robots:
-                for values in (pair.ranges.rows, pair.moves, pair.closures.rows):
-                    h.update(_rounded(values))
+                h.update(b"".join(part.digest for part in pair.parts))
         return int.from_bytes(h.digest(), "big", signed=True)
-
-
-def _rounded(values: Array) -> bytes:
-    return np.rint(values / RESOLUTION).astype(np.int64).tobytes()
 
 
 class Thinning:
@@ -110,12 +101,14 @@ class Thinning:
     def _views_of_pairs(
         self, chains: Mapping[int, ChainData], pairs: list[PairData], views: Mapping[int, ChainView]
     ) -> list[PairView]:
-        before, self._pairs, out = self._pairs, {}, []
+        before, self._pairs = self._pairs, {}
+        begun = []
         for pair in pairs:
             a, b = pair.a.robot, pair.b.robot
             if a not in views or b not in views:
                 continue
             thinning = before.get((pair.a, pair.b)) or PairThinning()
             self._pairs[pair.a, pair.b] = thinning
-            out.append(thinning.view(pair, chains[b], views[a], views[b]))
-        return out
+            begun.append(thinning.begin(pair, chains[b], views[a], views[b]))
+        parts = iter(thinned_pairs([part for said, _ in begun for part in said], views))
+        return [finish(list(islice(parts, len(said)))) for said, finish in begun]

@@ -59,7 +59,10 @@ class System:
 
 
 class _Assembly:
-    """Where the blocks of one set of factors go in the system; the same in every iteration."""
+    """Where the blocks of one set of factors go in the system; the same in every iteration.
+
+    Blocks are symmetric, so each two columns of a Jacobian are multiplied once.
+    """
 
     def __init__(self, layout: BandLayout, unknowns: Index) -> None:
         """
@@ -67,24 +70,31 @@ class _Assembly:
             unknowns: (m, c) on which each factor depends.
         """
         self._layout = layout
-        # the mountings come last, and most often none of them is an unknown
-        self._columns = int(np.flatnonzero((unknowns != NOWHERE).any(axis=0)).max(initial=-1)) + 1
-        self._unknowns = unknowns[:, : self._columns]
+        # most often no mounting is an unknown
+        self._columns = np.flatnonzero((unknowns != NOWHERE).any(axis=0))
+        self._unknowns = unknowns[:, self._columns]
+
+    @cached_property
+    def _twos(self) -> tuple[Index, Index]:
+        """(t,) all columns that are used, two and two."""
+        one, other = np.tril_indices(len(self._columns))
+        return one, other
 
     @cached_property
     def _places(self) -> tuple[tuple[Index, Index], ...]:
-        """Of the entries of all blocks: which are in band, border and corner, and where."""
-        n, b, unknowns = self._layout.band, self._layout.border, self._unknowns
-        shape = (*unknowns.shape, unknowns.shape[1])
-        row = np.broadcast_to(unknowns[:, :, None], shape).ravel()
-        column = np.broadcast_to(unknowns[:, None, :], shape).ravel()
-        in_band = np.flatnonzero((row >= column) & (row < n) & (column != NOWHERE))
-        in_border = np.flatnonzero((row < n) & (row != NOWHERE) & (column >= n))
-        in_corner = np.flatnonzero((row >= n) & (column >= n))
+        """Of the products (t, m) of columns: which are in band, border and corner, and where."""
+        n, b = self._layout.band, self._layout.border
+        each = np.ascontiguousarray(self._unknowns.T)
+        one, other = (each[of] for of in self._twos)
+        row, column = np.maximum(one, other).ravel(), np.minimum(one, other).ravel()
+        is_known, is_high, is_low = column != NOWHERE, row >= n, column >= n
+        in_band = np.flatnonzero(is_known & ~is_high)
+        in_border = np.flatnonzero(is_known & is_high & ~is_low)
+        in_corner = np.flatnonzero(is_low)
         return (
-            (in_band, ((row - column) * n + column)[in_band]),
-            (in_border, (row * b + column - n)[in_border]),
-            (in_corner, ((row - n) * b + column - n)[in_corner]),
+            (in_band, (row[in_band] - column[in_band]) * n + column[in_band]),
+            (in_border, column[in_border] * b + row[in_border] - n),
+            (in_corner, (row[in_corner] - n) * b + column[in_corner] - n),
         )
 
     @cached_property
@@ -96,17 +106,33 @@ class _Assembly:
 
     def add_matrix(self, system: System, factors: Linearised) -> None:
         """Add J' W J."""
-        jacobian = factors.jacobian[:, :, : self._columns]
-        blocks = (np.swapaxes(jacobian, 1, 2) @ (factors.information @ jacobian)).ravel()
-        parts = (system.band, system.border, system.corner)
-        for part, (which, at) in zip(parts, self._places, strict=True):
-            if len(at):
-                part += _sums(at, blocks[which], part)
+        (in_band, band), (in_border, border), (in_corner, corner) = self._places
+        products = self._products(factors).ravel()
+        system.band += _sums(band, products[in_band], system.band)
+        if len(in_border):
+            system.border += _sums(border, products[in_border], system.border)
+        if len(in_corner):
+            below = _sums(corner, products[in_corner], system.corner)
+            system.corner += below
+            system.corner += np.tril(below, -1).T
+
+    def _products(self, factors: Linearised) -> Array:
+        """(t, m) entries of J' W J."""
+        jacobian = np.ascontiguousarray(factors.jacobian[:, :, self._columns].transpose(2, 1, 0))
+        if jacobian.shape[1] == 1:
+            weighed = jacobian * factors.information[:, 0, 0]
+        else:
+            weighed = np.einsum("cem,mde->cdm", jacobian, factors.information)
+        one, other = self._twos
+        out = np.empty((len(one), jacobian.shape[2]))
+        for at, (k, last) in enumerate(zip(one.tolist(), other.tolist(), strict=True)):
+            np.einsum("dm,dm->m", jacobian[k], weighed[last], out=out[at])
+        return out
 
     def add_gradient(self, gradient: Array, factors: Linearised) -> None:
         """Add J' f."""
         known, at = self._entries
-        each = (factors.pull[:, None, :] @ factors.jacobian[:, :, : self._columns]).ravel()
+        each = (factors.pull[:, None, :] @ factors.jacobian[:, :, self._columns]).ravel()
         gradient += _sums(at, each[known], gradient)
 
 

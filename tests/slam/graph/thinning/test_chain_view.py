@@ -14,7 +14,9 @@ from drslamd.slam import se2
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import Keyframe
 from drslamd.slam.graph.thinning.chain_view import ChainThinning, ChainView, whole
+from drslamd.slam.graph.thinning.team_chains import TeamChains
 from drslamd.slam.graph.thinning.time_cells import RECENT_S
+from drslamd.slam.graph.timed_rows import NEVER
 from drslamd.slam.odometry.noise import PATH, WHEELS, OdometryNoise, by_yaw_rate
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.factors import chain_links
@@ -220,11 +222,16 @@ def test_a_link_far_from_the_origin_keeps_its_digits() -> None:
 # what was measured at keyframes that went
 
 
+def seen(view: ChainView) -> TeamChains:
+    """All rows of one chain."""
+    return TeamChains({0: view}, {0: (0, NEVER)})
+
+
 def test_bodies_are_seen_from_the_nearest_keyframe_that_stays() -> None:
     data = wandering(2_000)
     view = aged(data)
     rows = np.arange(2_000)
-    carried = view.carried(rows)
+    carried = seen(view).carried(rows)
     stays = view.keyframes.n
     for row in range(0, 2_000, 7):
         distance = np.abs(stays - 10 * row)
@@ -235,7 +242,7 @@ def test_bodies_are_seen_from_the_nearest_keyframe_that_stays() -> None:
         way = np.hypot(*np.diff(WANDER[low : high + 1, :2], axis=0).T).sum()
         assert carried.sums[row, 0] == pytest.approx(way, abs=2e-3)
         assert carried.is_after[row] == (row >= at)
-    assert (view.is_old(rows) == (10 * rows < view.recent_n)).all()
+    assert (seen(view).is_old == (10 * rows < view.recent_n)).all()
     assert (carried.n[10 * rows >= view.recent_n] == 10 * rows[10 * rows >= view.recent_n]).all()
 
 
@@ -244,7 +251,7 @@ def test_the_way_between_is_summed_in_the_frame_of_that_keyframe() -> None:
     data = wandering(2_000)
     view = aged(data)
     rows = np.array([3, 4, 9, 130, 301, 888, 1_003, 1_500])
-    carried = view.carried(rows)
+    carried = seen(view).carried(rows)
     poses = data.keyframes.poses
     for k, row in enumerate(rows.tolist()):
         at = int(carried.n[k]) // 10
@@ -266,7 +273,7 @@ def test_nothing_is_carried_across_a_break() -> None:
     for k in range(400):
         data.add(Keyframe(10 * k, int(k >= 3), 1_000 * k, 0, 0))
     view = aged(data)
-    assert view.carried(np.array([1, 2, 3])).n.tolist() == [0, 0, 30]
+    assert seen(view).carried(np.array([1, 2, 3])).n.tolist() == [0, 0, 30]
 
 
 # again and again

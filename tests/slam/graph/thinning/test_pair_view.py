@@ -28,7 +28,8 @@ from drslamd.slam import se2
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.thinning.chain_view import ChainView
-from drslamd.slam.graph.thinning.pair_view import FEW_CLOSURES, FEW_RANGES, MOVING_M, PairView
+from drslamd.slam.graph.thinning.pair_view import PairView
+from drslamd.slam.graph.thinning.thinned_pairs import FEW_CLOSURES, FEW_RANGES, MOVING_M
 from drslamd.slam.odometry.noise import OdometryNoise
 
 AHEAD = 23

@@ -1,0 +1,62 @@
+"""Pairs that are thinned together: each becomes what it becomes alone."""
+
+from __future__ import annotations
+
+import numpy as np
+from long_drives import Drive, logs
+
+from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.graph.thinning.thinned_pairs import NOTHING, PairPart, Unthinned, thinned_pairs
+
+
+def said_and_graph() -> tuple[list[Unthinned], PoseGraph]:
+    graph = PoseGraph()
+    for origin, entry in logs(4, 1_500, [Drive(), Drive(clock=500_011), Drive(clock=777)], 3):
+        graph.insert(origin, entry)
+    out = []
+    for pair in graph.usable():
+        for half in (0, 1):
+            ranges, closures = pair.ranges, pair.closures
+            middle = np.median(ranges.a_n)
+            ranges = ranges.chosen((ranges.a_n > middle) == half)
+            closures = closures.chosen((closures.a_n > middle) == half)
+            named = np.concatenate([ranges.b_n, closures.b_n]).astype(int)
+            span = int(named.min()), int(named.max())
+            out.append(Unthinned(pair.a.robot, pair.b.robot, ranges, closures, span))
+    return out, graph
+
+
+def bits(part: PairPart) -> tuple[bytes, ...]:
+    return part.ranges.rows.tobytes(), part.moves.tobytes(), part.closures.rows.tobytes()
+
+
+def test_what_becomes_of_a_pair_does_not_depend_on_the_others() -> None:
+    said, graph = said_and_graph()
+    views = graph.view.chains
+    together = thinned_pairs(said, views)
+    assert len(together) == len(said) == 6
+    for one, part in zip(said, together, strict=True):
+        (alone,) = thinned_pairs([one], views)
+        assert bits(alone) == bits(part)
+        assert 0 < len(part.ranges) <= len(one.ranges)
+        assert 0 < len(part.closures) <= len(one.closures)
+    assert any(len(part.ranges) < len(one.ranges) for one, part in zip(said, together, strict=True))
+    for one, part in zip(reversed(said), thinned_pairs(said[::-1], views), strict=True):
+        (alone,) = thinned_pairs([one], views)
+        assert bits(alone) == bits(part)
+    assert thinned_pairs([], views) == []
+
+
+def test_a_digest_sees_each_of_what_a_part_holds_and_nothing_of_an_empty_one() -> None:
+    said, graph = said_and_graph()
+    part = thinned_pairs(said[:1], graph.view.chains)[0]
+    moved = part.moves.copy()
+    moved[np.flatnonzero(moved.reshape(len(moved), -1).any(axis=1))[0]] += 1e-3
+    others = [
+        PairPart(part.ranges, moved, part.closures),
+        PairPart(part.ranges, part.moves, NOTHING.closures),
+        PairPart(NOTHING.ranges, NOTHING.moves, part.closures),
+    ]
+    assert len({part.digest, *(other.digest for other in others)}) == 4
+    assert PairPart(part.ranges, part.moves.copy(), part.closures).digest == part.digest
+    assert NOTHING.digest == b""
