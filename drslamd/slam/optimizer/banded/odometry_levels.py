@@ -3,7 +3,8 @@
 A robot whose odometry does not fit (`misfit`) slipped, was stuck, or is otherwise not as
 configured. Its noise is raised until the misfit is as it should be: first all along its way, then
 cell by cell of time as far as each cell asks for it, so that a moment of slip is believed less and
-the rest as before. Each time the team is solved again.
+the rest as before. Each time the team is solved again. Where one or two robots explain it all, the
+others are as configured.
 
 Long-lasting errors of ranges look alike. What tells them apart: with the right stretches raised
 hardly any range is an outlier any more, and a robot that is wrong contradicts more than one other.
@@ -17,6 +18,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.misfit import (
@@ -45,6 +47,8 @@ DOUBT_OF_CELL = 0.1
 """Degrees of freedom that hold a cell at its nominal noise."""
 BESIDE = 0.3
 """Of the worst s / g: a robot below that is believed until the worst ones are not."""
+MOST_TRIED = 2
+"""Robots that may be to blame for all of it."""
 ROUNDS_OF_ROBOTS = 5
 ROUNDS_OF_CELLS = 8
 SETTLED = 0.1
@@ -102,7 +106,8 @@ def levelled(
     robot = problem.odometry.robot
     level, point = _robots_raised(equations, nominal, ratio)
     start = np.maximum(level[robot], _run_level(problem, found))
-    seen, point = _cells_settled(equations, point, start)
+    seen, point = _fewest_blamed(equations, *_cells_settled(equations, point, start))
+    level = np.where(np.bincount(robot, seen > 1.0, len(level)) > 0, level, 1.0)
     believed = Equations(raised(problem, seen, point), like=equations)
     point = descend(believed, point.calibration, most, tolerance)
     lately, so_far = _lingering(problem, seen)
@@ -164,14 +169,38 @@ def _runs_of(found: list[Run]) -> Counter[int]:
     return Counter(end for run in found for end in (run.i, run.j))
 
 
-def _cells_settled(equations: Equations, point: Point, variance: Array) -> tuple[Array, Point]:
-    """(m,) the variance over the nominal one that every cell of time asks for."""
+def _fewest_blamed(equations: Equations, seen: Array, point: Point) -> tuple[Array, Point]:
+    """The same with as few robots as explain it no worse: beside one with a fault a few links of
+    the others seem wrong too, and nobody is to be doubted for that."""
+    problem, robot = equations.problem, equations.problem.odometry.robot
+    robots = len(problem.priors.scale)
+    blame = np.bincount(robot, np.log(seen), robots)
+    bound = np.maximum(outlier_share(problem, point), FEW_OUTLIERS)
+    for count in range(1, min(int(np.count_nonzero(blame)), MOST_TRIED + 1)):
+        alone = np.isin(robot, np.argsort(-blame)[:count])
+        fewer, near = _cells_settled(equations, point, np.where(alone, seen, 1.0), alone)
+        near, now = _solved(equations, fewer, near)
+        fits = now.ratio(robot, robots) <= STANDS_OUT
+        if fits.all() and (outlier_share(problem, near) <= bound).all():
+            return fewer, near
+    return seen, point
+
+
+def _cells_settled(
+    equations: Equations, point: Point, variance: Array, asked: NDArray[np.bool_] | None = None
+) -> tuple[Array, Point]:
+    """(m,) the variance over the nominal one that every cell of time asks for.
+
+    Args:
+        asked: (m,) links of which it may be another one than it is; all of them by default.
+    """
     problem, odometry = equations.problem, equations.problem.odometry
     names = np.stack([odometry.robot, problem.n[odometry.j] // CELL])
     cell = np.unique(names, axis=1, return_inverse=True)[1].ravel()
     for _ in range(ROUNDS_OF_CELLS):
         point, now = _solved(equations, variance, point)
         wanted = _wanted(now, variance, cell)
+        wanted = wanted if asked is None else np.where(asked, wanted, variance)
         if np.abs(np.log(wanted / variance)).max(initial=0.0) < SETTLED:
             break
         variance = wanted

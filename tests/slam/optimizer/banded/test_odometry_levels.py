@@ -98,11 +98,37 @@ def test_who_was_stuck_or_slipped_for_six_seconds_is_blamed_alone_and_for_that_t
     assert worst(found.point, truth) < 0.7
     level = levels(problem, found.seen)
     assert level[1, slice(*FAULT)].min() > 10
-    others = np.delete(level, 1, axis=0)
-    assert others.max() < 3
+    assert np.delete(level, 1, axis=0).max() == 1
+    # nor is anybody else feared
+    assert np.delete(levels(problem, found.lately), 1, axis=0).max() == math.sqrt(TARGET)
     # a cell of two seconds on either side may take part of it
     assert np.delete(level[1], np.arange(FAULT[0] - 2, FAULT[1] + 2)).max() < 3
     assert np.median(level) == 1
+
+
+@pytest.mark.parametrize("tried", [1, 2])
+def test_of_two_with_a_fault_both_are_blamed_and_alone_where_so_many_are_tried(
+    tried: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither explains all of it; where two are not tried what all cells asked for stays."""
+    monkeypatch.setattr(odometry_levels, "MOST_TRIED", tried)
+    problem = slipping(stuck(a_team(2)[0], 1, *FAULT), 2, 10, 16)
+    found = explained(problem)
+    level = levels(problem, found.seen)
+    assert level[1, slice(*FAULT)].min() > 10
+    assert level[2, 11:15].min() > 10
+    assert bool(level[[0, 3]].max() == 1) is (tried == 2)
+
+
+def test_fewer_are_not_blamed_where_that_leaves_more_outliers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """All are asked for again, as if no solution with fewer robots fitted."""
+    problem = slipping(a_team(2)[0], 1, *FAULT)
+    assert np.delete(levels(problem, explained(problem).seen), 1, axis=0).max() == 1
+    shares = iter([np.zeros(problem.pairs), *[np.full(problem.pairs, 1.0)] * 9])
+    monkeypatch.setattr(odometry_levels, "outlier_share", lambda *_: next(shares))
+    assert np.delete(levels(problem, explained(problem).seen), 1, axis=0).max() > 1
 
 
 def test_what_was_seen_is_feared_to_have_gone_on_before_and_not_less() -> None:
