@@ -62,7 +62,8 @@ class Modules:
         """
         if not self._jobs.is_free(WHAT_IF, utime):
             return []
-        asked = self._front.what_if(self._peers(utime, only), self._back.graph, utime)
+        peers, back = self._peers(utime, only), self._back
+        asked = self._front.what_if(peers, back.graph, back.estimate, utime)
         return [self._jobs.begin(Job(WHAT_IF, (w.pair,), (w.request,)), w.run) for w in asked]
 
     def consistency(self, utime: int, only: PairTracker | None = None) -> list[Effect]:

@@ -12,6 +12,7 @@ from drslamd.slam import settings
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
 from drslamd.slam.calibration.window_calibration import PairCalibration
 from drslamd.slam.closure_method import PairWindow
+from drslamd.slam.consistency.measurable import Measurable, behind_lapses
 from drslamd.slam.consistency.pair import Checked, PairTracker
 from drslamd.slam.doubt import Partners
 from drslamd.slam.graph.estimate import TeamEstimate
@@ -40,14 +41,6 @@ from drslamd.slam.relocation.sightings import Own
 from drslamd.slam.robot_model import with_gyro
 from drslamd.slam.se2 import Array
 from drslamd.slam.tuning import DEFAULTS, Tuning
-
-
-class Measurable(NamedTuple):
-    """An owned pair, and both its robots, with everything at hand that a measurement needs."""
-
-    pair: PairTracker
-    a: PairEnd
-    b: PairEnd
 
 
 class WindowJob(NamedTuple):
@@ -213,7 +206,8 @@ class FrontEnd:
         self.update_pairs(neighbours, graph, utime)
         self._count_unknown_clocks(neighbours, graph, utime)
         out = []
-        for pair, a, b in self._measurable(neighbours, graph, utime):
+        found = self._measurable(neighbours, graph, utime)
+        for pair, a, b in behind_lapses(found, estimate):
             window = request(pair.ranges, a, b, self._method.rule, self._range_model)
             if isinstance(window, str):
                 pair.count(window)
@@ -259,11 +253,16 @@ class FrontEnd:
         return known.a.correction, known.b.correction
 
     def what_if(
-        self, neighbours: list[PeerInRange], graph: PoseGraph, utime: int
+        self,
+        neighbours: list[PeerInRange],
+        graph: PoseGraph,
+        estimate: TeamEstimate | None,
+        utime: int,
     ) -> list[WhatIfJob]:
         """Begin the searches for mistakes in mountings that are due, where windows disagree."""
         out = []
-        for pair, a, b in self._measurable(neighbours, graph, utime):
+        measurable = self._measurable(neighbours, graph, utime)
+        for pair, a, b in behind_lapses(measurable, estimate):
             search, awaits = pair.search, pair.awaits_confirmation
             if not (self._method.agreement.confirms and search.is_due(utime, awaits)):
                 continue

@@ -16,7 +16,7 @@ from drslamd.slam.calibration.sensor_calibration import CHANGED_BIAS_M, SensorCa
 from drslamd.slam.closure_method import AGREEMENT, CONFIRM_US
 from drslamd.slam.consistency.pair import PairTracker
 from drslamd.slam.front_end import FrontEnd
-from drslamd.slam.graph.estimate import Learned, TeamEstimate
+from drslamd.slam.graph.estimate import Lapse, Learned, TeamEstimate
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.relative_pose.estimate import PairNoise
@@ -245,6 +245,21 @@ def test_what_module_3_has_learned_of_a_bias_serves_module_1(is_used: bool, extr
         np.array_equal(a.a_T_b, b.a_T_b) for a, b in zip(*answers, strict=True)
     )
     assert same is not is_used
+
+
+@pytest.mark.parametrize("robot", [0, 1])
+def test_no_window_spans_a_time_in_which_wheels_stood_or_spun(robot: int) -> None:
+    """The stretch of one of them ended ten seconds ago, by its own clock."""
+    scene = FrontScene()
+    scene.drive(SECONDS)
+    (plain,) = scene.module1()
+    last = (scene.utime - 10 * SECOND_US + (scene.neighbour().ahead_us or 0) * robot) // GRID_US
+    lapses = (Lapse(robot, last - 50, last, stood=True), Lapse(2, last, last + 90, stood=True))
+    scene.front.pairs[1].history.clear()
+    (job,) = scene.module1(TeamEstimate(Segment(0, 1, 0), {}, lapses=lapses))
+    seconds = np.ptp(plain.request.window.t), np.ptp(job.request.window.t)
+    assert seconds[0] > 15
+    assert 8 < seconds[1] < 10.2
 
 
 @pytest.mark.parametrize("calls", [1, 3])

@@ -31,7 +31,7 @@ def disagreeing(extra: str = "", windows: int = MANY) -> FrontScene:
 
 
 def asked(scene: FrontScene) -> list[WhatIfJob]:
-    return scene.front.what_if([scene.neighbour()], scene.graph, scene.utime)
+    return scene.front.what_if([scene.neighbour()], scene.graph, None, scene.utime)
 
 
 @pytest.mark.parametrize(("windows", "is_asked"), [(MANY - 1, False), (MANY, True)])

@@ -98,6 +98,7 @@ class TeamEstimate:
             late, as far as it must be feared; 1 where none is named.
         late_level: likewise, of the last seconds only.
         lapses: of everybody.
+        fitted: by robot, the last keyframe of the last solution that was as modelled.
         contradicted: pairs whose ranges of late do not fit the rest.
         boldness: by how much variances of pairs a < b that were claimed of late were too small
             (`revisions`), where they were.
@@ -126,6 +127,7 @@ class TeamEstimate:
     odometry_level: dict[int, float] = field(default_factory=dict)
     late_level: dict[int, float] = field(default_factory=dict)
     lapses: tuple[Lapse, ...] = ()
+    fitted: dict[int, int] = field(default_factory=dict)
     contradicted: frozenset[tuple[int, int]] = frozenset()
     boldness: dict[tuple[int, int], float] = field(default_factory=dict)
     is_explained: bool = True

@@ -235,6 +235,8 @@ class Problem:
         doubted: whose mountings are unknowns; those of the others are as configured.
         model: of its ranges.
         freed: of what odometry says.
+        fitted: (robots,) keyframes until which all was as modelled not long ago; none where left
+            out.
     """
 
     robot: Index
@@ -250,6 +252,7 @@ class Problem:
     range_sigma: float = 0.1
     model: RangeModel = LINKTRACK
     freed: tuple[Freed, ...] = ()
+    fitted: Array | None = None
 
 
 def pose_errors(poses: Array, factors: BetweenFactors, measured: Array) -> Array:

@@ -6,7 +6,7 @@ way from the window's end to the nearest keyframe of each robot is odometry on b
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,7 +34,7 @@ class PairEnd:
     """One robot: its 10 Hz track, what it said of itself, its clock minus ours in us.
 
     Attributes:
-        since_us: from when on our clock that difference holds.
+        since_us: from when on our clock that difference holds, and its wheels are to be believed.
     """
 
     track: Track
@@ -57,6 +57,10 @@ class PairEnd:
             return NO_GYRO
         since, until = (np.array(span) * GRID_US - self.ahead_us - utime) / SECOND_US
         return float(since), float(until)
+
+    def behind(self, n: int) -> PairEnd:
+        """From a sample of the track on only."""
+        return replace(self, since_us=max(self.since_us, n * GRID_US - self.ahead_us))
 
     @property
     def first_us(self) -> int:

@@ -150,7 +150,9 @@ def build_problem(
         range_sigma=numbers.range_sigma,
         model=numbers.model,
     )
-    problem = freed_again(problem, robots, previous.lapses if previous else ())
+    if previous is not None:
+        fitted = np.array([previous.fitted.get(robot, 0) for robot in robots], dtype=float)
+        problem = freed_again(replace(problem, fitted=fitted), robots, previous.lapses)
     by_gyro = {c.chain.robot for c in chains if c.model.noise.learns_gyro}
     start = _start(previous, known, pairs, robots, by_gyro)
     solved = {chain.chain: places.n[places.of_robot(chain.chain.robot)] for chain in chains}
@@ -245,7 +247,10 @@ def _begun(
 ) -> TeamEstimate:
     """State the problem and solve it: both take long where the team is large."""
     team = build_problem(graph, group, previous, numbers)
-    return solved(team, group, solve=numbers.solve, kept=previous.kept if previous else None)
+    if previous is None:
+        return solved(team, group, solve=numbers.solve)
+    found = solved(team, group, solve=numbers.solve, kept=previous.kept)
+    return found if found.is_as_modelled else replace(found, fitted=previous.fitted)
 
 
 def solved(
@@ -304,6 +309,7 @@ def solved(
         # (a good one stays good, should the last digits not come to rest)
         converged=solution.converged or team.is_known,
         settled=team.is_known,
+        fitted={robot: int(team.problem.n[at]) for robot, at in zip(mine, last, strict=True)},
         is_as_modelled=solution.is_explained and bool((solution.odometry_level <= 1).all()),
         kept=kept,
     )

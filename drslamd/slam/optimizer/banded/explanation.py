@@ -109,13 +109,10 @@ def _by_lapse(
 ) -> Explanation | None:
     """Wheels stood or spun, if that explains all."""
     found = lapse_search.best(equations, nominal, most, tolerance)
-    if found is None:
+    if found is None or not _fits(found.equations, found.point):
         return None
-    freed, point = settled(found.equations, found.point, most, tolerance)
-    if not _fits(freed, point):
-        return None
-    check = _checked(freed, point)
-    return _as_is(freed, point, check.ratio) if check.is_passed() else None
+    check = _checked(found.equations, found.point)
+    return _as_is(found.equations, found.point, check.ratio) if check.is_passed() else None
 
 
 def _fits(equations: Equations, point: Point) -> bool:

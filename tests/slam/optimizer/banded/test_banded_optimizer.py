@@ -154,6 +154,30 @@ def test_the_next_solution_begins_with_the_lapses_that_were_found() -> None:
     assert build_problem(team.graph, group_of(team.graph), None, BANDED).problem.freed == ()
 
 
+def test_what_was_as_modelled_until_when_is_remembered_while_it_is_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    team = small_team(1, count=12)
+    group = group_of(team.graph)
+    first = solved(team.graph, group)
+    last = {robot: int(n[-1]) for robot, n in team.n.items()}
+    assert first.is_as_modelled
+    assert first.fitted == last
+    previous = replace(first, fitted={0: 5, 1: 7})
+    problem = build_problem(team.graph, group, previous, BANDED).problem
+    assert problem.fitted is not None
+    assert problem.fitted.tolist() == [5, 7, 0]
+    assert solved(team.graph, group, previous).fitted == last
+    solve = banded_solver.solve
+
+    def worse(*args: Any, **named: Any) -> Solution:
+        answer = solve(*args, **named)
+        return replace(answer, odometry_level=2 + answer.odometry_level)
+
+    monkeypatch.setattr(banded_solver, "solve", worse)
+    assert solved(team.graph, group, previous).fitted == {0: 5, 1: 7}
+
+
 def test_a_lapse_is_named_by_its_robot_and_keyframes(monkeypatch: pytest.MonkeyPatch) -> None:
     team = small_team(1, count=12)
     group = group_of(team.graph)

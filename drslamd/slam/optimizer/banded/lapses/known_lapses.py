@@ -9,7 +9,6 @@ import numpy as np
 
 from drslamd.conventions import GRID_HZ
 from drslamd.slam.graph.estimate import Lapse
-from drslamd.slam.optimizer.banded.lapses.lapse_search import GAIN
 from drslamd.slam.optimizer.banded.lapses.placements import best_placed
 from drslamd.slam.optimizer.banded.lapses.stretches import (
     freed_links,
@@ -21,6 +20,9 @@ from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.problem import Freed, Problem
 
+GAIN = 30.0
+"""Of cost: what a stretch that is freed must explain; where nothing stood or spun the best gains
+less than 20, or the rest still does not fit."""
 SETTLES_S = 10.0
 """After a lapse: where the robot went meanwhile shows in the ranges since."""
 

@@ -1,4 +1,10 @@
-"""Which stretch, freed, explains what does not fit."""
+"""Which stretch, freed, explains what does not fit.
+
+Two robots alone only know of each other how far they are apart: what one of them may have done in a
+stretch explains much of what the other did in another one. So only what came to an end not long
+before all still was as modelled is looked at, and where a stretch of another robot explains nearly
+as much nobody can say who it was.
+"""
 
 from __future__ import annotations
 
@@ -6,56 +12,90 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drslamd.slam.optimizer.banded.lapses.stretches import likely_stretches, with_freed
+from drslamd.slam.optimizer.banded.lapses.known_lapses import GAIN, settled
+from drslamd.slam.optimizer.banded.lapses.placements import RIVAL
+from drslamd.slam.optimizer.banded.lapses.stretches import likely_stretches, span, with_freed
 from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.problem import Freed, Problem
 
-GAIN = 30.0
-"""Of cost, by which the best must be better than none; where nothing stood or spun it is below 20,
-or the rest still does not fit."""
 ROUND, ROUGH = 8, 1e-3
-"""Steps, and m and rad, after which it is seen which is best."""
+"""Steps, and m and rad, after which it is seen which are worth more."""
+LITTLE, MOST_POLISHED = 10.0, 3
+"""What gains less by then is not gone on with, and so many are."""
+BEHIND = 10
+"""Links by which a stretch may have ended before something did not fit: ranges show it once the
+robot has driven some metres."""
 
 
 @dataclass(frozen=True)
 class Tried:
-    """What is solved with a stretch freed; gain: by how much the cost fell."""
+    """What is solved with a stretch freed.
 
+    Attributes:
+        robot: whose it is, as the problem numbers them.
+        gain: by how much the cost fell.
+    """
+
+    robot: int
     equations: Equations
     point: Point
     gain: float
 
 
 def best(equations: Equations, nominal: Point, most: int, tolerance: float) -> Tried | None:
-    """The solution with the stretch freed that explains most; None where none explains much.
+    """The solution with the stretch freed that explains most; None where none explains much, or
+    where nobody can say which does.
 
     Args:
         most, tolerance: of that solution, see `descend`.
     """
     problem = equations.problem
     taken = [links for freed in problem.freed for links in freed.links.tolist()]
-    tried = [
-        _solved(equations, nominal, freed)
+    rough = [
+        _roughly(equations, nominal, freed)
         for freed in likely_stretches(problem)
-        if not np.isin(freed.links[1:-1], taken).any()
+        if _is_recent(problem, freed) and not np.isin(freed.links[1:-1], taken).any()
+    ]
+    rough.sort(key=lambda one: -one.gain)
+    tried = [
+        _polished(equations, nominal, one, most, tolerance)
+        for one in rough[:MOST_POLISHED]
+        if one.gain >= LITTLE
     ]
     found = max(tried, key=lambda one: one.gain, default=None)
     if found is None or found.gain < GAIN:
         return None
-    point = descend(found.equations, found.point.calibration, most, tolerance)
-    gain = _gain(equations, nominal, found.equations.problem, point)
-    return Tried(found.equations, point, gain) if gain >= GAIN else None
+    others = [one.gain for one in tried if one.robot != found.robot]
+    return found if max(others, default=0.0) < found.gain - RIVAL else None
 
 
-def _solved(equations: Equations, nominal: Point, freed: Freed) -> Tried:
-    """Roughly."""
+def _is_recent(problem: Problem, freed: Freed) -> bool:
+    """Did it end at most some links before the last solution that was as modelled?"""
+    if problem.fitted is None:
+        return True
+    odometry = problem.odometry
+    mine = odometry.robot == freed.robot
+    until = problem.n[odometry.j[mine]] <= problem.fitted[freed.robot]
+    since = problem.n[odometry.i[mine]] >= span(problem, freed)[1]
+    return int(np.count_nonzero(until & since)) <= BEHIND
+
+
+def _roughly(equations: Equations, nominal: Point, freed: Freed) -> Tried:
     problem = with_freed(replace(equations.problem, initial=nominal.poses), freed)
     wider = Equations(problem, like=equations)
     point = descend(wider, nominal.calibration, ROUND, ROUGH)
-    near = Equations(replace(wider.problem, initial=point.poses), like=wider)
-    return Tried(near, point, _gain(equations, nominal, problem, point))
+    near = Equations(replace(problem, initial=point.poses), like=wider)
+    return Tried(freed.robot, near, point, _gain(equations, nominal, problem, point))
+
+
+def _polished(
+    equations: Equations, nominal: Point, rough: Tried, most: int, tolerance: float
+) -> Tried:
+    point = descend(rough.equations, rough.point.calibration, most, tolerance)
+    freed, point = settled(rough.equations, point, most, tolerance)
+    return Tried(rough.robot, freed, point, _gain(equations, nominal, freed.problem, point))
 
 
 def _gain(equations: Equations, nominal: Point, freed: Problem, better: Point) -> float:

@@ -13,13 +13,13 @@ from slam_problems import CLOCKS
 from drslamd.slam.graph.estimate import Lapse
 from drslamd.slam.optimizer.banded.lapses import known_lapses
 from drslamd.slam.optimizer.banded.lapses.known_lapses import (
+    GAIN,
     SETTLES_S,
     freed_again,
     lapse_of,
     settled,
     still_freed,
 )
-from drslamd.slam.optimizer.banded.lapses.lapse_search import GAIN
 from drslamd.slam.optimizer.banded.lapses.placements import PlacedWay
 from drslamd.slam.optimizer.banded.lapses.stretches import likely_stretches, with_freed
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE

@@ -11,8 +11,9 @@ from slam_problems import links_of, mismeasured, slipping, stuck
 
 from drslamd.slam.graph.estimate import Lapse
 from drslamd.slam.optimizer.banded.lapses import lapse_search
-from drslamd.slam.optimizer.banded.lapses.known_lapses import lapse_of
-from drslamd.slam.optimizer.banded.lapses.lapse_search import GAIN, Tried, best
+from drslamd.slam.optimizer.banded.lapses.known_lapses import GAIN, lapse_of
+from drslamd.slam.optimizer.banded.lapses.lapse_search import BEHIND, Tried, best
+from drslamd.slam.optimizer.banded.lapses.placements import RIVAL
 from drslamd.slam.optimizer.banded.lapses.stretches import likely_stretches
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE
 from drslamd.slam.optimizer.banded.normal_equations import Equations
@@ -36,7 +37,9 @@ def test_the_stretch_is_found_and_behind_it_poses_are_as_if_nothing_had_been(
     assert worst(nominal(problem).poses, truth) > 1.5
     assert answer.gain > 10 * GAIN
     (freed,) = answer.equations.problem.freed
-    assert lapse_of(problem, [4, 6, 9], freed) == Lapse(6, *FROM_TO, fault is stuck)
+    assert lapse_of(problem, [4, 6, 9], freed) == Lapse(
+        6, *FROM_TO, fault is stuck, is_settled=True
+    )
     outside = np.ones(len(truth), dtype=bool)
     outside[robots * FAULT[0] : robots * FAULT[1]] = False
     assert worst(answer.point.poses[outside], truth[outside]) < clean + 0.5
@@ -92,3 +95,32 @@ def test_ranges_that_no_longer_count_are_no_reason(monkeypatch: pytest.MonkeyPat
         lambda at, _: replace(at, ranges=silent, freed=(useless,)),
     )
     assert tried(problem) is None
+
+
+@pytest.mark.parametrize("times", [0.99, 1.01])
+def test_who_explains_hardly_less_may_have_been_it_as_well(
+    times: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of robots 0 and 1 each has a stretch."""
+    problem = slipping(a_team(7)[0], 1, *FAULT)
+    (freed,) = likely_stretches(problem)
+    other = replace(freed, robot=0)
+    polished = lapse_search._polished
+
+    def gaining(*args: object) -> Tried:
+        answer = polished(*args)  # type: ignore[arg-type]
+        return replace(answer, gain=100.0 if answer.robot else 100.0 - times * RIVAL)
+
+    monkeypatch.setattr(lapse_search, "likely_stretches", lambda _: [freed, other])
+    monkeypatch.setattr(lapse_search, "_polished", gaining)
+    assert (tried(problem) is not None) is (times > 1)
+
+
+@pytest.mark.parametrize(("links", "is_tried"), [(BEHIND, True), (BEHIND + 1, False)])
+def test_a_stretch_behind_which_all_was_as_modelled_for_long_is_no_reason(
+    links: int, is_tried: bool
+) -> None:
+    """It ends with keyframe 32 of robot 1."""
+    problem = slipping(a_team(7)[0], 1, *FAULT)
+    fitted = np.array([1e9, FROM_TO[1] + 10 * links, 1e9])
+    assert (tried(replace(problem, fitted=fitted)) is not None) is is_tried
