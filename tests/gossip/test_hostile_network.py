@@ -105,7 +105,7 @@ def test_a_replay_of_the_whole_conversation_changes_nothing_but_counters() -> No
     for s in (before, after):
         del s["logs"]["repeats"]["pace"]  # it counts what is on the air
     assert after == before
-    assert dict(team.refused) == {"already seen": 3 * 5}
+    assert dict(team.refused) == {"already seen": 3 * (len(events) - 3)}
     assert team.repeats_heard == 3 * 3
 
 
@@ -175,7 +175,7 @@ def test_everything_that_comes_in_is_counted_exactly_once() -> None:
     received += len(more)
     assert team.accepted + team.refused.total() + team.own_echoes + team.repeats_heard == received
     assert team.accepted == len(events) + 1
-    assert team.own_echoes == 5
+    assert team.own_echoes == len(kinds())
 
 
 @pytest.mark.parametrize(
