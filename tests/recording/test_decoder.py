@@ -19,7 +19,8 @@ from drslamd.recording.event_log import Entry, entries
 from drslamd.recording.records import KINDS, Beginning, Marked, Opening, Record, Sent, Told
 
 SETTINGS = settings(derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-BEGINNING = Beginning(2**50, {1: 7, 2: 2**40}, {"scale": [0.1, 0.02]})
+PLACE = {"speed_mps": 0.5, "seen": [[1, 7, 120, 2**40, 1.5, -2.0, 0.2]]}
+BEGINNING = Beginning(2**50, {1: 7, 2: 2**40}, {"scale": [0.1, 0.02]}, PLACE)
 OPENING = Opening(5, BEGINNING, 3, {"host": "robot", "configuration": {"robot": {"id": 3}}})
 
 

@@ -183,3 +183,21 @@ def test_a_robot_is_made_with_what_a_tape_said_then(
     assert robot.calibration.used.scale.value == scale
     # a configuration that names no file asks what would have been without it
     assert make_robot(run.config(), run, team_key(None)).calibration.used.scale.value == 0.0
+
+
+@pytest.mark.parametrize(
+    ("state", "is_known"),
+    [
+        ({"speed_mps": 0.5, "seen": [[1, 7, 120, 9, 1.5, -2.0, 0.2]]}, True),
+        ({}, False),
+        ([], False),
+    ],
+)
+def test_a_robot_is_made_with_where_its_last_start_was(
+    tmp_path: Path, state: object, is_known: bool
+) -> None:
+    write(tmp_path)
+    (run,) = read_runs([tmp_path])
+    begun = replace(run.opening.beginning, place=state)  # type: ignore[arg-type]
+    robot = make_robot(run.config(), run, team_key(None), begun)
+    assert robot.front.resumption.is_waiting is is_known

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from lab.trust.holes import Hole, lines, play
+from lab.trust.holes import Hole, lines, play, row
 
 
 def test_lines_count_only_who_was_localised_before() -> None:
@@ -39,3 +39,10 @@ def test_one_restart_is_survived() -> None:
     assert hole.back_s <= 12
     assert hole.back_m < 1.0
     assert hole.wrong == 0
+
+
+def test_a_row_says_how_one_run_went() -> None:
+    assert row(4, Hole()) == "seed 4: was not localised before"
+    assert row(4, Hole(True)) == "seed 4: never back"
+    found = Hole(True, [], 0, 4.5, 0.123, 0.05, 2)
+    assert row(4, found) == "seed 4: back after 4.5 s, 0.12 m and 2.9 degrees off, 2 wrong"

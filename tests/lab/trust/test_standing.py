@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from lab.trust.standing import MOVED_M, STANDS, Run, lines, recorded
+from lab.trust.standing import MOVED_M, STANDS, Run, lines, recorded, row
 
 
 def test_lines_say_the_median_and_the_worst() -> None:
@@ -28,3 +28,12 @@ def test_what_stands_is_a_robot_or_a_module_that_measures_nothing(what: str, rob
     assert bool((recording.ranges[:, 1] == STANDS).any()) is (what == "robot")
     moved = float(np.hypot(*(stands[-1] - stands[0])))
     assert moved == pytest.approx(MOVED_M if what == "moved" else 0.0)
+
+
+def test_a_row_says_how_one_run_went() -> None:
+    assert row("robot", 3, Run(known_s=12.0, off_m=[0.1, 0.2])) == (
+        "seed 3: 12 s, 0.100, 0.200 m at the end, 0 wrong"
+    )
+    assert row("moved", 3, Run(known_s=12.0, wrong=2, dropped_s=9.0, worst_m=0.25)) == (
+        "seed 3: 12 s, nobody knows it, m at the end, 2 wrong, 9 s, 0.25 m"
+    )

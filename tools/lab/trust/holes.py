@@ -172,6 +172,18 @@ def _error(recording: Recording, member: Member, stated: PoseNow) -> Array:
     return np.asarray(error)
 
 
+def row(seed: int, hole: Hole) -> str:
+    """One run, for people."""
+    if not hole.was_localised:
+        return f"seed {seed}: was not localised before"
+    if not np.isfinite(hole.back_s):
+        return f"seed {seed}: never back"
+    return (
+        f"seed {seed}: back after {hole.back_s:.1f} s, {hole.back_m:.2f} m and "
+        f"{np.degrees(hole.back_rad):.1f} degrees off, {hole.wrong} wrong"
+    )
+
+
 def lines(found: list[Hole]) -> list[str]:
     """What came out, of those that were localised before; empty where nobody was."""
     runs = [hole for hole in found if hole.was_localised]
@@ -223,7 +235,10 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=20, metavar="N", help="default: %(default)s")
     parser.add_argument("--first", type=int, default=1, metavar="N", help="default: %(default)s")
     asked = parser.parse_args()
-    found = list(holes(asked.what, range(asked.first, asked.first + asked.seeds)))
+    found: list[Hole] = []
+    for hole in holes(asked.what, range(asked.first, asked.first + asked.seeds)):
+        print(row(asked.first + len(found), hole), flush=True)
+        found.append(hole)
     print("\n".join(lines(found)))
 
 

@@ -155,6 +155,13 @@ def _truth(recording: Recording, robot: int, t: float, place: Array) -> Array:
     return np.asarray(se2.between(pose, np.array([*place, 0.0]))[:2])
 
 
+def row(what: str, seed: int, run: Run) -> str:
+    """One run, for people."""
+    off = ", ".join(f"{metres:.3f}" for metres in run.off_m) or "nobody knows it,"
+    moved = f", {run.dropped_s:.0f} s, {run.worst_m:.2f} m" if what == "moved" else ""
+    return f"seed {seed}: {run.known_s:.0f} s, {off} m at the end, {run.wrong} wrong{moved}"
+
+
 def lines(what: str, runs: list[Run]) -> Iterator[str]:
     """What came out, for people."""
     known = [run.known_s for run in runs]
@@ -195,6 +202,7 @@ def main() -> None:
     progress, runs = Progress("played", len(seeds), "runs"), []
     for done, seed in enumerate(seeds, start=1):
         runs.append(play(options.what, seed, options.seconds))
+        print(row(options.what, seed, runs[-1]), flush=True)
         progress(done)
     progress.end()
     print("\n".join(lines(options.what, runs)))
