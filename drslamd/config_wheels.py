@@ -114,6 +114,16 @@ class AsciiSection(SerialWheelSection, GyroKeys):
     counts_per_metre: Scale
 
 
+class WheeltecSection(SerialWheelSection, GyroKeys):
+    source: Literal["wheeltec"]
+
+    @model_validator(mode="after")
+    def _has_no_sides(self) -> WheeltecSection:
+        if self.reverse_left or self.reverse_right:
+            raise ValueError("a wheeltec base says what its body does and has no sides to reverse")
+        return self
+
+
 class CanWheelSection(WheelSection):
     can: CanSection = CanSection()
 
@@ -183,7 +193,15 @@ class DbcSection(CanWheelSection, GyroKeys):
 
 
 Wheels = Annotated[
-    Union[KobukiSection, RoboteqSection, AsciiSection, OdriveSection, AgilexSection, DbcSection],
+    Union[
+        KobukiSection,
+        RoboteqSection,
+        AsciiSection,
+        WheeltecSection,
+        OdriveSection,
+        AgilexSection,
+        DbcSection,
+    ],
     Field(discriminator="source"),
 ]
 
@@ -191,6 +209,7 @@ SOURCES: dict[str, type[WheelSection]] = {
     "kobuki": KobukiSection,
     "roboteq": RoboteqSection,
     "ascii": AsciiSection,
+    "wheeltec": WheeltecSection,
     "odrive": OdriveSection,
     "agilex": AgilexSection,
     "dbc": DbcSection,

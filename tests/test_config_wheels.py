@@ -57,4 +57,7 @@ def test_only_a_twist_has_a_turn_to_reverse_and_only_wheels_have_sides() -> None
     assert isinstance(twist, DbcSection)
     assert twist.reverse_angular
     assert "has no sides to reverse" in fault({**TWIST, "reverse_left": True})
+    wheeltec = {"source": "wheeltec", "port": "/p", "track_m": 0.3}
+    assert WHEELS.validate_python({**wheeltec, "reverse_gyro": True})
+    assert "has no sides to reverse" in fault({**wheeltec, "reverse_right": True})
     assert "reverse_angular is for" in fault({**COUNTS, "reverse_angular": True})

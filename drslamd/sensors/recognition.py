@@ -16,6 +16,7 @@ from drslamd.sensors.linktrack.linktrack_frames import Kind
 from drslamd.sensors.wheels.ascii_odometry import AsciiDriver
 from drslamd.sensors.wheels.kobuki import KobukiDriver
 from drslamd.sensors.wheels.wheel_driver import SerialDriver, WheelRefusal
+from drslamd.sensors.wheels.wheeltec import WheeltecDriver
 
 LEAST_FRAMES: Final = 2
 LINKTRACK_BAUDS: Final = (921_600, 115_200, 460_800, 230_400, 1_000_000, 1_500_000, 2_000_000)
@@ -30,6 +31,7 @@ class Device(Enum):
     LINKTRACK = "LinkTrack"
     KOBUKI = "Kobuki"
     ASCII = "$ODO lines"
+    WHEELTEC = "Wheeltec"
     UNKNOWN = "something that is not understood"
     SILENT = "nothing"
 
@@ -59,6 +61,7 @@ def recognised(data: bytes) -> Recognised:
         _linktrack(data),
         _base(Device.KOBUKI, KobukiDriver(), data),
         _base(Device.ASCII, AsciiDriver(), data),
+        _base(Device.WHEELTEC, WheeltecDriver(), data),
     )
     best = max(found, key=lambda r: r.frames)
     return best if best.frames >= LEAST_FRAMES else Recognised(Device.UNKNOWN)

@@ -15,7 +15,7 @@ from drslamd.sensors.recognition import Device, Recognised
 
 USB_BASES = {"20d2:5740": "roboteq"}
 """Bases that say nothing unasked, by the USB id that only their maker uses."""
-TALKING_BASES = {Device.KOBUKI: "kobuki", Device.ASCII: "ascii"}
+TALKING_BASES = {Device.KOBUKI: "kobuki", Device.ASCII: "ascii", Device.WHEELTEC: "wheeltec"}
 LINKTRACK_BRIDGES = {"10c4:ea60", "1a86:55d4", "1a86:55d3"}
 """USB chips of LinkTrack modules, and of many other things: never written to by chance."""
 

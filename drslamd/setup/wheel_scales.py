@@ -13,6 +13,7 @@ from drslamd.config_wheels import (
     OdriveSection,
     RoboteqSection,
     WheelSection,
+    WheeltecSection,
 )
 from drslamd.sensors.wheels import agilex
 
@@ -24,7 +25,9 @@ SPEED_SIGMA = 0.01
 
 def has_two_sides(wheels: WheelSection) -> bool:
     """Is each wheel measured, or only what the whole base did?"""
-    return not (isinstance(wheels, DbcSection) and wheels.measures == "twist")
+    if isinstance(wheels, DbcSection):
+        return wheels.measures != "twist"
+    return not isinstance(wheels, WheeltecSection)
 
 
 def step_m(wheels: WheelSection) -> float | None:
@@ -33,6 +36,8 @@ def step_m(wheels: WheelSection) -> float | None:
         return 1 / agilex.COUNTS_PER_METRE
     if isinstance(wheels, OdriveSection):
         return 0.0
+    if isinstance(wheels, WheeltecSection):
+        return None
     if isinstance(wheels, (KobukiSection, RoboteqSection, AsciiSection)):
         return 1 / wheels.counts_per_metre
     assert isinstance(wheels, DbcSection)

@@ -215,6 +215,15 @@ def ascii_line(time_ms: int, left: int, right: int) -> bytes:
     return b"$%s*%02X\r\n" % (text, reduce(xor, text))
 
 
+def wheeltec_frame(
+    ahead_mmps: int, turn_mradps: int, gyro: int = 0, sideways_mmps: int = 0, stop: int = 0
+) -> bytes:
+    """At rest but for that, level, with a battery of 24 V."""
+    speeds = struct.pack(">BB3h", 0x7B, stop, ahead_mmps, sideways_mmps, turn_mradps)
+    frame = speeds + struct.pack(">6hH", 0, 0, 16384, 0, 0, gyro, 24_000)
+    return frame + bytes([reduce(xor, frame), 0x7D])
+
+
 # how bytes arrive
 
 

@@ -10,6 +10,7 @@ SECTIONS: dict[str, dict[str, Any]] = {
     "kobuki": {"port": "/p"},
     "roboteq": {"port": "/p", "track_m": 0.5, "counts_per_metre": 2000.0},
     "ascii": {"port": "/p", "track_m": 0.5, "counts_per_metre": 100.0},
+    "wheeltec": {"port": "/p", "track_m": 0.3},
     "odrive": {"left_axis": 3, "right_axis": 5, "track_m": 0.5, "wheel_radius_m": 0.1},
     "agilex": {"track_m": 0.6},
 }

@@ -12,7 +12,16 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import pytest
-from frames import SECOND_US, Peer, ascii_line, kobuki_core, kobuki_packet, node_frame3, node_frame5
+from frames import (
+    SECOND_US,
+    Peer,
+    ascii_line,
+    kobuki_core,
+    kobuki_packet,
+    node_frame3,
+    node_frame5,
+    wheeltec_frame,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -86,6 +95,12 @@ def say_ascii(wheels: WheelInput, left: float, right: float, ms: int) -> list[Mo
     return wheels.feed(ascii_line(ms, *counts(left, right)), T0 + ms * MS)
 
 
+def say_wheeltec(wheels: WheelInput, left: float, right: float, ms: int) -> list[Motion]:
+    ahead, turn = (v if math.isfinite(v) else -1e9 for v in (left, right))
+    said = (max(-(1 << 15), min(int(1000 * v), (1 << 15) - 1)) for v in (ahead, turn))
+    return wheels.feed(wheeltec_frame(*said), T0 + ms * MS)
+
+
 def say_odrive(wheels: WheelInput, left: float, right: float, ms: int) -> list[Motion]:
     out = []
     for axis, turns in ((1, right), (0, left), (1, right)):
@@ -129,6 +144,7 @@ BASES = {
     "kobuki": Base('source = "kobuki"\nport = "x"', say_kobuki),
     "roboteq": Base(f'source = "roboteq"\nport = "x"\n{SCALED}', say_roboteq),
     "ascii": Base(f'source = "ascii"\nport = "x"\n{SCALED}', say_ascii),
+    "wheeltec": Base('source = "wheeltec"\nport = "x"\ntrack_m = 0.3', say_wheeltec),
     "odrive": Base(
         'source = "odrive"\nleft_axis = 0\nright_axis = 1\ntrack_m = 0.5\nwheel_radius_m = 0.1',
         say_odrive,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 
 import pytest
+from frames import wheeltec_frame
 from lab.play.emulators import AsciiEmulator, KobukiEmulator, LinkTrackEmulator, as_heard_at
 
 from drslamd.sensors.recognition import LINKTRACK_BAUDS, Device, Recognised, recognised
@@ -42,7 +43,15 @@ def test_a_kobuki_and_lines_of_our_own_are_recognised_from_the_middle_on() -> No
     assert recognised(lines(4)[5:]) == Recognised(Device.ASCII, 3)
 
 
-@pytest.mark.parametrize("say", [kobuki, lines, lambda n: linktrack(3, 2, n)])
+def wheeltec(count: int) -> bytes:
+    return b"".join(wheeltec_frame(200 + k, 7) for k in range(count))
+
+
+def test_a_wheeltec_base_is_recognised_though_its_usb_chip_may_be_that_of_a_linktrack() -> None:
+    assert recognised(wheeltec(4)[5:]) == Recognised(Device.WHEELTEC, 3)
+
+
+@pytest.mark.parametrize("say", [kobuki, lines, wheeltec, lambda n: linktrack(3, 2, n)])
 def test_one_intact_frame_is_none_and_two_are_enough(say: object) -> None:
     assert callable(say)
     assert recognised(say(1)) == Recognised(Device.UNKNOWN)

@@ -20,13 +20,14 @@ from drslamd.sensors.frame_scanner import FrameScanner
 from drslamd.sensors.linktrack.codec import LINKTRACK, Frame, Refusal, decode
 from drslamd.sensors.linktrack.linktrack_frames import ModuleFault
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
-from drslamd.sensors.samples import GyroAngle, Twist, WheelCounts, WheelSpeeds, WheelTurns
+from drslamd.sensors.samples import GyroAngle, GyroRate, Twist, WheelCounts, WheelSpeeds, WheelTurns
 from drslamd.sensors.wheels.agilex import AgilexDriver
 from drslamd.sensors.wheels.ascii_odometry import AsciiDriver
 from drslamd.sensors.wheels.dbc import DbcDriver
 from drslamd.sensors.wheels.kobuki import KobukiDriver
 from drslamd.sensors.wheels.odrive import OdriveDriver
 from drslamd.sensors.wheels.roboteq import RoboteqDriver
+from drslamd.sensors.wheels.wheeltec import GYRO_RADPS, WheeltecDriver
 
 MS = 1000
 T0 = 100 * SECOND_US
@@ -144,6 +145,21 @@ def test_captured_kobuki_packets_give_their_counters_and_their_heading(vectors: 
     assert wrap.feed(bytes.fromhex(packets["kobuki_wrap_1"]["hex"]), T0) == []
     after = wrap.feed(bytes.fromhex(packets["kobuki_wrap_2"]["hex"]), T0 + 20 * MS)
     assert after == [WheelCounts(T0 + 20 * MS, 5, 65535, 16)]
+
+
+def test_frames_of_a_wheeltec_give_their_speeds_and_their_gyro(vectors: Path) -> None:
+    for vector in load(vectors, "wheeltec.json"):
+        driver, said = WheeltecDriver(), vector["decoded"]
+        samples = driver.feed(bytes.fromhex(vector["hex"]), T0)
+        if vector["protocol"] != "wheeltec-rx":
+            assert samples == []  # what a host says to a base
+            continue
+        turn = GYRO_RADPS * said["gyro_raw"][2]
+        assert samples == [
+            GyroRate(T0, about(turn)),
+            Twist(T0, about(said["vx_mps"]), about(said["wz_radps"])),
+        ]
+        assert driver.is_stopped == said["stop"]
 
 
 def can_frame(vector: dict[str, Any], utime: int = T0) -> CanFrame:

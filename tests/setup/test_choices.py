@@ -20,6 +20,8 @@ from drslamd.setup.choices import (
 
 MODULE = PortFound("/dev/m", Recognised(Device.LINKTRACK, 9, 7), 460_800)
 OTHER_MODULE = MODULE._replace(path="/dev/m2")
+WHEELTEC = PortFound("/dev/w", Recognised(Device.WHEELTEC, 9), 115_200, "1a86:55d4")
+"""Its USB chip is one that LinkTrack modules have, too."""
 KOBUKI = PortFound("/dev/k", Recognised(Device.KOBUKI, 9), 115_200)
 LINES = PortFound("/dev/a", Recognised(Device.ASCII, 9), 57_600)
 QUIET = PortFound("/dev/q", Recognised(Device.SILENT))
@@ -57,6 +59,7 @@ def test_a_port_that_was_named_is_the_module_whoever_speaks_there() -> None:
         (KOBUKI, "kobuki", {"port": "/dev/k"}),
         (LINES, "ascii", {"port": "/dev/a", "baud": 57_600}),
         (ROBOTEQ, "roboteq", {"port": "/dev/r"}),
+        (WHEELTEC, "wheeltec", {"port": "/dev/w"}),
         (QUIET._replace(answers="roboteq", baud=115_200), "roboteq", {"port": "/dev/q"}),
     ],
 )

@@ -16,6 +16,7 @@ BASES: dict[str, dict[str, Any]] = {
     "kobuki": PORT,
     "roboteq": {**PORT, "counts_per_metre": 1000, "track_m": 0.5, "swap_channels": True},
     "ascii": {**PORT, "baud": 57_600, "counts_per_metre": 4000.5, "track_m": 0.3},
+    "wheeltec": {**PORT, "track_m": 0.3},
     "odrive": {"left_axis": 0, "right_axis": 1, "track_m": 0.5, "wheel_radius_m": 0.085},
     "agilex": {"track_m": 0.6, "can.channel": "can1"},
     "dbc": {

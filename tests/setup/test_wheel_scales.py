@@ -27,6 +27,7 @@ from drslamd.setup.wheel_scales import (
         (wheels("ascii"), 0.01),
         (wheels("odrive"), 0.0),
         (wheels("agilex"), 0.001),
+        (wheels("wheeltec"), None),
         (COUNTS, 0.0025),
         (SPEEDS, None),
         (TWIST, None),
@@ -93,8 +94,10 @@ def test_swapped_sides_have_a_remedy(section: WheelSection, remedy: str) -> None
     assert swap_remedy(section) == remedy
 
 
-def test_only_a_twist_has_no_sides() -> None:
+def test_only_what_says_a_twist_has_no_sides() -> None:
     assert not has_two_sides(TWIST)
+    assert not has_two_sides(wheels("wheeltec"))
+    assert scale_key(wheels("wheeltec"), 1.25) == ""
     assert all(has_two_sides(w) for w in (COUNTS, SPEEDS, wheels("agilex"), wheels("kobuki")))
 
 

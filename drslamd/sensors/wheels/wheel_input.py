@@ -22,6 +22,7 @@ from drslamd.config_wheels import (
     OdriveSection,
     RoboteqSection,
     WheelSection,
+    WheeltecSection,
 )
 from drslamd.conventions import SECOND_US
 from drslamd.events import CanFrame
@@ -41,6 +42,7 @@ from drslamd.sensors.wheels.wheel_driver import (
     SerialDriver,
     WheelRefusal,
 )
+from drslamd.sensors.wheels.wheeltec import WheeltecDriver
 
 SILENCE_US: Final = SECOND_US
 """The slowest base that is any use sends twice a second."""
@@ -68,6 +70,10 @@ def _ascii(section: AsciiSection, _dbc_text: str) -> Source:
     return Source(AsciiDriver(), section.counts_per_metre)
 
 
+def _wheeltec(_section: WheeltecSection, _dbc_text: str) -> Source:
+    return Source(WheeltecDriver(), 1.0)
+
+
 def _odrive(section: OdriveSection, _dbc_text: str) -> Source:
     driver = OdriveDriver(section.left_axis, section.right_axis)
     return Source(driver, section.gear / (2 * math.pi * section.wheel_radius_m))
@@ -87,6 +93,7 @@ SOURCES: Final[dict[type[WheelSection], Callable[[Any, str], Source]]] = {
     KobukiSection: _kobuki,
     RoboteqSection: _roboteq,
     AsciiSection: _ascii,
+    WheeltecSection: _wheeltec,
     OdriveSection: _odrive,
     AgilexSection: _agilex,
     DbcSection: _dbc,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,7 +16,7 @@ def test_what_is_told_to_nobody_costs_nothing(monkeypatch: pytest.MonkeyPatch) -
     def work(*_: Any) -> None:
         now[0] += 0.25
 
-    monkeypatch.setattr(busy_daemon.time, "thread_time", lambda: now[0])
+    monkeypatch.setattr(time, "thread_time", lambda: now[0])
     socket = SimpleNamespace(has_readers=False, tell=work)
     near = SimpleNamespace(on_motion=work)
     daemon: Any = SimpleNamespace(_near=socket, robot=SimpleNamespace(near=near))

@@ -43,6 +43,7 @@ WHEELS = {
     "track_m = 0.5\nmax_speed_mps = 2\n",
     "ascii": 'source = "ascii"\nport = "/dev/none"\ncounts_per_metre = 1000\n'
     "track_m = 0.5\nmax_speed_mps = 2\n",
+    "wheeltec": 'source = "wheeltec"\nport = "/dev/none"\ntrack_m = 0.5\nmax_speed_mps = 2\n',
     "odrive": 'source = "odrive"\nwheel_radius_m = 0.1\n'
     "left_axis = 0\nright_axis = 1\ntrack_m = 0.5\nmax_speed_mps = 2\n"
     '[wheels.can]\nchannel = "can0"\n',
