@@ -74,9 +74,13 @@ def inlier_scatter(
     squares = (errors / sigmas) ** 2
     scatter = np.ones(pairs)
     for _ in range(ROUNDS):
-        weights = 1 / np.square(1 + squares / ((sigmas_cut * scatter) ** 2)[pair])
-        total = np.bincount(pair, GAUSSIAN * weights * squares, pairs)
+        weights = squares * ((sigmas_cut * scatter) ** -2)[pair]
+        weights += 1
+        np.divide(1, weights, out=weights)
+        weights *= weights
         count = np.bincount(pair, weights, pairs)
+        weights *= squares
+        total = GAUSSIAN * np.bincount(pair, weights, pairs)
         scatter = np.sqrt((PRIOR_RANGES + total) / (PRIOR_RANGES + count))
         scatter = np.minimum(np.maximum(scatter, LEAST_SCATTER), 1.0)
     return scatter

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +19,8 @@ from drslamd.conventions import Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.pose_graph import PoseGraph
-from drslamd.slam.graph.tables import ClosureTable, KeyframeTable
-from drslamd.slam.graph.thinning.pair_view import PairView
+from drslamd.slam.graph.tables import KeyframeTable
+from drslamd.slam.graph.thinning.joints import Joint
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.se2 import Array, Index
 
@@ -82,43 +81,9 @@ def group_with(chains: Set[Chain], graph: PoseGraph) -> set[Segment]:
     return min(found, key=min, default=set())
 
 
-class Joint(NamedTuple):
-    """Two segments, and the closures that join them.
-
-    Attributes:
-        tells_place_only: do these say where b stood and nothing of its heading?
-    """
-
-    a: Segment
-    b: Segment
-    closures: ClosureTable
-    tells_place_only: bool = False
-
-
 def joints(graph: PoseGraph) -> list[Joint]:
     """Segments that are joined by closures whose both keyframes are held."""
-    out = []
-    for pair in graph.view.pairs:
-        if not len(pair.closures):
-            continue
-        a, b = (graph.view.chains[chain.robot].keyframes for chain in (pair.a, pair.b))
-        if a.is_one_segment and b.is_one_segment:
-            out.append(_joint(pair, int(a.rows[0, 1]), int(b.rows[0, 1]), pair.closures))
-            continue
-        at_a, _ = a.find(pair.closures.a_n)
-        at_b, _ = b.find(pair.closures.b_n)
-        ends = np.stack([a.segment[at_a], b.segment[at_b]], axis=-1)
-        for one, other in np.unique(ends, axis=0).tolist():
-            these = pair.closures.chosen((ends == (one, other)).all(axis=1))
-            out.append(_joint(pair, one, other, these))
-    return out
-
-
-def _joint(pair: PairView, one: int, other: int, these: ClosureTable) -> Joint:
-    """Of two segments; who says a whole pose is believed before who says but a place."""
-    whole = ~these.tells_place_only
-    found = these.chosen(whole) if whole.any() else these
-    return Joint(Segment(*pair.a, one), Segment(*pair.b, other), found, not whole.any())
+    return graph.view.joints
 
 
 def gauge_segment(group: set[Segment], living: set[int]) -> Segment | None:

@@ -104,8 +104,8 @@ class CarriedEnds:
 
     @cached_property
     def shifts(self) -> Array:
-        """(c, 2, 2) the same as x + iy."""
-        return np.asarray(self.moves @ [1, 1j])
+        """(2, 2, c) the same as x + iy: of q_i and q_j, by yaw rate and scale."""
+        return np.ascontiguousarray((self.moves @ [1, 1j]).transpose(1, 2, 0))
 
     @staticmethod
     def none() -> CarriedEnds:
@@ -171,16 +171,22 @@ class RangeFactors:
         taken out, each antenna where it really is."""
         (arm_i, arm_j), carried = (end.copy() for end in self._points), self.carried
         if len(carried.rows):
-            constants = np.stack([calibration.yaw, calibration.scale], axis=-1)
-            of_end = constants[self.robots[carried.rows]]
-            moved = (of_end * carried.shifts).sum(axis=2)
-            arm_i[carried.rows] -= moved[:, 0]
-            arm_j[carried.rows] -= moved[:, 1]
+            for end, arm in enumerate((arm_i, arm_j)):
+                robot = self.carriers[end]
+                by_yaw, by_scale = carried.shifts[end]
+                arm[carried.rows] -= (
+                    calibration.yaw[robot] * by_yaw + calibration.scale[robot] * by_scale
+                )
         if calibration.antenna.any():
             beside = calibration.antenna @ [1, 1j]
             for end, arm in enumerate((arm_i, arm_j)):
                 arm += beside[self.robots[:, end]] * np.exp(1j * self.turned[:, end])
         return arm_i, arm_j
+
+    @cached_property
+    def carriers(self) -> Index:
+        """(2, c) whose odometry has carried q_i and q_j of those that were."""
+        return np.ascontiguousarray(self.robots[self.carried.rows].T)
 
     @cached_property
     def _points(self) -> tuple[Array, Array]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from hashlib import blake2b
 from itertools import islice
 
@@ -13,6 +14,7 @@ from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.pair_data import PairData
 from drslamd.slam.graph.tables import KeyframeTable
 from drslamd.slam.graph.thinning.chain_view import ChainThinning, ChainView
+from drslamd.slam.graph.thinning.joints import Joint, joints_of
 from drslamd.slam.graph.thinning.pair_view import PairThinning, PairView
 from drslamd.slam.graph.thinning.rounding import as_digested
 from drslamd.slam.graph.thinning.thinned_pairs import thinned_pairs
@@ -33,6 +35,11 @@ class GraphView:
     chains: Mapping[int, ChainView]
     pairs: list[PairView]
     shifts: Mapping[int, float]
+
+    @cached_property
+    def joints(self) -> list[Joint]:
+        """Of all segments that are joined."""
+        return joints_of(self.chains, self.pairs)
 
     def segment(self, segment: Segment) -> KeyframeTable:
         """The keyframes of a segment that stay."""

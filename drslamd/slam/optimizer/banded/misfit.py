@@ -73,7 +73,12 @@ class Misfit:
             group: (m,) to which each link belongs.
         """
         s, g = (np.bincount(group, each, count) for each in (self.squares, self.checked))
-        return np.asarray((s + DOUBT) / (np.maximum(g, 0.0) + DOUBT))
+        return ratio_of(s, g)
+
+
+def ratio_of(s: Array, g: Array) -> Array:
+    """(count,) s / g of groups, from their sums."""
+    return np.asarray((s + DOUBT) / (np.maximum(g, 0.0) + DOUBT))
 
 
 def misfit(equations: Equations, point: Point, factor: BandFactor) -> Misfit:
@@ -84,7 +89,7 @@ def misfit(equations: Equations, point: Point, factor: BandFactor) -> Misfit:
     """
     problem = equations.problem
     jacobian = linearised.odometry_jacobian(problem, point.poses)
-    squares, information = _squares(problem, point)
+    squares, information = squares_of(problem, point), problem.odometry.information
     blocks = factor.covariance_blocks(equations.layout.odometry_unknowns(problem.odometry))
     if blocks is None:
         return Misfit(squares, np.zeros(len(squares)))
@@ -99,7 +104,7 @@ def guessed_misfit(equations: Equations, point: Point, factor: Solver) -> Misfit
     """
     problem, layout = equations.problem, equations.layout
     jacobian = linearised.odometry_jacobian(problem, point.poses)
-    squares, information = _squares(problem, point)
+    squares, information = squares_of(problem, point), problem.odometry.information
     signs = np.random.default_rng(0).choice([-1.0, 1.0], (len(jacobian), 3, PROBES))
     whitened = np.swapaxes(np.linalg.cholesky(information), 1, 2) @ jacobian
     unknowns = layout.odometry_unknowns(problem.odometry)
@@ -115,11 +120,10 @@ def guessed_misfit(equations: Equations, point: Point, factor: Solver) -> Misfit
     return Misfit(squares, 3 - seen.sum(axis=(1, 2)) / PROBES)
 
 
-def _squares(problem: Problem, point: Point) -> tuple[Array, Array]:
-    """e' W e (m,) and W (m, 3, 3)."""
-    information = problem.odometry.information
-    squares: Array = np.einsum("ki,kij,kj->k", point.link, information, point.link)
-    return squares, information
+def squares_of(problem: Problem, point: Point) -> Array:
+    """(m,) e' W e of each link."""
+    weighed = (problem.odometry.information @ point.link[..., None])[..., 0]
+    return np.asarray((point.link * weighed).sum(axis=1))
 
 
 def outliers(problem: Problem, point: Point) -> NDArray[np.bool_]:

@@ -38,32 +38,35 @@ class Elimination:
 
     Attributes:
         own, below: their numbers (c,), and those (r,) of the unknowns that they reach.
-        inverse: (c, c) L^-1; gain: (r, c) G; aside: (c, b) V, of the border as it was then;
-            of 32 bits, as are the vectors.
+        inverse: (c, c) L^-1; onwards: (r + b, c) G, then V' of the border as it was then; of 32
+            bits, as are the vectors.
     """
 
     own: Index | slice
     below: Index | slice
     inverse: Singles
-    gain: Singles
-    aside: Singles
+    onwards: Singles
 
     @staticmethod
     def of(
         own: Index | slice, below: Index | slice, inverse: Array, gain: Array, aside: Array
     ) -> Elimination:
-        return Elimination(own, below, *(part.astype(SINGLE) for part in (inverse, gain, aside)))
+        onwards = np.concatenate([gain, aside.T]).astype(SINGLE)
+        return Elimination(own, below, inverse.astype(SINGLE), onwards)
 
     def forward(self, inner: Singles, outer: Singles) -> None:
         """The way of right-hand sides inner (n, ...) and of the border, outer (b, ...), down."""
         inner[self.own] = own = self.inverse @ inner[self.own]
-        inner[self.below] -= self.gain @ own
-        outer[: self.aside.shape[1]] -= self.aside.T @ own
+        change = self.onwards @ own
+        below = inner[self.below]
+        inner[self.below] = below - change[: len(below)]
+        outer[: len(change) - len(below)] -= change[len(below) :]
 
     def backward(self, inner: Singles, outer: Singles) -> None:
         """And back up, with what lies below known."""
-        known = self.gain.T @ inner[self.below] + self.aside @ outer[: self.aside.shape[1]]
-        inner[self.own] = self.inverse.T @ (inner[self.own] - known)
+        below = inner[self.below]
+        known = np.concatenate([below, outer[: len(self.onwards) - len(below)]])
+        inner[self.own] = self.inverse.T @ (inner[self.own] - self.onwards.T @ known)
 
 
 @dataclass(frozen=True)

@@ -113,12 +113,13 @@ def _of_odometry(
     carried, ranges = problem.ranges.carried, problem.ranges
     if len(carried.rows):
         seen = of_ranges[carried.rows] * point.sight.direction[carried.rows]
+        back = np.exp(-1j * point.poses[:, 2])
         for end, (pose, sign) in enumerate(((ranges.i, 1), (ranges.j, -1))):
-            back = sign * seen * np.exp(-1j * point.poses[pose[carried.rows], 2])
-            by = (np.conj(back)[:, None] * carried.shifts[:, end]).real
-            robot = ranges.robots[carried.rows, end]
-            yaw += np.bincount(robot, by[:, 0], robots)
-            scale += np.bincount(robot, by[:, 1], robots)
+            here = sign * seen * back[pose[carried.rows]]
+            robot = ranges.carriers[end]
+            for sums, shift in zip((yaw, scale), carried.shifts[end], strict=True):
+                by = here.real * shift.real + here.imag * shift.imag
+                sums += np.bincount(robot, by, robots)
     return scale, yaw
 
 

@@ -27,6 +27,7 @@ from drslamd.slam.optimizer.kept.kept_factor import (
     Current,
     KeptFactor,
 )
+from drslamd.slam.optimizer.kept.quick_check import Checked
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.se2 import Array
@@ -79,13 +80,15 @@ class Kept:
     Attributes:
         downwards: of the system that leads to the solution; claimed: of what may be claimed there.
         sure: when that was made.
-        variances: of the mountings, see `mountings.variances`.
+        variances: of the mountings, see `mountings.variances`; checked: of odometry; both of when
+            `downwards` was made.
     """
 
     downwards: KeptFactor
     claimed: KeptFactor
     sure: Sureness
     variances: Array
+    checked: Checked
 
 
 def solve(
@@ -121,7 +124,8 @@ def _solved(
     variances = kept.variances if kept else mountings.variances(equations, point, current)
     if variances is None:
         return None
-    ratio = quick_check.misfit_as_modelled(equations, point, current, variances)
+    checked = kept.checked if kept else Checked.of(equations, point, current)
+    ratio = quick_check.misfit_as_modelled(problem, point, checked, variances)
     if ratio is None:
         return None
     scatter = claims.scatter_of(problem, point)
@@ -136,7 +140,7 @@ def _solved(
     held = _grown(claimed, believed)
     if found is None or downwards is None or held is None:
         return None
-    after = Kept(downwards, held, kept.sure if kept and known else sure, variances)
+    after = Kept(downwards, held, kept.sure if kept and known else sure, variances, checked)
     return _said(equations, point, scatter, sure.feared, *found), after
 
 

@@ -6,6 +6,8 @@ answer that says yes is one; when it is no, `banded_solver` looks closer.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +24,8 @@ from drslamd.slam.optimizer.banded.misfit import (
     RUN,
     guessed_misfit,
     outliers,
+    ratio_of,
+    squares_of,
 )
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
@@ -30,23 +34,53 @@ from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array, Index
 
 
+@dataclass(frozen=True)
+class Checked:
+    """What the other measurements could check of each robot's odometry, some seconds ago.
+
+    It grows with the way, as the links do. To compute it takes as long as several steps, and a
+    sigma goes with the fourth root of it.
+
+    Attributes:
+        freedom: (robots,) g, see `misfit`; links: (robots,) of so many.
+    """
+
+    freedom: Array
+    links: Array
+
+    @staticmethod
+    def of(equations: Equations, point: Point, matrix: Solver) -> Checked:
+        """
+        Args:
+            equations: in the layout of `matrix`.
+        """
+        odometry, robots = equations.problem.odometry, len(equations.problem.priors.scale)
+        checked = guessed_misfit(equations, point, matrix).checked
+        freedom = np.bincount(odometry.robot, checked, robots)
+        return Checked(freedom, np.bincount(odometry.robot, minlength=robots).astype(float))
+
+    def ratio(self, problem: Problem, point: Point) -> Array:
+        """(robots,) s / g now."""
+        robot, robots = problem.odometry.robot, len(self.links)
+        squares = np.bincount(robot, squares_of(problem, point), robots)
+        links = np.bincount(robot, minlength=robots)
+        return ratio_of(squares, self.freedom * links / np.maximum(self.links, 1.0))
+
+
 def misfit_as_modelled(
-    equations: Equations, point: Point, matrix: Solver, variances: Array
+    problem: Problem, point: Point, checked: Checked, variances: Array
 ) -> Array | None:
     """(robots,) s / g of odometry, see `misfit`; None where something may not be as modelled.
 
     Args:
-        equations: in the layout of `matrix`.
         variances: of the mountings, see `mountings.variances`; they may be of some seconds ago.
     """
-    problem = equations.problem
     if has_runs(problem, point):
         return None
     pull = mounting_pulls(problem, point)
     if mountings.scored(problem, pull, variances).ask():
         return None
-    misfit = guessed_misfit(equations, point, matrix)
-    ratio = misfit.ratio(problem.odometry.robot, len(problem.priors.scale))
+    ratio = checked.ratio(problem, point)
     return ratio if (ratio <= SUSPICIOUS).all() else None
 
 
