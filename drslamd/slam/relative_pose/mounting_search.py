@@ -56,6 +56,8 @@ FITS = 0.7
 """Chi-squared per degree of freedom of windows that a track, a scale or a curve really explains: it
 is 0.2 to 0.6, because noise is allowed for generously. Where sight is blocked it is more, whatever
 is tried."""
+MUCH = 0.6
+"""Of chi-squared that is left where a track, a scale or a curve explains some of it."""
 INDIFFERENT = -5.0
 """Who drives straight for long is the same in a mirror: then what is configured is believed. So is
 it against wheels of unlike size: healthy pairs are confirmed as soon as without, of six with bent
@@ -208,8 +210,9 @@ class MountingSearch:
         self._answers.append(_Answer(costs, measurements - 3))
         if self.found is not None:
             return self._refine(self.found)
-        newest = [answer.costs for answer in self._answers][-FEWEST_ASKED:]
-        self.is_confirmed |= is_as_configured(np.sum(newest, axis=0), is_mirror_told)
+        newest = list(self._answers)[-FEWEST_ASKED:]
+        chi2, degrees = np.sum([n.costs for n in newest], axis=0), sum(n.freedom for n in newest)
+        self.is_confirmed |= is_as_configured(chi2, degrees, is_mirror_told)
         asked = len(self._answers)
         if asked < FEWEST_ASKED:
             return False
@@ -244,16 +247,23 @@ class MountingSearch:
         return self.found != found
 
 
-def is_as_configured(chi2: Array, is_mirror_told: bool) -> bool:
+def is_as_configured(chi2: Array, freedom: float, is_mirror_told: bool) -> bool:
     """Do windows exclude that wheels run backwards, and is no other mistake better?
 
+    Where nothing fits, as when sight is blocked, a track, a scale or a curve is better by chance:
+    none of them counts that does not explain what is left.
+
     Args:
-        chi2: (cases,) of up to three windows.
+        chi2: (cases,) of up to three windows; freedom: degrees of it.
     """
     worse = chi2 - chi2[0]
     # (short ways hardly tell a slight curve from none)
     least = [INDIFFERENT if is_curve(case) else 0.0 for case in CASES]
-    return bool((worse >= least).all() and _backwards(worse, is_mirror_told) >= EXCLUDED)
+    backwards = _backwards(worse, is_mirror_told) / max(chi2[0] / freedom, 1.0)
+    others = np.delete(np.arange(len(CASES)), BACKWARDS)
+    explains = chi2[others].min() <= max(FITS * freedom, MUCH * chi2[0])
+    is_none_better = bool((worse >= least).all())
+    return bool(backwards >= EXCLUDED and (is_none_better or not explains))
 
 
 def against_backwards(chi2: Array, freedom: int) -> float:

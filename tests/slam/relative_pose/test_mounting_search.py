@@ -26,6 +26,7 @@ from drslamd.slam.relative_pose.mounting_search import (
     MANY,
     MOST,
     MOST_ASKED,
+    MUCH,
     QUICKLY_US,
     RECENT,
     SHARED,
@@ -154,7 +155,7 @@ def test_a_pair_is_not_confirmed_where_a_curve_is_better_by_more_than_chance(
     by: float, confirms: bool
 ) -> None:
     chi2 = costs({AS_IT_IS: FIT, Case(a=CURVES[2]): FIT + by})
-    assert is_as_configured(chi2, True) is confirms
+    assert is_as_configured(chi2, FREEDOM, True) is confirms
 
 
 def test_what_is_configured_wins_nothing() -> None:
@@ -191,7 +192,37 @@ def test_windows_must_exclude_wheels_that_run_backwards_and_find_no_other_mistak
     case: Case, by: float, is_told: bool, confirms: bool
 ) -> None:
     """A robot that hardly drove is the same in a mirror, and is not asked about that."""
-    assert is_as_configured(costs({AS_IT_IS: FIT, case: FIT + by}), is_told) is confirms
+    assert is_as_configured(costs({AS_IT_IS: FIT, case: FIT + by}), FREEDOM, is_told) is confirms
+
+
+@pytest.mark.parametrize(
+    ("level", "left", "confirms"),
+    [
+        # nothing explains what blocked sight does, whatever is a little better
+        (2.0, MUCH + LITTLE, True),
+        (2.0, MUCH - LITTLE, False),
+        # what fits well explains it, and what fits well as configured is told from it
+        (1.1, FITS / 1.1 + LITTLE, True),
+        (1.1, FITS / 1.1 - LITTLE, False),
+        (FITS - LITTLE, 0.9, False),
+    ],
+)
+@pytest.mark.parametrize("case", [TRACK, SCALE, Case(a=CURVES[2])])
+def test_where_nothing_fits_only_what_explains_it_speaks_against_the_configuration(
+    case: Case, level: float, left: float, confirms: bool
+) -> None:
+    chi2 = level * FREEDOM
+    assert is_as_configured(costs({AS_IT_IS: chi2, case: left * chi2}), FREEDOM, True) is confirms
+
+
+@pytest.mark.parametrize("level", [0.5, 1.0, 3.0])
+def test_windows_that_fit_badly_must_exclude_backwards_by_multiples_of_how_badly(
+    level: float,
+) -> None:
+    chi2, unit = level * FREEDOM, max(level, 1.0)
+    for by, confirms in ((EXCLUDED + LITTLE, True), (EXCLUDED - LITTLE, False)):
+        known = costs({AS_IT_IS: chi2, LEFT: chi2 + by * unit})
+        assert is_as_configured(known, FREEDOM, True) is confirms
 
 
 def test_a_pair_is_confirmed_once_and_for_all() -> None:
