@@ -90,11 +90,14 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
     bases = [(equations, nominal, check)]
     if check.scores.ask():
         mounted, better = mountings.fitted(equations, nominal, check.scores, most, tolerance)
-        again = _checked(mounted, better)
-        if better.converged and _fits(mounted, better) and again.is_passed():
+        again, gain = _checked(mounted, better), _gain(equations, nominal, mounted, better)
+        is_worth = better.converged and gain >= check.scores.least_gain()
+        if is_worth and _fits(mounted, better) and again.is_passed():
             return _as_is(mounted, better, again.ratio)
-        if better.converged and _gain(equations, nominal, mounted, better) > MUCH:
+        if is_worth and gain > MUCH and check.scores.ask_alone():
             bases.insert(0, (mounted, better, again))
+        if check.is_passed() and not check.scores.ask_alone():
+            return _as_is(equations, nominal, check.ratio)
     for base, point, said in bases:
         levels = odometry_levels.levelled(base, point, said.ratio, said.runs, most, tolerance)
         seen = np.sqrt(levels.seen)

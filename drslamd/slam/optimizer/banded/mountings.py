@@ -26,6 +26,14 @@ from drslamd.slam.se2 import Array, Index
 ASKED_FOR = 30.0
 """Score; with mountings as configured it stays below 10, and below 25 where biases move with
 bearing; a track or an antenna that is far off scores 65 to 400."""
+BESIDE = 22.0
+"""Likewise of an antenna beside another one that is off: with one of them let go the other bends
+until it fits."""
+TOGETHER = 18.0
+"""Score of all antennas together, for each robot: where two are off each hides the other. As
+configured it is 4 at most."""
+WORTH = 25.0
+"""What the cost must really lose, for each robot, where they only ask together."""
 WITHOUT_DATA = 0.1
 """Sigma, a fraction or m, that a score takes for granted; what moves no error scores nothing."""
 FIRST = 8
@@ -36,14 +44,27 @@ ROUNDS = 4
 
 @dataclass(frozen=True)
 class Scores:
-    """(robots,) each."""
+    """
+    Attributes:
+        track, antenna: (robots,) each.
+        antennas: of all of them together.
+    """
 
     track: Array
     antenna: Array
+    antennas: float = 0.0
 
     def ask(self) -> bool:
         """Does any mounting ask to be let go?"""
+        return self.ask_alone() or self.antennas > TOGETHER * len(self.track)
+
+    def ask_alone(self) -> bool:
+        """By its own score?"""
         return bool((np.append(self.track, self.antenna) > ASKED_FOR).any())
+
+    def least_gain(self) -> float:
+        """What letting go must take off the cost."""
+        return 0.0 if self.ask_alone() else WORTH * len(self.track)
 
 
 def scores(equations: Equations, point: Point, factor: Solver) -> Scores:
@@ -72,7 +93,13 @@ def scored(problem: Problem, pull: Array, left: Array) -> Scores:
     blocks = left[pairs[:, :, None], pairs[:, None, :]]
     moved = np.linalg.solve(blocks, pull[pairs][..., None])[..., 0]
     antenna = (pull[pairs] * moved).sum(axis=1)
-    return Scores(np.where(doubted.track, 0.0, track), np.where(doubted.antenna, 0.0, antenna))
+    held = pairs[~doubted.antenna].ravel()
+    antennas = pull[held] @ np.linalg.solve(left[np.ix_(held, held)], pull[held])
+    return Scores(
+        np.where(doubted.track, 0.0, track),
+        np.where(doubted.antenna, 0.0, antenna),
+        float(antennas),
+    )
 
 
 def variances(equations: Equations, point: Point, factor: Solver) -> Array | None:
@@ -124,10 +151,13 @@ def _parts(equations: Equations, point: Point) -> tuple[tuple[Linearised, Index,
 
 
 def let_go(doubted: Doubted, found: Scores) -> Doubted:
-    """Also those whose score asks for it."""
-    return Doubted(
-        doubted.track | (found.track > ASKED_FOR), doubted.antenna | (found.antenna > ASKED_FOR)
-    )
+    """Also those whose score asks for it; all antennas where they only ask together."""
+    alone = doubted.antenna | (found.antenna > ASKED_FOR)
+    if alone.any():
+        antenna = alone | (found.antenna > BESIDE)
+    else:
+        antenna = np.full(len(alone), found.ask() and not found.ask_alone())
+    return Doubted(doubted.track | (found.track > ASKED_FOR), antenna)
 
 
 def fitted(

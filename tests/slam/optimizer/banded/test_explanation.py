@@ -31,7 +31,7 @@ from drslamd.slam.optimizer.banded.misfit import (
     outlier_share,
     runs,
 )
-from drslamd.slam.optimizer.banded.mountings import Scores
+from drslamd.slam.optimizer.banded.mountings import TOGETHER, WORTH, Scores
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import Levels
@@ -366,6 +366,20 @@ def test_mountings_that_leave_many_outliers_are_not_enough(
     scene.is_passed_later = True
     monkeypatch.setattr(explanation, "outlier_share", lambda *_: np.array([0.0, share]))
     assert (scene.explained().equations is scene.mounted) is (share < 0.06)
+
+
+@pytest.mark.parametrize(("gain", "is_taken"), [(2 * WORTH - 1, False), (2 * WORTH + 1, True)])
+def test_antennas_that_only_ask_together_must_be_worth_it(
+    gain: float, is_taken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else all stays as it was, for odometry and ranges fit."""
+    scene = Asked(monkeypatch, gain)
+    none = np.zeros(2)
+    together = explanation._Check(np.ones(2), [], Scores(none, none, 2 * TOGETHER + 1))
+    monkeypatch.setattr(explanation, "_checked", lambda *_: together)
+    found = scene.explained()
+    assert found.equations is (scene.mounted if is_taken else scene.equations)
+    assert scene.levelled == []
 
 
 def test_mountings_whose_solution_was_not_reached_are_not_taken(

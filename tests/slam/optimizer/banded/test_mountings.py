@@ -20,7 +20,7 @@ from slam_problems import held_at, mismeasured, mismounted, team_problem
 
 from drslamd.slam.optimizer.banded import mountings
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
-from drslamd.slam.optimizer.banded.mountings import Scores, fitted, let_go, scores
+from drslamd.slam.optimizer.banded.mountings import WORTH, Scores, fitted, let_go, scores
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
@@ -74,9 +74,10 @@ def dense_scores(problem: Problem, point: Point) -> Scores:
     blocks = [[k] for k in range(robots)] + [
         [robots + 2 * k, robots + 2 * k + 1] for k in range(robots)
     ]
+    blocks.append([robots + k for k in range(2 * robots) if not kept[robots + k]])
     for block in blocks:
-        at = first + np.array(block)
-        if kept[block].any():
+        at = first + np.array(block, dtype=int)
+        if kept[block].any() or not block:
             found.append(0.0)
             continue
         across = bare[np.ix_(inside, at)]
@@ -85,7 +86,7 @@ def dense_scores(problem: Problem, point: Point) -> Scores:
         )
         left += 100 * np.eye(len(block))
         found.append(float(pull[at] @ np.linalg.solve(left, pull[at])))
-    return Scores(np.array(found[:robots]), np.array(found[robots:]))
+    return Scores(np.array(found[:robots]), np.array(found[robots:-1]), found[-1])
 
 
 @pytest.mark.parametrize(
@@ -103,6 +104,7 @@ def test_scores_are_those_of_the_dense_matrices(doubted: Doubted) -> None:
     expected = dense_scores(equations.problem, point)
     assert found.track == pytest.approx(expected.track, rel=1e-3, abs=1e-3)
     assert found.antenna == pytest.approx(expected.antenna, rel=1e-3, abs=1e-3)
+    assert found.antennas == pytest.approx(expected.antennas, rel=1e-3, abs=1e-3)
     assert (found.track[doubted.track] == 0).all()
     assert (found.antenna[doubted.antenna] == 0).all()
     assert min(found.track.min(), found.antenna.min()) >= 0
@@ -130,6 +132,7 @@ def test_mountings_as_configured_do_not_ask(seed: int) -> None:
     found = scored(team_problem(seed, robots=3, count=60)[0])
     assert not found.ask()
     assert max(found.track.max(), found.antenna.max()) < 20
+    assert found.antennas < 30
 
 
 @pytest.mark.parametrize("robot", [0, 2])
@@ -173,9 +176,45 @@ def test_a_mounting_asks_beyond_thirty(score: float, asks: bool) -> None:
     wider = let_go(doubts((0,), (), 2), Scores(high, low))
     assert wider.track.tolist() == [True, asks]
     assert wider.antenna.tolist() == [False, False]
-    wider = let_go(doubts((), (0,), 2), Scores(low, high))
+    wider = let_go(doubts((), (), 2), Scores(low, high))
     assert wider.track.tolist() == [False, False]
-    assert wider.antenna.tolist() == [True, asks]
+    assert wider.antenna.tolist() == [False, asks]
+
+
+@pytest.mark.parametrize(
+    ("score", "robots", "asks"), [(53, 3, False), (55, 3, True), (37, 2, True)]
+)
+def test_all_antennas_ask_together_beyond_eighteen_for_each_robot(
+    score: float, robots: int, asks: bool
+) -> None:
+    found = Scores(np.zeros(robots), np.full(robots, 12.0), score)
+    assert found.ask() is asks
+    assert not found.ask_alone()
+    wider = let_go(Doubted.none(robots), found)
+    assert wider.antenna.tolist() == [asks] * robots
+    assert not wider.track.any()
+    # what they take off the cost must be worth it
+    assert found.least_gain() == WORTH * robots
+    assert replace(found, antenna=np.full(robots, 31.0)).least_gain() == 0
+
+
+@pytest.mark.parametrize(("score", "is_let_go"), [(21.9, False), (22.1, True)])
+def test_an_antenna_beside_one_that_is_off_asks_sooner(score: float, is_let_go: bool) -> None:
+    none = np.zeros(2)
+    for doubted, first in ((doubts((), (0,), 2), 0.0), (doubts((), (), 2), 31.0)):
+        wider = let_go(doubted, Scores(none, np.array([first, score])))
+        assert wider.antenna.tolist() == [True, is_let_go]
+    assert not let_go(doubts((), (), 2), Scores(none, np.array([0.0, score]))).any()
+
+
+def test_two_antennas_that_are_off_alike_are_found_though_each_hides_the_other() -> None:
+    """By 0.3 m ahead, as where a team was mounted alike."""
+    beside = ((0.3, 0.0), (0.3, 0.0))
+    problem, truth = team_problem(7, robots=2, count=90, range_error=0.03)
+    problem = mismounted(held_at(problem, truth), truth, antenna=beside)
+    equations, point = fit(problem)
+    assert equations.problem.doubted.antenna.tolist() == [True, True]
+    assert point.calibration.antenna == pytest.approx(np.array(beside), abs=0.1)
 
 
 def fit(problem: Problem) -> tuple[Equations, Point]:
