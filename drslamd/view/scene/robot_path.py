@@ -11,12 +11,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drslamd.conventions import GRID_US, SECOND_US, Chain
 from drslamd.gossip.message_types import Pose, PoseState
 from drslamd.slam import se2
 from drslamd.slam.graph.measurements import Keyframe
 from drslamd.slam.odometry.track import RESOLUTION
+from drslamd.slam.relocation.relocation import ANY_HEADING_RAD
 from drslamd.slam.se2 import Array
 from drslamd.view.scene.rows import Rows
 
@@ -40,10 +42,12 @@ DUE_S = 1.5
 """A robot that moves has made another keyframe after this time."""
 BY_ODOMETRY = 9
 """In the place of a pose's state: before the robot was localised."""
+KNOWN_RAD = 0.99 * ANY_HEADING_RAD
+"""A sigma above it is that of any heading."""
 NO_CLOCK = -1e9
 """In the place of a time on the robot's clock: of an earlier start."""
 
-T, OWN, X, Y, THETA, STATE, XX, XY, YY = range(9)
+T, OWN, X, Y, THETA, STATE, XX, XY, YY, TT = range(10)
 """Columns: time of the onlooker and of the robot, s; the pose; what it is worth; covariance."""
 POSE = [X, Y, THETA]
 
@@ -60,13 +64,13 @@ class RobotPath:
         self.frame: Chain | None = None
         self.is_new = False
         self.covariance = np.zeros((3, 3))
-        self._rows = Rows(KEPT, 9)
+        self._rows = Rows(KEPT, 10)
         self._keyframes = Rows(KEYFRAMES, 5)
         """Time on the robot's clock, segment, odometry pose."""
 
     @property
     def rows(self) -> Array:
-        """(k, 9), the earliest first; see the columns above."""
+        """(k, 10), the earliest first; see the columns above."""
         return self._rows.values
 
     def begin_again(self) -> None:
@@ -89,9 +93,7 @@ class RobotPath:
         own = message.pose_utime / SECOND_US
         pose, state = np.array(message.pose), message.state
         self.covariance = covariance = se2.unpacked(message.covariance)
-        row = np.array(
-            [t - age_s, own, *pose, state, covariance[0, 0], covariance[0, 1], covariance[1, 1]]
-        )
+        row = np.array([t - age_s, own, *pose, state, *covariance[[0, 0, 1, 2], [0, 1, 1, 2]]])
         if frame != self.frame:
             self._enter(frame, row)
         rows = self.rows
@@ -126,14 +128,14 @@ class RobotPath:
         rows[:, XX], rows[:, XY], rows[:, YY] = blocks[:, 0, 0], blocks[:, 0, 1], blocks[:, 1, 1]
 
     def _way_before(self, row: Array) -> Array:
-        """How the robot came to its first pose, by its odometry: rows (k, 9)."""
+        """How the robot came to its first pose, by its odometry: rows (k, 10)."""
         keyframes, here = self._keyframes.values, self._odometry(row[OWN])
         if here is None:
-            return np.zeros((0, 9))
+            return np.zeros((0, 10))
         segment, pose = here
         earlier = keyframes[(keyframes[:, 1] == segment) & (keyframes[:, 0] < row[OWN])]
         w_T_o = se2.compose(row[POSE], se2.inverse(pose))
-        out = np.zeros((len(earlier), 9))
+        out = np.zeros((len(earlier), 10))
         out[:, OWN], out[:, STATE] = earlier[:, 0], BY_ODOMETRY
         out[:, T] = row[T] - (row[OWN] - earlier[:, 0])
         out[:, POSE] = se2.compose(w_T_o[None], earlier[:, 2:])
@@ -215,6 +217,12 @@ class RobotPath:
             return None
         motion = self._motion(here[OWN], own)
         return None if motion is None else np.asarray(se2.compose(here[POSE], motion))
+
+
+def headings_known(rows: Array) -> NDArray[np.bool_]:
+    """(k,) which rows say where the robot looks: what stands, or is placed by ranges, does not."""
+    stands = rows[:, STATE] == PoseState.POSITION
+    return np.asarray(~stands & (rows[:, TT] < KNOWN_RAD**2))
 
 
 def time_of(n: int) -> float:

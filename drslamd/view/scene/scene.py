@@ -244,12 +244,14 @@ def _other(key: tuple[int, int], robot: int) -> int:
 
 
 def _path_rows(rows: Array) -> list[list[Any]]:
-    """For the page: time, x, y, theta, state, and the covariance of x and y."""
+    """For the page: time, x, y, theta or None, state, and the covariance of x and y."""
     columns = [0, *robot_path.POSE, robot_path.STATE, robot_path.XX, robot_path.XY, robot_path.YY]
     digits = (2, 3, 3, 3, 0, 6, 6, 6)
+    known = robot_path.headings_known(rows).tolist()
     out: list[list[Any]] = []
-    for row in rows[:, columns].tolist():
-        out.append([round(v, d) if d else int(v) for v, d in zip(row, digits, strict=True)])
+    for row, has_heading in zip(rows[:, columns].tolist(), known, strict=True):
+        told = [round(v, d) if d else int(v) for v, d in zip(row, digits, strict=True)]
+        out.append(told if has_heading else [*told[:3], None, *told[4:]])
     return out
 
 

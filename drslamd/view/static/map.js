@@ -202,7 +202,7 @@ export class MapView {
     context.globalAlpha = isDimmed(scene, id) ? 0.35 : 1;
     context.translate(x, y);
     context.rotate(-row.theta);
-    this.body(standing !== "position");
+    this.body(row.hasHeading);
     context.fillStyle = colour;
     context.strokeStyle = PAGE.panel;
     context.lineWidth = 2;

@@ -186,6 +186,7 @@ function trace(context, path, k, end, camera, isAlike) {
 // From row k - 1 to row k as a robot drives: it leaves and arrives the way that it looks.
 function curve(context, path, k, px, py, x, y) {
   const arm = Math.hypot(x - px, y - py) / 3, from = path.theta[k - 1], to = path.theta[k];
+  if (from === null || to === null) { context.lineTo(x, y); return; }
   const along = Math.cos(from) * (x - px) - Math.sin(from) * (y - py) > 0 ? arm : -arm; // or backwards
   if (Math.abs(turn(from, to)) > 2) { context.lineTo(x, y); return; }
   context.bezierCurveTo(px + along * Math.cos(from), py - along * Math.sin(from),

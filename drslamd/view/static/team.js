@@ -50,13 +50,14 @@ export class Path {
   at(t) {
     const k = this.index(t);
     if (k < 0) return null;
-    const row = { x: this.x[k], y: this.y[k], theta: this.theta[k], state: this.state[k],
+    const hasHeading = this.theta[k] !== null;
+    const row = { x: this.x[k], y: this.y[k], theta: this.theta[k] ?? 0, hasHeading, state: this.state[k],
       xx: this.xx[k], xy: this.xy[k], yy: this.yy[k], age: t - this.t[k] };
     if (k + 1 < this.t.length && this.isJoined(k + 1)) {
       const share = (t - this.t[k]) / (this.t[k + 1] - this.t[k]);
       row.x += (this.x[k + 1] - row.x) * share;
       row.y += (this.y[k + 1] - row.y) * share;
-      row.theta += turn(row.theta, this.theta[k + 1]) * share;
+      row.theta += turn(row.theta, this.theta[k + 1] ?? row.theta) * share;
       row.age = 0;
     }
     return row;

@@ -11,7 +11,16 @@ from onlooked_team import Actor
 from drslamd.conventions import Chain
 from drslamd.gossip.message_types import PoseState
 from drslamd.view.scene import robot_path
-from drslamd.view.scene.robot_path import BY_ODOMETRY, KEPT, POSE, STATE, RobotPath, T, arc
+from drslamd.view.scene.robot_path import (
+    BY_ODOMETRY,
+    KEPT,
+    POSE,
+    STATE,
+    RobotPath,
+    T,
+    arc,
+    headings_known,
+)
 
 OTHER = Chain(7, 3)
 
@@ -43,7 +52,28 @@ def test_a_path_is_what_was_published_one_pose_a_second() -> None:
     for row in path.rows:
         assert apart(row[POSE], actor.truth(row[T])) < 1e-6
     assert path.rows[-1, T] == pytest.approx(10.0)
-    assert path.rows[-1, 6:].tolist() == [0.04, 0.01, 0.01]
+    assert path.rows[-1, 6:].tolist() == [0.04, 0.01, 0.01, 0.001]
+
+
+@pytest.mark.parametrize(
+    ("state", "sigma_rad", "is_known"),
+    [
+        (PoseState.LOCALISED, 0.03, True),
+        (PoseState.STALE, 0.03, True),
+        (PoseState.STALE, 1.79, True),
+        (PoseState.STALE, 1.80, False),
+        (PoseState.POSITION, 1.81, False),
+        (PoseState.POSITION, 0.03, False),
+    ],
+)
+def test_a_heading_is_known_unless_it_stands_or_is_as_uncertain_as_any(
+    state: PoseState, sigma_rad: float, is_known: bool
+) -> None:
+    """Of headings all around the circle sigma is pi / sqrt 3, 1.814 rad; 99 % of it is as much."""
+    covariance = (0.04, 0.0, 0.0, 0.04, 0.0, sigma_rad**2)
+    path = RobotPath()
+    path.add(Actor(0, state=state, covariance=covariance).pose(0.0), 0.0, 0.0)
+    assert headings_known(path.rows).tolist() == [is_known]
 
 
 def test_the_age_of_a_pose_counts() -> None:
@@ -160,7 +190,7 @@ def test_a_change_of_frame_takes_the_whole_path_along() -> None:
     for row in path.rows:
         assert apart(row[POSE], elsewhere.truth(row[T])) < 5e-3
     # xx and yy change places, xy its sign
-    assert path.rows[3, 6:] == pytest.approx([0.01, -0.01, 0.04])
+    assert path.rows[3, 6:] == pytest.approx([0.01, -0.01, 0.04, 0.001])
 
 
 @pytest.mark.parametrize(("pause", "rows"), [(5.9, 11), (6.1, 1)])

@@ -66,6 +66,13 @@ def test_a_pose_is_told_once_with_its_state_and_covariance() -> None:
     assert scene.changes(1.1, False) == {"t": 1.1}
 
 
+def test_a_heading_that_is_not_known_is_none() -> None:
+    scene, actor = Scene(), Actor(0, state=PoseState.POSITION)
+    scene.take(actor.said(actor.pose(0.0), 0.0), 0.0)
+    ((_, x, _, theta, state, *_),) = scene.changes(0.0, False)["paths"]["0"]
+    assert (x, theta, state) == (pytest.approx(2.0), None, 4)
+
+
 def test_a_pose_that_was_old_when_it_was_said_is_shown_where_it_belongs_in_time() -> None:
     scene, (a, _) = Scene(), two()
     scene.take(a.said(a.pose(1.0), 1.8), 2.0)
