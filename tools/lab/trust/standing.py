@@ -1,6 +1,6 @@
 """Something stands that nobody has surveyed: when is its place known, and how well?
 
-    python -m lab.trust.standing [--what robot] [--seeds 20] [--first 1] [--seconds 60]
+    python -m lab.trust.standing [--what robot] [--seeds 20] [--seconds 60] [--drivers 2]
 
 Two robots drive, and between them stands a third one (`robot`), a module that no robot carries
 (`module`), or one that somebody carries 2 m away in the middle of the run (`moved`). Each second
@@ -26,12 +26,12 @@ from lab.progress import Progress
 from lab.recordings import world
 from lab.recordings.recording import Array, Recording
 
-STANDS, DRIVERS = 2, (0, 1)
-MOVED_M = 2.0
+DRIVERS = 2
+MOVED_M, BEFORE_S = 2.0, 10.0
 FEW = 2
 """Candidates that are worth telling."""
 WRONG_M, WRONG_SIGMAS = 0.5, 4.0
-SCENE = world.Scene(robots=3, seconds=60.0, odometry_hz=20, range_hz=10)
+SCENE = world.Scene(seconds=60.0, odometry_hz=20, range_hz=10)
 
 
 @dataclass
@@ -44,7 +44,8 @@ class Run:
         wrong: claims over 0.5 m and four sigmas off; headings: claims of a heading.
         squares: of all claims, per degree of freedom.
         dropped_s: how long after it was moved the old place was still claimed; worst_m: how far
-            drivers are off meanwhile, relative to each other.
+            drivers are off from then on, relative to each other; before_m: in the ten seconds
+            before.
     """
 
     few_s: float = float("inf")
@@ -55,13 +56,17 @@ class Run:
     squares: list[float] = field(default_factory=list)
     dropped_s: float = 0.0
     worst_m: float = 0.0
+    before_m: float = 0.0
 
 
-def recorded(what: str, seed: int, seconds: float) -> tuple[Recording, Array]:
-    """A drive, and (n, 2) where the thing is, one row for each `world.STEP_S`."""
+def recorded(
+    what: str, seed: int, seconds: float, drivers: int = DRIVERS
+) -> tuple[Recording, Array]:
+    """A drive, and (n, 2) where the thing is that comes after the drivers, one row for each
+    `world.STEP_S`."""
     rng = np.random.default_rng(seed)
-    scene = replace(SCENE, seconds=seconds)
-    truths = [world.drive(rng, scene) for _ in DRIVERS]
+    scene = replace(SCENE, seconds=seconds, robots=drivers + 1)
+    truths = [world.drive(rng, scene) for _ in range(drivers)]
     place = rng.uniform([1, 1], [scene.width - 1, scene.height - 1])
     stands = np.tile([*place, rng.uniform(-np.pi, np.pi)], (len(truths[0]), 1))
     if what == "moved":
@@ -69,31 +74,37 @@ def recorded(what: str, seed: int, seconds: float) -> tuple[Recording, Array]:
         stands[len(stands) // 2 :, :2] += MOVED_M * np.array([np.cos(angle), np.sin(angle)])
     recording = world.recorded(f"{what}, seed {seed}", rng, scene, [*truths, stands])
     if what != "robot":
-        trails = {robot: recording.trails[robot] for robot in DRIVERS}
-        ranges = recording.ranges[recording.ranges[:, 1] != STANDS]
+        trails = {robot: recording.trails[robot] for robot in range(drivers)}
+        ranges = recording.ranges[recording.ranges[:, 1] != drivers]
         recording = replace(recording, trails=trails, ranges=ranges)
     return recording, stands[:, :2]
 
 
-def play(what: str, seed: int, seconds: float) -> Run:
+def play(what: str, seed: int, seconds: float, drivers: int = DRIVERS) -> Run:
     """One seed."""
-    recording, stands = recorded(what, seed, seconds)
+    recording, stands = recorded(what, seed, seconds, drivers)
     simulator, run = virtual_team.start(recording, seed), Run()
     for second in range(2, round(seconds)):
         simulator.run(second)
-        _look(run, recording, stands, simulator, second, what == "moved")
+        _look(run, recording, stands, simulator, second, drivers)
+        if what == "moved":
+            off = max(apart_off(recording, simulator, other) for other in range(1, drivers))
+            if second > seconds / 2:
+                run.worst_m = max(run.worst_m, off)
+            elif second > seconds / 2 - BEFORE_S:
+                run.before_m = max(run.before_m, off)
     return run
 
 
 def _look(
-    run: Run, recording: Recording, stands: Array, simulator: Simulator, second: int, moves: bool
+    run: Run, recording: Recording, stands: Array, simulator: Simulator, second: int, drivers: int
 ) -> None:
-    number = STANDS if STANDS in recording.trails else node_chain(STANDS).robot
-    is_moved = moves and second > len(stands) * world.STEP_S / 2
+    number = drivers if drivers in recording.trails else node_chain(drivers).robot
+    is_moved = bool((stands[0] != stands[-1]).any()) and second > len(stands) * world.STEP_S / 2
     run.off_m = []
-    for robot in DRIVERS:
+    for robot in range(drivers):
         member = simulator.members[robot]
-        tracker = member.robot.front.points.trackers.get(STANDS)
+        tracker = member.robot.front.points.trackers.get(drivers)
         found = tracker.found if tracker is not None else None
         if found is not None and 1 <= len(found.candidates) <= FEW:
             run.few_s = min(run.few_s, second)
@@ -112,9 +123,7 @@ def _look(
         run.off_m.append(float(np.hypot(*off)))
         run.squares.append(square / 2)
         run.wrong += run.off_m[-1] > WRONG_M and square > WRONG_SIGMAS**2
-    if is_moved:
-        run.worst_m = max(run.worst_m, apart_off(recording, simulator))
-    parked = simulator.members.get(STANDS)
+    parked = simulator.members.get(drivers)
     if parked is not None:
         where = parked.robot.whereabouts(parked.clock.local(simulator.now))
         run.headings += where.state in (PoseState.LOCALISED, PoseState.DOUBTFUL)
@@ -127,20 +136,17 @@ def seen_from(estimate: TeamEstimate, robot: int, number: int) -> tuple[Array, A
     return found[0][:2], found[1][:2, :2]
 
 
-def apart_off(recording: Recording, simulator: Simulator) -> float:
-    """How far the first driver has the second one from where it is, as it sees it, m."""
-    member, other = (simulator.members[robot] for robot in DRIVERS)
-    estimate = member.robot.back.estimate
-    if estimate is None or estimate.relative(*DRIVERS) is None:
+def apart_off(recording: Recording, simulator: Simulator, other: int) -> float:
+    """How far the first driver has another one from where it is, as it sees it, m."""
+    members = simulator.members[0], simulator.members[other]
+    estimate = members[0].robot.back.estimate
+    found = estimate.relative(0, other) if estimate is not None else None
+    if estimate is None or found is None:
         return 0.0
-    found = estimate.relative(*DRIVERS)
-    assert found is not None
-    ends = [estimate.trajectories[robot].n[-1] for robot in DRIVERS]
-    times = [
-        m.clock.world(int(n) * GRID_US) / 1e6 for m, n in zip((member, other), ends, strict=True)
-    ]
-    there = _pose(recording, DRIVERS[1], times[1])
-    true = _truth(recording, DRIVERS[0], times[0], there[:2])
+    ends = [estimate.trajectories[robot].n[-1] for robot in (0, other)]
+    times = [m.clock.world(int(n) * GRID_US) / 1e6 for m, n in zip(members, ends, strict=True)]
+    there = _pose(recording, other, times[1])
+    true = _truth(recording, 0, times[0], there[:2])
     return float(np.hypot(*(found[0][:2] - true)))
 
 
@@ -158,7 +164,11 @@ def _truth(recording: Recording, robot: int, t: float, place: Array) -> Array:
 def row(what: str, seed: int, run: Run) -> str:
     """One run, for people."""
     off = ", ".join(f"{metres:.3f}" for metres in run.off_m) or "nobody knows it,"
-    moved = f", {run.dropped_s:.0f} s, {run.worst_m:.2f} m" if what == "moved" else ""
+    moved = (
+        f", {run.dropped_s:.0f} s, {run.worst_m:.2f} m (before {run.before_m:.2f} m)"
+        if what == "moved"
+        else ""
+    )
     return f"seed {seed}: {run.known_s:.0f} s, {off} m at the end, {run.wrong} wrong{moved}"
 
 
@@ -186,8 +196,11 @@ def lines(what: str, runs: list[Run]) -> Iterator[str]:
         dropped = [run.dropped_s for run in runs]
         yield (
             f"the old place is dropped after {median(dropped):.0f} s (median), "
-            f"{max(dropped):.0f} s (most); drivers meanwhile at most "
-            f"{max(run.worst_m for run in runs):.2f} m off"
+            f"{max(dropped):.0f} s (most); drivers are off by at most "
+            f"{max(run.worst_m for run in runs):.2f} m from then on "
+            f"({median(run.worst_m for run in runs):.2f} m, median), "
+            f"{max(run.before_m for run in runs):.2f} m in the {BEFORE_S:.0f} s before "
+            f"({median(run.before_m for run in runs):.2f} m, median)"
         )
 
 
@@ -197,11 +210,12 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=SCENE.seconds)
+    parser.add_argument("--drivers", type=int, default=DRIVERS)
     options = parser.parse_args()
     seeds = range(options.first, options.first + options.seeds)
     progress, runs = Progress("played", len(seeds), "runs"), []
     for done, seed in enumerate(seeds, start=1):
-        runs.append(play(options.what, seed, options.seconds))
+        runs.append(play(options.what, seed, options.seconds, options.drivers))
         print(row(options.what, seed, runs[-1]), flush=True)
         progress(done)
     progress.end()
