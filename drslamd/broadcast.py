@@ -109,7 +109,7 @@ class Broadcast:
             leaving=leaving,
             uwb_id=self._config.uwb_id,
             uwb_clock_us=UNKNOWN_CLOCK if uwb_clock is None else uwb_clock,
-            graph_hash=self._back.digest(),
+            graph_hash=self._back.said_digest(),
             heard=heard,
             ranged=tuple(sorted(self._ranged(utime) & {h.id for h in heard})),
             logs=self._team.logs.next_states(),

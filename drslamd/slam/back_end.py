@@ -16,6 +16,7 @@ from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
+from drslamd.slam.graph.thinning.graph_view import GraphView
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.rbcd import lifted_neighbours
 from drslamd.slam.optimizer.rbcd.pose_exchange import PoseExchange
@@ -68,6 +69,8 @@ class BackEnd:
         self._is_beside = False
         self._inserted = 0
         self._known = _Known()
+        self._digested: tuple[GraphView, set[int], int] | None = None
+        """What was digested last, and what came of it."""
         self._not_converged = 0
         """Solutions in a row."""
 
@@ -77,7 +80,20 @@ class BackEnd:
 
     def digest(self) -> int:
         """Equal on two robots of a group when both hold the same graph of it."""
-        return self.graph.digest({segment.robot for segment in self.group})
+        return self.graph.digest(self._grouped)
+
+    def said_digest(self) -> int:
+        """The same of the graph as module 3 looked at it last: what is said each second shall not
+        cost a look of its own, and without news it is the same."""
+        view = self.graph.latest_view
+        known = self._digested
+        if known is None or known[0] is not view or known[1] != self._grouped:
+            known = self._digested = view, self._grouped, view.digest(self._grouped)
+        return known[2]
+
+    @property
+    def _grouped(self) -> set[int]:
+        return {segment.robot for segment in self.group}
 
     def trajectory(self, robot: int) -> Trajectory | None:
         """The solved keyframes of a robot, in the frame of the team."""

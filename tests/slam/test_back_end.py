@@ -289,6 +289,15 @@ def test_two_robots_of_a_group_that_hold_the_same_say_the_same_of_it(team: Small
     assert one.digest() != other.digest()
 
 
+def test_what_is_said_of_a_graph_is_of_when_module_3_looked_at_it(team: SmallTeam) -> None:
+    back, _ = settled(team, 0)
+    assert back.said_digest() == back.digest()
+    back.insert(team.chains[2], GraphEntry(7, keyframes=(Keyframe(9_000, 0, 1, 2, 3),)))
+    before = back.said_digest()
+    assert back.begin({0, 1, 2}) is not None
+    assert back.said_digest() == back.digest() != before
+
+
 def test_what_is_told_of_a_relaxation_are_our_poses_that_carry_closures(team: SmallTeam) -> None:
     back, _ = back_end(team)
     result = moved(0)

@@ -53,7 +53,10 @@ def groups(graph: PoseGraph) -> list[set[Segment]]:
     for joint in joints(graph):
         if joint.tells_place_only:
             continue
-        joined = group_of.get(joint.a, {joint.a}) | group_of.get(joint.b, {joint.b})
+        one, other = group_of.get(joint.a, {joint.a}), group_of.get(joint.b, {joint.b})
+        if one is other:
+            continue
+        joined = one | other
         for segment in joined:
             group_of[segment] = joined
     distinct: list[set[Segment]] = []

@@ -48,5 +48,6 @@ def joints_of(chains: Mapping[int, ChainView], pairs: list[PairView]) -> list[Jo
 def _joint(pair: PairView, one: int, other: int, these: ClosureTable) -> Joint:
     """Of two segments; who says a whole pose is believed before who says but a place."""
     whole = ~these.tells_place_only
-    found = these.chosen(whole) if whole.any() else these
-    return Joint(Segment(*pair.a, one), Segment(*pair.b, other), found, not whole.any())
+    says_any = bool(whole.any())
+    found = these.chosen(whole) if says_any and not whole.all() else these
+    return Joint(Segment(*pair.a, one), Segment(*pair.b, other), found, not says_any)

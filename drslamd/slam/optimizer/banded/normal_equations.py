@@ -22,6 +22,10 @@ GAUGE_SIGMA = 1e-5
 """The gauge pose is held to 10 um and 10 urad: far below all noise, far above rounding."""
 
 
+SPARSE = 4
+"""Where a matrix has so many times more entries than are added to it, they are added one by one."""
+
+
 @dataclass
 class System:
     """A symmetric matrix: lower band (w, n), border (n, b) and corner (b, b)."""
@@ -90,11 +94,13 @@ class _Assembly:
         is_known, is_high, is_low = column != NOWHERE, row >= n, column >= n
         in_band = np.flatnonzero(is_known & ~is_high)
         in_border = np.flatnonzero(is_known & is_high & ~is_low)
-        in_corner = np.flatnonzero(is_low)
+        in_corner, apart = np.flatnonzero(is_low), np.flatnonzero(is_low & (row != column))
+        below = (row[in_corner] - n) * b + column[in_corner] - n
+        above = (column[apart] - n) * b + row[apart] - n
         return (
             (in_band, (row[in_band] - column[in_band]) * n + column[in_band]),
             (in_border, column[in_border] * b + row[in_border] - n),
-            (in_corner, (row[in_corner] - n) * b + column[in_corner] - n),
+            (np.concatenate([in_corner, apart]), np.concatenate([below, above])),
         )
 
     @cached_property
@@ -106,15 +112,13 @@ class _Assembly:
 
     def add_matrix(self, system: System, factors: Linearised) -> None:
         """Add J' W J."""
-        (in_band, band), (in_border, border), (in_corner, corner) = self._places
         products = self._products(factors).ravel()
-        system.band += _sums(band, products[in_band], system.band)
-        if len(in_border):
-            system.border += _sums(border, products[in_border], system.border)
-        if len(in_corner):
-            below = _sums(corner, products[in_corner], system.corner)
-            system.corner += below
-            system.corner += np.tril(below, -1).T
+        parts = (system.band, system.border, system.corner)
+        for part, (which, at) in zip(parts, self._places, strict=True):
+            if len(at) < part.size // SPARSE:
+                np.add.at(part.reshape(-1), at, products[which])
+            else:
+                part += _sums(at, products[which], part)
 
     def _products(self, factors: Linearised) -> Array:
         """(t, m) entries of J' W J."""

@@ -25,9 +25,6 @@ DEPTH = 3
 """Earlier steps that are mixed."""
 MOST = 12
 """Steps; a matrix that needs more is no longer near."""
-A_THIRD = 1 / 3
-"""Of a tolerance: a solution is at most so far off after its last step
-(`newton_descent.TOLERANCE`)."""
 FARTHEST = 0.5
 """m and rad: whoever has to go farther begins with a matrix of where he is."""
 
@@ -43,7 +40,6 @@ def approach(
     """
     problem, layout = equations.problem, equations.layout
     point, at = start, layout.vector(start.poses, start.calibration)
-    sizes: list[float] = []
     places: list[Array] = []
     steps: list[Array] = []
     gradients: list[Array] = []
@@ -58,30 +54,15 @@ def approach(
             [*kept[-DEPTH:], new]
             for kept, new in ((places, at), (steps, step), (gradients, gradient))
         )
-        sizes.append(size)
-        is_there = _remains(sizes) < tolerance
-        at = at + step if is_there else _mixed(places, steps, gradients)
+        at = at + step if size < tolerance else _mixed(places, steps, gradients)
         calibration = layout.calibration(at)
         point = Point.of(problem, at[layout.poses], calibration, steps=count + 1)
-        if is_there:
+        if size < tolerance:
             is_lower = equations.cost(point, start.threshold) <= equations.cost(
                 start, start.threshold
             ) * (1 + 1e-9)
             return replace(point, converged=True) if is_lower else None
     return None
-
-
-def _remains(sizes: list[float]) -> float:
-    """How far it still is after the last of some steps, over `A_THIRD`: m and rad.
-
-    Steps become shorter by some share of themselves, in the mean of the last two; those that follow
-    come to as much as a geometric series of it.
-    """
-    size = sizes[-1]
-    if len(sizes) < 3:
-        return size
-    share = float(np.sqrt(size / sizes[-3]))
-    return size * min(share / ((1 - share) * A_THIRD), 1.0) if share < A_THIRD else size
 
 
 def _mixed(places: list[Array], steps: list[Array], gradients: list[Array]) -> Array:

@@ -93,7 +93,8 @@ class Places:
         is_tail = np.ones(len(problem.n), dtype=bool)
         is_tail[at] = False
         number = {pair: k for k, pair in enumerate(pairs)}
-        named = (*head.pairs, *(pair for pair in pairs if pair not in set(head.pairs)))
+        known = set(head.pairs)
+        named = (*head.pairs, *(pair for pair in pairs if pair not in known))
         bias = flat.bias[np.array([number[pair] for pair in named], dtype=np.int64)]
         first, later = np.split(bias, [head.paired])
         others = flat.constants[len(pairs) :]

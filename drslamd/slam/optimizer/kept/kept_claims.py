@@ -15,14 +15,12 @@ from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.se2 import Array, Index
 
 
-def kept_covariances(
-    problem: Problem, point: Point, claimed: Current, wanted: Index
-) -> tuple[Array, Calibration] | None:
-    """See `claims.covariances`; None where it is for that to say.
+def kept_covariance(claimed: Current, wanted: Index) -> Array | None:
+    """(3 k, 3 k) joint covariance of poses (k,) that are not eliminated; None where it is for
+    `claims.covariances` to say.
 
     Args:
         claimed: of a problem whose odometry is believed as far as it should be.
-        wanted: (k,) poses that are not eliminated.
     """
     layout, lower = claimed.layout, claimed.lower
     at = layout.poses[wanted].ravel()
@@ -31,6 +29,15 @@ def kept_covariances(
     unit = np.zeros((len(lower), len(at)))
     unit[at, np.arange(len(at))] = 1
     joint = cholesky_solved(lower, unit)[at]
+    squares = np.diag(joint)
+    if not (np.isfinite(squares) & (squares > 0) & (squares < UNKNOWN)).all():
+        return None
+    return np.asarray((joint + joint.T) / 2)
+
+
+def kept_spread(problem: Problem, point: Point, claimed: Current) -> Calibration | None:
+    """Sigmas of what was learned, see `claims.covariances`; None as above."""
+    layout, lower = claimed.layout, claimed.lower
     first = len(lower) - len(claimed.places.flat.constants)
     own = lower[first:, first:]
     alone = (inverse_triangular(own) ** 2).sum(axis=0)[layout.bias - layout.band - first]
@@ -41,7 +48,4 @@ def kept_covariances(
         return None
     sigmas = np.full(len(lower), np.sqrt(UNKNOWN))
     sigmas[first:] = np.sqrt((learned**2).sum(axis=0))
-    squares = np.diag(joint)
-    if not (np.isfinite(squares) & (squares > 0) & (squares < UNKNOWN)).all():
-        return None
-    return (joint + joint.T) / 2, layout.calibration(sigmas)
+    return layout.calibration(sigmas)

@@ -135,13 +135,15 @@ def _solved(
     claimed = _matrix(known, believed, pairs, with_blocks=False)
     if claimed is None:
         return None
-    found = kept_claims.kept_covariances(problem, point, claimed, np.array(last, dtype=int))
+    joint = kept_claims.kept_covariance(claimed, np.array(last, dtype=int))
+    spread = kept_claims.kept_spread(problem, point, claimed)
     downwards = _grown(current, Believed(problem, point))
     held = _grown(claimed, believed)
-    if found is None or downwards is None or held is None:
+    if joint is None or spread is None or downwards is None or held is None:
         return None
-    after = Kept(downwards, held, kept.sure if kept and known else sure, variances, checked)
-    return _said(equations, point, scatter, sure.feared, *found), after
+    since = kept.sure if kept and known else sure
+    after = Kept(downwards, held, since, variances, checked)
+    return _said(equations, point, scatter, sure.feared, joint, spread), after
 
 
 def _matrix(

@@ -47,6 +47,21 @@ def test_what_becomes_of_a_pair_does_not_depend_on_the_others() -> None:
     assert thinned_pairs([], views) == []
 
 
+def test_what_names_keyframes_that_nobody_holds_waits() -> None:
+    """As of a robot whose keyframes are all still to come, or begin later than its peer's."""
+    said, graph = said_and_graph()
+    one = said[0]
+    late = one.ranges.copy()
+    late.rows[:, :3] += [1e6, 0, 1e6]
+    named = int(late.b_n.min()), int(late.b_n.max())
+    (none,) = thinned_pairs(
+        [Unthinned(one.a, one.b, late, NOTHING.closures, named)], graph.view.chains
+    )
+    assert (len(none.ranges), len(none.moves), len(none.closures)) == (0, 0, 0)
+    both = [Unthinned(one.a, one.b, late, NOTHING.closures, named), one]
+    assert len(thinned_pairs(both, graph.view.chains)[1].ranges) > 0
+
+
 def test_a_digest_sees_each_of_what_a_part_holds_and_nothing_of_an_empty_one() -> None:
     said, graph = said_and_graph()
     part = thinned_pairs(said[:1], graph.view.chains)[0]

@@ -71,13 +71,26 @@ def test_a_misfit_is_told_where_all_is_as_modelled_and_not_where_it_is_not() -> 
     assert factor is not None
     left = mountings.variances(equations, point, factor)
     assert left is not None
-    ratio = quick_check.misfit_as_modelled(equations, point, factor, left)
+    checked = quick_check.Checked.of(equations, point, factor)
+    ratio = quick_check.misfit_as_modelled(problem, point, checked, left)
     assert ratio is not None
     expected = misfit.guessed_misfit(equations, point, factor).ratio(problem.odometry.robot, 3)
     assert np.allclose(ratio, expected)
     ask = mountings.scores(equations, point, factor)
     assert not ask.ask()
     # a mounting that asks, odometry that does not fit
-    assert quick_check.misfit_as_modelled(equations, point, factor, left / 1e4) is None
+    assert quick_check.misfit_as_modelled(problem, point, checked, left / 1e4) is None
     worse = replace(point, link=point.link * 4)
-    assert quick_check.misfit_as_modelled(equations, worse, factor, left) is None
+    assert quick_check.misfit_as_modelled(problem, worse, checked, left) is None
+
+
+def test_what_could_be_checked_grows_with_the_way() -> None:
+    """Twice as many links as then: twice the freedom, and what fitted fits."""
+    problem = a_problem()
+    point = shaken(problem)
+    squares, robot = misfit.squares_of(problem, point), problem.odometry.robot
+    links = np.bincount(robot, minlength=3).astype(float)
+    then = quick_check.Checked(np.array([7.0, 20.0, 0.0]), links / [1, 2, 1])
+    s = [squares[robot == k].sum() for k in range(3)]
+    expected = [(s[0] + 1) / (7 + 1), (s[1] + 1) / (40 + 1), s[2] + 1]
+    assert then.ratio(problem, point) == pytest.approx(expected)
