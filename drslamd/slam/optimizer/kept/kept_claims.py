@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drslamd.slam.optimizer.banded.claims import UNKNOWN
+from drslamd.slam.optimizer.banded.claims import UNKNOWN, bias_sigmas
 from drslamd.slam.optimizer.banded.lapack import cholesky_solved, inverse_triangular
 from drslamd.slam.optimizer.banded.layout import NOWHERE
 from drslamd.slam.optimizer.banded.normal_equations import Equations
@@ -17,7 +17,7 @@ from drslamd.slam.se2 import Array, Index
 
 def kept_covariances(
     problem: Problem, point: Point, claimed: Current, wanted: Index
-) -> tuple[Array, Calibration] | None:
+) -> tuple[Array, Calibration, Array] | None:
     """See `claims.covariances`; None where it is for that to say.
 
     Args:
@@ -33,8 +33,7 @@ def kept_covariances(
     joint = cholesky_solved(lower, unit)[at]
     first = len(lower) - len(claimed.places.flat.constants)
     own = lower[first:, first:]
-    alone = (inverse_triangular(own) ** 2).sum(axis=0)[layout.bias - layout.band - first]
-    belief = Equations(problem, layout=layout).bias_belief(point, alone)[first:, first:]
+    belief = Equations(problem, layout=layout).bias_belief(point)[first:, first:]
     try:
         learned = inverse_triangular(np.linalg.cholesky(own @ own.T + belief))
     except np.linalg.LinAlgError:
@@ -44,4 +43,5 @@ def kept_covariances(
     squares = np.diag(joint)
     if not (np.isfinite(squares) & (squares > 0) & (squares < UNKNOWN)).all():
         return None
-    return (joint + joint.T) / 2, layout.calibration(sigmas)
+    wide = (inverse_triangular(own) ** 2).sum(axis=0)[layout.bias - layout.band - first]
+    return (joint + joint.T) / 2, layout.calibration(sigmas), bias_sigmas(problem, point, wide)

@@ -172,6 +172,7 @@ def _said(
     feared: Array,
     joint: Array,
     spread: Calibration,
+    biases: Array,
 ) -> Solution:
     """What `banded_solver.solve` says where all is as modelled."""
     problem = equations.problem
@@ -187,6 +188,7 @@ def _said(
         scatter=scatter,
         joint=joint,
         spread=spread,
+        bias_sigmas=biases,
         odometry_level=np.ones(len(level)),
         feared_level=level,
         late_level=level,
