@@ -32,13 +32,15 @@ class RangeNoise:
 
     Attributes:
         sigma: around the bias.
-        bias_sigma: of the bias of a pair.
+        bias_sigma: of the bias of a pair, where the teams' likeness is believed.
+        bias_beyond: what is unknown of it besides; a pose is as wrong as both make it.
         scatter: true over allowed sigma.
     """
 
     sigma: float
     bias_sigma: float
     scatter: float = 1.0
+    bias_beyond: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -245,18 +245,12 @@ def claimed_information(problem: Problem, x: Array, threshold: Array, claims: Ar
 
 
 def learned_information(problem: Problem, x: Array, threshold: Array, claims: Array) -> Array:
-    """The same, but that biases resemble each other, as far as those that were measured show."""
+    """The same, but that biases resemble each other."""
     information = claimed_information(problem, x, threshold, claims)
-    prior, biases = problem.priors.bias, bias_places(problem)
-    told = 1 / np.diag(np.linalg.inv(information))[biases[:-1]] - prior.sigma**-2
-    own = x[biases[:-1]] - x[biases[-1]]
-    information[biases, biases] -= prior.sigma**-2
-    held = 1 / prior.own_variance(own, told) + prior.sigma**-2
-    for bias in biases[:-1]:
-        apart = np.zeros(len(x))
-        apart[[bias, biases[-1]]] = 1.0, -1.0
-        information += held * np.outer(apart, apart)
-    information[biases[-1], biases[-1]] += 1 / prior.team_variance
+    biases = bias_places(problem)
+    information[biases, biases] -= problem.priors.bias.sigma**-2
+    at = np.ix_(biases, biases)
+    information[at] += heavy_curvature(problem, x)[at]
     return information
 
 

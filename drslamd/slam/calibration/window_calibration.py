@@ -91,7 +91,7 @@ class PairCalibration(NamedTuple):
     """What is known of one pair's sensors.
 
     Attributes:
-        bias: of the pair, m.
+        bias: of the pair, m; bias_sigma: how wrong that may be.
         a, b: of both robots.
         scatter: of the pair's ranges over the configured sigma, see `range_scatter`.
         near_bias: of the team, m at range 0, see `RangeModel.near_range_shape`.
@@ -102,6 +102,7 @@ class PairCalibration(NamedTuple):
     b: EndCalibration = EndCalibration()
     scatter: float = 1.0
     near_bias: Learned = Learned()
+    bias_sigma: float = 0.0
 
     @staticmethod
     def of(
@@ -124,6 +125,7 @@ class PairCalibration(NamedTuple):
             EndCalibration.of(estimate, b),
             estimate.scatter.get(pair, 1.0),
             estimate.near_bias_m,
+            estimate.bias_sigma_m.get(pair, 0.0),
         )
 
 
@@ -164,9 +166,12 @@ def calibrated_window(
         a_antenna=window.a_antenna + known.a.antenna,
         b_antenna=window.b_antenna + known.b.antenna,
     )
-    bias = remaining(known.bias, noise.ranges.bias_sigma, model.least_bias_m)
+    before, least = noise.ranges.bias_sigma, model.least_bias_m
+    bias = remaining(known.bias, before, least)
+    wrong = remaining(Learned(sigma=known.bias_sigma), before, least)
+    beyond = math.sqrt(max(wrong**2 - bias**2, 0.0))
     return better, PairNoise(
-        RangeNoise(noise.ranges.sigma, bias, known.scatter),
+        RangeNoise(noise.ranges.sigma, bias, known.scatter, beyond),
         _narrowed(noise.a, known.a.scale),
         _narrowed(noise.b, known.b.scale),
         model,

@@ -86,7 +86,8 @@ class TeamEstimate:
         trajectories: by robot.
         joint: (3 k, 3 k) covariance of x, y, theta of the last poses of the first k in the order of
             `everybody`; of the others nothing is claimed.
-        bias_m: range bias of each pair, m.
+        bias_m: range bias of each pair, m, as the team's likeness holds it; bias_sigma_m: how wrong
+            that may be.
         scale, yaw: of each robot's odometry, fraction and rad/m.
         gyro_rate: in place of that of the robots whose heading a gyro gives, rad/s.
         near_bias_m: of the team, at range 0 (`RangeModel.near_range_shape`).
@@ -116,6 +117,7 @@ class TeamEstimate:
     trajectories: dict[int, Trajectory]
     joint: Array = field(default_factory=lambda: np.zeros((0, 0)))
     bias_m: dict[tuple[int, int], Learned] = field(default_factory=dict)
+    bias_sigma_m: dict[tuple[int, int], float] = field(default_factory=dict)
     scale: dict[int, Learned] = field(default_factory=dict)
     yaw: dict[int, Learned] = field(default_factory=dict)
     gyro_rate: dict[int, Learned] = field(default_factory=dict)

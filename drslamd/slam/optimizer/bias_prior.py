@@ -14,9 +14,9 @@ where they differ all are held loosely. Its cost is -2 log of the density, witho
 is configured: without them a bias that motion says little of runs off by metres after whatever else
 is wrong.
 
-How sure of a bias one may be is another question than where it most likely is. The peak of a heavy
-tail is narrow, and most of what it holds is elsewhere: what is told of a bias has the variances of
-these distributions (`own_variance`, `team_variance`), and not the curvatures of their costs.
+How wrong a bias may be is another question than how strongly it is held. The peak of a heavy tail
+is narrow, and most of what it holds is elsewhere: what windows claim rests on the variances of
+these distributions (`sigmas`), and not on the curvatures of their costs.
 """
 
 from __future__ import annotations
@@ -97,6 +97,19 @@ class BiasPrior:
     def team_curvature(self, team: float, least: float = LEAST_CURVATURE) -> float:
         """Half the second derivative, kept positive."""
         return float(cauchy_curvature(self.team, np.array([team]), least)[0]) + self.sigma**-2
+
+    def sigmas(self, own: Array, told: Array) -> Array:
+        """(pairs,) how wrong biases may be that were measured, m.
+
+        What was measured of the other pairs tells what all have in common.
+
+        Args:
+            own, told: see `own_variance`.
+        """
+        varies = 1 / (1 / self.own_variance(own, told) + self.sigma**-2)
+        of_team = told / (1 + told * varies)
+        team = 1 / (1 / self.team_variance + of_team.sum() - of_team)
+        return np.asarray(1 / np.sqrt(told + 1 / (varies + team)))
 
     def own_variance(self, own: Array, told: Array) -> float:
         """What a pair may have of its own, m^2, where nothing was measured of it.

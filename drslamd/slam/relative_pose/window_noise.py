@@ -152,6 +152,7 @@ class WindowNoise:
         ranges = [(n.ranges.sigma, n.ranges.bias_sigma, n.ranges.scatter) for n in noises]
         sigma, bias, scatter = np.array(ranges).T
         self._sigma, self._excess = sigma, scatter**2 - 1
+        self._beyond = np.array([n.ranges.bias_beyond for n in noises]) ** 2
         self._before = stack.before
         self._points = stack.points.transpose(1, 0, 2)
         robots = [noise.a for noise in noises] + [noise.b for noise in noises]
@@ -191,19 +192,24 @@ class WindowNoise:
         return covariance
 
     def excess(self, of: Index, gain: Array) -> Array:
-        """(k, 3, 3) what ranges that scatter otherwise than allowed for add to a covariance.
+        """(k, 3, 3) what ranges that scatter otherwise than allowed for, and biases that are less
+        known than held, add to a covariance.
 
         Args:
             of: (k,) windows.
             gain: (k, 3, n) how the estimate follows the residuals, gain G: with true noise V' in
                 the place of V the covariance G V G' becomes G V' G' (a sandwich).
         """
-        if not self._excess[of].any():
-            return np.zeros((len(gain), 3, 3))
-        rows = self._rows(of)
-        scatter = self._model.correlated_covariance(self._t[rows], self._sigma[rows])
-        added = gain @ scatter @ gain.transpose(0, 2, 1)
-        return np.asarray(self._excess[of, None, None] * added)
+        added = np.zeros((len(gain), 3, 3))
+        if self._excess[of].any():
+            rows = self._rows(of)
+            scatter = self._model.correlated_covariance(self._t[rows], self._sigma[rows])
+            scattered = gain @ scatter @ gain.transpose(0, 2, 1)
+            added += self._excess[of, None, None] * scattered
+        if self._beyond[of].any():
+            by_bias = gain.sum(axis=2)
+            added += self._beyond[of, None, None] * by_bias[:, :, None] * by_bias[:, None, :]
+        return added
 
     def _rows(self, of: Index) -> Index | slice:
         """The only window stands for as many as are asked."""

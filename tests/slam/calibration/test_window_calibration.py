@@ -158,6 +158,7 @@ def test_what_was_never_measured_changes_nothing() -> None:
     assert np.array_equal(same.ranges, window.ranges)
     assert np.array_equal(same.a_poses, window.a_poses)
     assert noise.ranges.bias_sigma == pytest.approx(0.30)
+    assert noise.ranges.bias_beyond == 0
     assert noise.a.scale == pytest.approx(NOISE.scale)
 
 
@@ -174,7 +175,7 @@ def test_what_module_3_says_of_its_sigmas_is_taken_as_it_is(scatter: float) -> N
     """How much the ranges of the pair scatter is part of those sigmas, and does not count twice."""
     window, _ = uncalibrated(5)
     a, b = EndCalibration(Learned(0.05, 0.02)), EndCalibration(Learned(0.0, 0.01))
-    learned = PairCalibration(Learned(0.1, 0.08), a, b, scatter)
+    learned = PairCalibration(Learned(0.1, 0.08), a, b, scatter, bias_sigma=0.2)
     wide = replace(NOISE, scale=0.1)
     same, noise = calibrated_window(window, replace(SENSORS, a=wide, b=wide), learned)
     assert np.allclose(same.ranges, window.ranges - 0.1)
@@ -182,8 +183,19 @@ def test_what_module_3_says_of_its_sigmas_is_taken_as_it_is(scatter: float) -> N
     assert noise.ranges.sigma == SENSORS.ranges.sigma
     assert noise.ranges.scatter == scatter
     assert noise.ranges.bias_sigma == pytest.approx(math.hypot(0.08, LINKTRACK.least_bias_m))
+    assert noise.ranges.bias_beyond == pytest.approx(math.sqrt(0.2**2 - 0.08**2))
     assert noise.a.scale == pytest.approx(math.hypot(0.02, LEAST_SCALE))
     assert noise.b.scale == pytest.approx(math.hypot(0.01, LEAST_SCALE))
+
+
+@pytest.mark.parametrize(("wrong", "beyond"), [(0.05, 0.0), (0.5, math.sqrt(0.09 - 0.0089))])
+def test_a_bias_is_no_more_wrong_than_was_configured_and_no_less_than_it_is_held(
+    wrong: float, beyond: float
+) -> None:
+    learned = PairCalibration(Learned(0.1, 0.08), bias_sigma=wrong)
+    _, noise = calibrated_window(uncalibrated(5)[0], SENSORS, learned)
+    assert LINKTRACK.least_bias_m == 0.05
+    assert noise.ranges.bias_beyond == pytest.approx(beyond)
 
 
 @pytest.mark.parametrize(
@@ -217,9 +229,11 @@ def test_a_pair_is_found_whoever_owns_it() -> None:
         bias_m={(1, 2): Learned(0.3, 0.02)},
         scale={2: Learned(0.1, 0.01)},
         scatter={(1, 2): 0.7},
+        bias_sigma_m={(1, 2): 0.2},
     )
     sensors = PairCalibration.of(replace(estimate, near_bias_m=Learned(-0.1, 0.03)), 2, 1)
     assert sensors.bias.value == 0.3
+    assert sensors.bias_sigma == 0.2
     assert sensors.scatter == 0.7
     assert PairCalibration.of(estimate, 0, 1).scatter == 1.0
     assert sensors.near_bias == (-0.1, 0.03)

@@ -227,3 +227,16 @@ def test_of_drawn_teams_the_pair_that_was_not_measured_is_as_far_off_as_is_said(
     assert said[wide].mean() > 1.2 * said[~wide].mean()
     for some in (wide, ~wide):
         assert np.mean(own[some, 2] ** 2 / said[some]) == pytest.approx(1.0, abs=0.12)
+
+
+@pytest.mark.parametrize("told", [[0.0, 0.0, 0.0], [400.0, 30.0, 0.0], [1e4, 1e4, 1e4]])
+def test_a_bias_is_as_wrong_as_what_was_measured_of_it_and_of_the_others_leaves_it(
+    told: list[float],
+) -> None:
+    """Against the inverse of the whole matrix of all biases and what they have in common."""
+    own = np.array([0.05, -0.02, 0.0])
+    varies = 1 / (1 / PRIOR.own_variance(own, np.array(told)) + PRIOR.sigma**-2)
+    beside = np.vstack([np.eye(3), -np.ones(3)])
+    information = beside @ beside.T / varies + np.diag([*told, 1 / PRIOR.team_variance])
+    expected = np.sqrt(np.diag(np.linalg.inv(information)))[:3]
+    assert PRIOR.sigmas(own, np.array(told)) == pytest.approx(expected)

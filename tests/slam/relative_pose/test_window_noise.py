@@ -227,11 +227,20 @@ def test_an_outlier_that_weighs_a_quarter_is_twice_as_uncertain() -> None:
     assert np.count_nonzero(np.tril(thinned - plain)) == 1
 
 
-@pytest.mark.parametrize("scatter", [0.6, 1.5])
-def test_what_follows_ranges_is_as_wrong_as_they_scatter(scatter: float) -> None:
+@pytest.mark.parametrize(
+    ("said_so", "truly"),
+    [
+        (RangeNoise(0.1, 0.3, 0.6), RangeNoise(0.06, 0.3)),
+        (RangeNoise(0.1, 0.3, 1.5), RangeNoise(0.15, 0.3)),
+        (RangeNoise(0.1, 0.3, bias_beyond=0.4), RangeNoise(0.1, 0.5)),
+        (RangeNoise(0.1, 0.05, 1.5, bias_beyond=0.12), RangeNoise(0.15, 0.13)),
+    ],
+)
+def test_what_follows_ranges_is_as_wrong_as_they_scatter_and_as_their_bias(
+    said_so: RangeNoise, truly: RangeNoise
+) -> None:
     window, _, _ = drive(30)
-    said = noise_of(window, RangeNoise(0.1, 0.3, scatter), NOISE, NOISE)
-    true = noise_of(window, RangeNoise(0.1 * scatter, 0.3), NOISE, NOISE)
+    said, true = (noise_of(window, ranges, NOISE, NOISE) for ranges in (said_so, truly))
     rng = np.random.default_rng(16)
     u, heading, ones = np.exp(1j * rng.uniform(size=(2, 40))), np.ones(2) + 0j, np.ones((2, 40))
     gain = rng.normal(size=(2, 3, 40))

@@ -291,6 +291,7 @@ def solved(
             solution.joint, np.isin([chain.robot for chain in team.chains], list(points))
         ),
         bias_m=_named(team.pairs, learned.bias, spread.bias),
+        bias_sigma_m=dict(zip(team.pairs, solution.bias_sigmas.tolist(), strict=True)),
         scale=_named(list(mine), learned.scale, spread.scale),
         yaw={robot: value for robot, value in yaw.items() if robot not in team.by_gyro},
         gyro_rate={robot: yaw[robot] for robot in team.by_gyro},

@@ -61,7 +61,7 @@ def solve(
     scatter = claims.scatter_of(problem, point)
     feared = Equations(raised(problem, explained.feared, point), like=equations)
     wanted = np.array(marginals, dtype=int)
-    joint, spread = claims.covariances(feared, point, scatter, wanted)
+    joint, spread, biases = claims.covariances(feared, point, scatter, wanted)
     freed = still_freed(problem, point)
     is_same = len(freed) == len(problem.freed) == known
     doubted = tuple(one for one in freed if not one.is_settled)
@@ -79,6 +79,7 @@ def solve(
         scatter=scatter,
         joint=joint,
         spread=spread,
+        bias_sigmas=biases,
         odometry_level=np.maximum(explained.level, news),
         feared_level=np.maximum(np.sqrt(explained.feared), news),
         late_level=np.maximum(np.sqrt(explained.lately), late),

@@ -21,8 +21,9 @@ CERTAIN = 3.0
 
 def covariances(
     equations: Equations, point: Point, scatter: Array, wanted: Index
-) -> tuple[Array, Calibration]:
-    """Joint covariance (3 k, 3 k) of poses (k,), and sigmas of the calibration.
+) -> tuple[Array, Calibration, Array]:
+    """Joint covariance (3 k, 3 k) of poses (k,), sigmas of the calibration, and how wrong biases
+    may be (pairs,), m.
 
     A bias of the configured size is feared for poses; what was learned of it is told with the sigma
     that the team's likeness leaves, because others go on from there.
@@ -38,11 +39,23 @@ def covariances(
     joint = None if factor is None else factor.joint_covariance(poses)
     sigmas = np.full(layout.band + layout.border, np.sqrt(UNKNOWN))
     if factor is None or joint is None or not _is_known(joint):
-        return UNKNOWN * np.eye(len(poses)), layout.calibration(sigmas)
-    claimed = np.diag(np.linalg.inv(factor.schur))[layout.bias - layout.band]
-    learned = np.linalg.inv(factor.schur + equations.bias_belief(point, claimed))
+        nothing = np.full(len(layout.bias), equations.problem.priors.bias.sigma)
+        return UNKNOWN * np.eye(len(poses)), layout.calibration(sigmas), nothing
+    learned = np.linalg.inv(factor.schur + equations.bias_belief(point))
     sigmas[layout.band :] = np.sqrt(np.diag(learned))
-    return joint, layout.calibration(sigmas)
+    claimed = np.diag(np.linalg.inv(factor.schur))[layout.bias - layout.band]
+    return joint, layout.calibration(sigmas), bias_sigmas(equations.problem, point, claimed)
+
+
+def bias_sigmas(problem: Problem, point: Point, claimed: Array) -> Array:
+    """(pairs,) how wrong biases may be, m.
+
+    Args:
+        claimed: (pairs,) variances under the priors as they are configured, m^2.
+    """
+    prior, calibration = problem.priors.bias, point.calibration
+    told = np.maximum(1 / claimed - prior.sigma**-2, 0.0)
+    return prior.sigmas(calibration.bias - calibration.team_bias[0], told)
 
 
 def _is_known(joint: Array) -> bool:

@@ -264,22 +264,13 @@ class Equations:
         system.add_prior(layout.yaw, priors.yaw_claim(calibration.yaw))
         self._add_mounting_priors(system, calibration, LEAST_CURVATURE)
 
-    def bias_belief(self, point: Point, claimed: Array) -> Array:
-        """(b, b) what the border gains where biases are as the team's likeness leaves them.
-
-        Args:
-            claimed: (pairs,) variances of biases, as they are `claimed`, m^2.
-        """
+    def bias_belief(self, point: Point) -> Array:
+        """(b, b) what the border gains where biases are as believed instead of as claimed."""
         layout, prior = self.layout, self.problem.priors.bias
-        wide = prior.sigma**-2
-        own = point.calibration.bias - float(point.calibration.team_bias[0])
-        told = np.maximum(1 / claimed - wide, 0.0)
-        stiffness = 1 / prior.own_variance(own, told) + wide
         gain = System.empty(layout)
-        gain.add_difference(layout.bias, layout.team_bias, stiffness * np.eye(len(own)))
-        gain.add_prior(layout.team_bias, 1 / prior.team_variance)
-        gain.add_prior(layout.bias, -wide)
-        gain.add_prior(layout.team_bias, -wide)
+        self._add_bias_prior(gain, point.calibration, LEAST_CURVATURE)
+        gain.add_prior(layout.bias, -(prior.sigma**-2))
+        gain.add_prior(layout.team_bias, -(prior.sigma**-2))
         return gain.corner
 
     def weighed(self, point: Point) -> System:

@@ -19,7 +19,7 @@ class Solution:
     Attributes:
         scatter: (pairs,) how many times the configured sigma ranges scatter.
         joint: (3 k, 3 k) covariance of x, y, theta in w of the k poses that were asked for.
-        spread: sigmas of the calibration.
+        spread: sigmas of the calibration; bias_sigmas: (pairs,) how wrong biases may be, m.
         odometry_level: (m,) sigmas of the links of odometry over what was configured, as far as
             it was seen; feared_level: as far as it must be feared; late_level: of the last seconds.
         doubted: whose mountings were let go.
@@ -36,6 +36,7 @@ class Solution:
     scatter: Array = field(default_factory=lambda: np.zeros(0))
     joint: Array = field(default_factory=lambda: np.zeros((0, 0)))
     spread: Calibration | None = None
+    bias_sigmas: Array = field(default_factory=lambda: np.zeros(0))
     odometry_level: Array = field(default_factory=lambda: np.zeros(0))
     feared_level: Array = field(default_factory=lambda: np.zeros(0))
     late_level: Array = field(default_factory=lambda: np.zeros(0))

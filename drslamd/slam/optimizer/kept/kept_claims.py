@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drslamd.slam.optimizer.banded.claims import UNKNOWN
+from drslamd.slam.optimizer.banded.claims import UNKNOWN, bias_sigmas
 from drslamd.slam.optimizer.banded.lapack import cholesky_solved, inverse_triangular
 from drslamd.slam.optimizer.banded.layout import NOWHERE
 from drslamd.slam.optimizer.banded.normal_equations import Equations
@@ -35,17 +35,20 @@ def kept_covariance(claimed: Current, wanted: Index) -> Array | None:
     return np.asarray((joint + joint.T) / 2)
 
 
-def kept_spread(problem: Problem, point: Point, claimed: Current) -> Calibration | None:
-    """Sigmas of what was learned, see `claims.covariances`; None as above."""
+def kept_spread(
+    problem: Problem, point: Point, claimed: Current
+) -> tuple[Calibration, Array] | None:
+    """Sigmas of what was learned, and how wrong biases may be (pairs,), m, see
+    `claims.covariances`; None as above."""
     layout, lower = claimed.layout, claimed.lower
     first = len(lower) - len(claimed.places.flat.constants)
     own = lower[first:, first:]
-    alone = (inverse_triangular(own) ** 2).sum(axis=0)[layout.bias - layout.band - first]
-    belief = Equations(problem, layout=layout).bias_belief(point, alone)[first:, first:]
+    belief = Equations(problem, layout=layout).bias_belief(point)[first:, first:]
     try:
         learned = inverse_triangular(np.linalg.cholesky(own @ own.T + belief))
     except np.linalg.LinAlgError:
         return None
     sigmas = np.full(len(lower), np.sqrt(UNKNOWN))
     sigmas[first:] = np.sqrt((learned**2).sum(axis=0))
-    return layout.calibration(sigmas)
+    wide = (inverse_triangular(own) ** 2).sum(axis=0)[layout.bias - layout.band - first]
+    return layout.calibration(sigmas), bias_sigmas(problem, point, wide)

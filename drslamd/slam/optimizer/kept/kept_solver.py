@@ -143,7 +143,7 @@ def _solved(
         return None
     since = kept.sure if kept and known else sure
     after = Kept(downwards, held, since, variances, checked)
-    return _said(equations, point, scatter, sure.feared, joint, spread), after
+    return _said(equations, point, scatter, sure.feared, joint, *spread), after
 
 
 def _matrix(
@@ -174,6 +174,7 @@ def _said(
     feared: Array,
     joint: Array,
     spread: Calibration,
+    biases: Array,
 ) -> Solution:
     """What `banded_solver.solve` says where all is as modelled."""
     problem = equations.problem
@@ -189,6 +190,7 @@ def _said(
         scatter=scatter,
         joint=joint,
         spread=spread,
+        bias_sigmas=biases,
         odometry_level=np.ones(len(level)),
         feared_level=level,
         late_level=level,

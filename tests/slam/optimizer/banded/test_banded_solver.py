@@ -291,7 +291,7 @@ def test_where_nobody_can_say_who_is_wrong_poses_stay_and_their_covariances_grow
     assert other is not None
     apart = (nominal.poses - other.poses)[wanted]
     apart[:, 2] = np.angle(np.exp(1j * apart[:, 2]))
-    plain, _ = covariances(equations, nominal, solution.scatter, wanted)
+    plain, *_ = covariances(equations, nominal, solution.scatter, wanted)
     grown = solution.joint - plain - np.outer(apart, apart)
     assert np.abs(apart).max() > 0.1
     assert np.linalg.eigvalsh(grown)[0] > -1e-6

@@ -21,7 +21,7 @@ def test_covariances_and_sigmas_are_those_of_the_whole_system() -> None:
     problem = team.problem
     point, scatter = shaken(problem), np.array([0.2, 0.9, 1.4])
     wanted = np.array([np.flatnonzero(problem.robot == robot)[-1] for robot in range(3)])
-    joint, spread = claims.covariances(Equations(problem), point, scatter, wanted)
+    joint, spread, biases = claims.covariances(Equations(problem), point, scatter, wanted)
     ratio = problem.model.correlated_ratio(1.0) * np.maximum(scatter, LEAST_SCATTER)
     believed = Believed(problem, point, ratio)
     kept = build(believed, team.pairs, tail_of(problem), with_blocks=False)
@@ -34,7 +34,9 @@ def test_covariances_and_sigmas_are_those_of_the_whole_system() -> None:
     assert found is not None
     assert np.allclose(found, joint, rtol=1e-6, atol=1e-12)
     learned = kept_spread(problem, point, current)
+    assert learned is not None
     for f in fields(Calibration):
-        assert np.allclose(getattr(learned, f.name), getattr(spread, f.name), rtol=1e-6), f.name
+        assert np.allclose(getattr(learned[0], f.name), getattr(spread, f.name), rtol=1e-6), f.name
+    assert np.allclose(learned[1], biases, rtol=1e-6)
     # of what was eliminated it cannot say it
     assert kept_covariance(current, np.array([0, 1, 2])) is None
