@@ -55,6 +55,38 @@ def nees(estimate: RelativePoseEstimate, true: Array) -> float:
     return float(error @ np.linalg.solve(best.covariance, error))
 
 
+# robots that only turn
+
+
+def spinning(count: int, turns: float, x: float) -> Array:
+    """(count, 3) who turns in place."""
+    return np.column_stack([np.full(count, x), np.zeros(count), np.linspace(0, turns, count)])
+
+
+def test_two_that_only_turn_say_nothing_of_each_other_wherever_their_antennas_are() -> None:
+    """Ranges are exact here; on robots they also move with bearing, as much as with the turns."""
+    a, b = spinning(60, 9.0, 0.0), spinning(60, -5.0, 6.0)
+    window, _ = window_of(a, b, a_antenna=(0.31, 0.0), b_antenna=(0.31, 0.0))
+    assert np.ptp(window.ranges) > 0.5
+    assert solved(window).verdict is Verdict.UNOBSERVABLE
+
+
+@pytest.mark.parametrize(("times", "is_enough"), [(0.99, True), (1.01, False)])
+def test_who_came_half_a_metre_far_does_not_only_turn(
+    times: float, is_enough: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert solver.SPOT_M == 0.5
+    window, _ = curved(1)
+    far = max(float(np.hypot(*p[:, :2].T).max()) for p in (window.a_poses, window.b_poses))
+    monkeypatch.setattr(solver, "SPOT_M", times * far)
+    assert (solved(window).verdict is Verdict.UNIQUE) is is_enough
+    if not is_enough:
+        assert (
+            solve_all([window, window], [SENSORS, SENSORS], DELTA)
+            == [RelativePoseEstimate(Verdict.UNOBSERVABLE)] * 2
+        )
+
+
 # what curved motion fixes
 
 
