@@ -20,8 +20,8 @@ from drslamd.slam.points.site import Site, site_of
 from drslamd.slam.pose_now import pose_now
 from drslamd.slam.relative_pose.pair_end import PairEnd
 from drslamd.slam.relocation.last_place import LastPlace, last_place
-from drslamd.slam.relocation.question import Found
-from drslamd.whereabouts import NOWHERE, Whereabouts, likely_speeds, whereabouts
+from drslamd.slam.relocation.question import Found, is_vague
+from drslamd.whereabouts import NOWHERE, VALID_US, Whereabouts, likely_speeds, whereabouts
 
 
 class Asked(NamedTuple):
@@ -58,10 +58,16 @@ class Standing:
         track, gap_m = self._front.reckoning.track, self._front.watch.gap_m
         by_ranges, estimate = self._front.relocation.by_ranges(utime), self._back.estimate
         is_point = estimate is not None and self._robot in estimate.points
-        most = self._most_mps
-        return whereabouts(
-            self.pose(), track, most, self._doubt(), utime, gap_m, by_ranges, is_point
-        )
+        most, pose = self._most_mps, self.pose()
+        if pose is not None and is_vague(pose.covariance) and self._comes_back(pose, utime):
+            pose = None
+        return whereabouts(pose, track, most, self._doubt(), utime, gap_m, by_ranges, is_point)
+
+    def _comes_back(self, pose: PoseNow, utime: int) -> bool:
+        """Were we just placed, after a hole or after a start?"""
+        relocation, resumption = self._front.relocation, self._front.resumption
+        has_place = relocation.is_lost and relocation.by_ranges(utime) is not None
+        return utime - pose.utime <= VALID_US and (has_place or resumption.is_settling(utime))
 
     def site(self) -> Site | str | None:
         """The frame of the site, or why there is none; None where no module has coordinates."""

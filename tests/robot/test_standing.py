@@ -13,7 +13,7 @@ from drslamd.conditions.diagnosis import why_not_localised
 from drslamd.conventions import SECOND_US, Chain
 from drslamd.gossip.message_types import Heard, PoseState
 from drslamd.slam.doubt import Doubt, Reason
-from drslamd.slam.graph.estimate import MUCH_WORSE, Learned, Trajectory
+from drslamd.slam.graph.estimate import MUCH_WORSE, Learned, PoseNow, Trajectory
 from drslamd.slam.range_watch import RangeWatch
 from drslamd.slam.relative_pose.estimate import Verdict
 from drslamd.slam.relative_pose.mounting_search import MOST
@@ -174,3 +174,23 @@ def test_a_robot_whose_id_another_uses_has_no_pose() -> None:
     found = standing(scene).whereabouts(scene.utime)
     assert (found.state, found.pose) == (PoseState.NOT_LOCALISED, None)
     assert "another robot uses the id" in str(why_not_localised(scene.robot, scene.utime))
+
+
+@pytest.mark.parametrize(
+    ("degrees", "is_told", "state"),
+    [
+        (14.0, True, PoseState.LOCALISED),
+        (16.0, True, PoseState.NOT_LOCALISED),
+        (16.0, False, PoseState.LOCALISED),
+    ],
+)
+def test_who_was_just_placed_has_no_pose_before_its_heading_is_known(
+    monkeypatch: pytest.MonkeyPatch, degrees: float, is_told: bool, state: PoseState
+) -> None:
+    scene = RobotScene()
+    covariance = np.diag([0.1, 0.1, np.radians(degrees) ** 2])
+    found = PoseNow(scene.utime, np.zeros(3), covariance)
+    monkeypatch.setattr(scene.robot.standing, "pose", lambda: found)
+    if is_told:
+        scene.robot.front.resumption._told_at = scene.utime
+    assert scene.robot.whereabouts(scene.utime).state is state

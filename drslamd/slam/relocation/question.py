@@ -25,6 +25,10 @@ LATE_US = 5 * SECOND_US // 2
 LONGEST_US = 10 * SECOND_US
 """Of the odometry after a hole that is placed at once."""
 
+VAGUE_RAD = np.radians(15.0)
+"""Module 3 has a range a second and placings have more, so its first answers may say next to
+nothing of a heading: until they do, there is no pose."""
+
 
 @dataclass(frozen=True)
 class Found:
@@ -55,6 +59,11 @@ def localised_peers(
         if path_in_team(end, estimate) is not None:
             out.append(Beacon(end, found))
     return out
+
+
+def is_vague(covariance: Array | None) -> bool:
+    """Of a robot that was placed, (3, 3): is its heading not yet known to module 3?"""
+    return covariance is not None and bool(covariance[2, 2] > VAGUE_RAD**2)
 
 
 def known_until(beacons: list[Beacon], utime: int) -> int:

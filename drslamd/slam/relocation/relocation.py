@@ -29,6 +29,7 @@ from drslamd.slam.relocation.placing import Prior
 from drslamd.slam.relocation.question import (
     Found,
     closure,
+    is_vague,
     known_until,
     last_keyframe,
     localised_peers,
@@ -112,6 +113,9 @@ class Relocation:
             speed: how fast we drive, m/s; asked for only in a hole.
         """
         hole = _hole(estimate, self._own, track, utime)
+        is_placed = hole is None
+        if is_placed and estimate is not None and is_vague(estimate.covariance(self._own.robot)):
+            hole = self._hole
         if hole is None or estimate is None:
             self._hole = self._cloud = self._prior = self._told_at = None
             return None
@@ -125,6 +129,8 @@ class Relocation:
         beacons = localised_peers(neighbours, ranges, graph, estimate)
         until = known_until(beacons, utime)
         self._carry(beacons, estimate, own, until, utime)
+        if is_placed:
+            return None
         return self._placing(beacons, estimate, own, until, utime)
 
     # while nothing is known of the way

@@ -53,6 +53,9 @@ AGREE_M, AGREE_RAD = 0.5, 0.15
 AGAIN_US = 4 * SECOND_US
 """A closure has joined us to the others by then, or another one is needed."""
 
+SETTLES_US = 10 * SECOND_US
+"""So long at most it is waited for a heading."""
+
 
 class _Answer(NamedTuple):
     """A place, in which frame, and since when it is the answer, us."""
@@ -159,6 +162,10 @@ class Resumption:
         self._number += 1
         self._closures.append(closure(found, found.answer, own, n, self._number))
         return True
+
+    def is_settling(self, utime: int) -> bool:
+        """Was a place told so lately that module 3 may not know the heading yet?"""
+        return self._told_at is not None and utime - self._told_at < SETTLES_US
 
     def tell(self) -> list[ClosureMeasurement]:
         """Closures for our log."""

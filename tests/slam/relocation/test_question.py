@@ -15,6 +15,7 @@ from drslamd.slam.relocation.question import (
     LATE_US,
     Found,
     closure,
+    is_vague,
     known_until,
     last_keyframe,
     localised_peers,
@@ -79,3 +80,11 @@ def test_a_segment_that_ended_has_no_keyframe_to_tell() -> None:
     scene = ResumedScene(last())
     found = Found(solved(), BEGAN - 1, (0,), "ambiguous")
     assert last_keyframe(found, scene.own) is None
+
+
+@pytest.mark.parametrize(("degrees", "expected"), [(14.9, False), (15.1, True)])
+def test_a_heading_is_known_to_fifteen_degrees_or_it_is_none(
+    degrees: float, expected: bool
+) -> None:
+    assert is_vague(np.diag([9.0, 9.0, np.radians(degrees) ** 2])) is expected
+    assert not is_vague(None)

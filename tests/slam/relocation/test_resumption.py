@@ -84,6 +84,16 @@ def test_who_is_localised_needs_it_no_more(points: frozenset[int], is_over: bool
     assert scene.resumption.is_waiting is not is_over
 
 
+def test_for_ten_seconds_after_a_place_was_told_it_may_be_vague() -> None:
+    scene, t0 = ResumedScene(last()), UNTIL * 100_000
+    assert not scene.resumption.is_settling(t0)
+    found = scene.found()
+    for k in (0, 2):
+        scene.resumption.on_found(found, scene.own, t0 + k * SECOND_US)
+    assert scene.resumption.is_settling(t0 + 12 * SECOND_US - 1)
+    assert not scene.resumption.is_settling(t0 + 12 * SECOND_US)
+
+
 def test_who_remembers_nothing_asks_nothing_and_nobody() -> None:
     scene = ResumedScene(None)
     assert scene.look() is None
