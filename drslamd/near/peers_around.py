@@ -143,8 +143,11 @@ class PeersAround:
             return NOBODY
         seen, covariance = self._relatives.seen_from(leg.end, added)
         stands, states, thens, unsure, speeds, turns = self._rows
-        stood = utime - STANDS_US
-        utimes = tuple(stood if still else then for still, then in zip(stands, thens, strict=True))
+        utimes = thens
+        if True in stands:
+            stood = utime - STANDS_US
+            both = zip(stands, thens, strict=True)
+            utimes = tuple(stood if still else then for still, then in both)
         return Neighbours(
             tuple(self._tracked), states, utimes, unsure, seen, covariance, speeds, turns
         )

@@ -91,7 +91,7 @@ def line(case: Case, drives: Sequence[Drive], without: Sequence[Drive]) -> tuple
     cost, usual = (_rms(each, spans) for each in (drives, without))
     named = np.array([d.named_s for d in drives])
     told = [f"{np.median(named):.1f}", f"{named.max():.1f}", f"{np.sum(~np.isfinite(named))}"]
-    ratio = cost / usual
+    ratio = round(cost / usual, 2)
     cells = [*(told if asked else ["-"] * 3), f"{np.degrees(cost):.2f}", f"{ratio:.2f}"]
     is_reached = not asked or (bool(named.max() <= NAMED_WITHIN_S) and ratio <= 1.0)
     return f"| {case.name} | {' | '.join(cells)} |", is_reached
