@@ -22,7 +22,7 @@ GAUGE_SIGMA = 1e-5
 """The gauge pose is held to 10 um and 10 urad: far below all noise, far above rounding."""
 
 
-SPARSE = 4
+SPARSE = 32
 """Where a matrix has so many times more entries than are added to it, they are added one by one."""
 
 
