@@ -128,10 +128,7 @@ class _Assembly:
         else:
             weighed = np.einsum("cem,mde->cdm", jacobian, factors.information)
         one, other = self._twos
-        out = np.empty((len(one), jacobian.shape[2]))
-        for at, (k, last) in enumerate(zip(one.tolist(), other.tolist(), strict=True)):
-            np.einsum("dm,dm->m", jacobian[k], weighed[last], out=out[at])
-        return out
+        return np.asarray(np.einsum("tdm,tdm->tm", jacobian[one], weighed[other]))
 
     def add_gradient(self, gradient: Array, factors: Linearised) -> None:
         """Add J' f."""
