@@ -59,9 +59,9 @@ def test_few_frames_with_two_damaged_bits_give_a_wrong_range() -> None:
     """The checksum alone lets one in fifteen pass."""
     found = flips.double_flips(3_000, told=quiet)
     assert found.many == 3_000
-    assert found.wrong <= 20
-    assert found.harmful <= 4
-    assert found.lost < 3
+    assert found.wrong <= 25
+    assert found.harmful <= 10
+    assert found.lost < 5
 
 
 @pytest.mark.row("D1")
