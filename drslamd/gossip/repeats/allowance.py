@@ -72,7 +72,7 @@ class _LastSecond:
 
     def add(self, utime: int, count: float) -> None:
         self._said.append((utime, count))
-        self._bytes += count
+        self._bytes = self.bytes(utime) + count
 
     def bytes(self, utime: int) -> float:
         while self._said and utime - self._said[0][0] >= SECOND_US:

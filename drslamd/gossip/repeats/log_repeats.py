@@ -1,10 +1,11 @@
 """Who repeats a lost log entry, and when.
 
 Each status names how far its sender has got with every log. Whoever holds what it lacks sends it
-again, sealed as it came: the owner at once, and once a second until the next status comes; the
-others a little later, in groups by their ids, and only if nobody else did. Where most messages are
-lost, requests are too: then an owner says each new entry again before it is asked, until everybody
-says that it is there.
+again, sealed as it came: the owner at once, and again when the next status is overdue; the others
+when the owner is silent or it is asked for a second time, a little later, in groups by their ids,
+and only if nobody else did and nobody says that it is there by now. Where most messages are lost,
+requests are too: then an owner says each new entry again before it is asked, until everybody says
+that it is there.
 """
 
 from __future__ import annotations

@@ -114,6 +114,14 @@ def test_however_much_else_is_said_a_fifth_is_left_for_repeats() -> None:
     assert not pace.has_room(T0 + 900 * MS, 301 - FRAMING)
 
 
+def test_no_more_than_a_second_of_repeats_is_remembered() -> None:
+    pace = Allowance()
+    for ms in range(0, 5_000, 10):
+        pace.on_air(100, T0 + ms * MS, Speech.AGAIN, 1, heard=True)
+    assert len(pace._again._said) == 100
+    assert pace._again.bytes(T0 + 4_990 * MS) == 100 * (100 + FRAMING)
+
+
 def test_whoever_floods_the_channel_with_repeats_leaves_each_robot_one_a_second() -> None:
     pace, sent = Allowance(), 0
     for ms in range(0, 10_000, 10):
