@@ -8,13 +8,16 @@ log; `log_repeats` says who then repeats what is missing.
 from __future__ import annotations
 
 from drslamd.conventions import MILLISECOND_US, SECOND_US, Chain
-from drslamd.gossip.log_repeats import REPEATS_AT_ONCE, LogRepeats, Speech, holdings
 from drslamd.gossip.message_types import MAX_LOGS, MAX_STRETCHES, LogState
+from drslamd.gossip.repeats.allowance import Speech
+from drslamd.gossip.repeats.log_repeats import REPEATS_AT_ONCE, LogRepeats, holdings
 from drslamd.gossip.replicated_log import AHEAD, ReplicatedLog
 from drslamd.slam.graph.measurements import Chapter, GraphEntry
 
 ECHO_US = 200 * MILLISECOND_US
 """So late at most we hear ourselves."""
+MUCH = 500
+"""Bytes of a large repeat: where there is no room for it, others say again what they can."""
 
 
 class LogSync:
@@ -70,19 +73,21 @@ class LogSync:
         """An entry of our own; chapters are said as if they were repeated, when there is room."""
         self.add(own, entry.seq, sealed, utime, entry.chapter)
         if entry.chapter is None:
-            self.repeats.pace.on_air(len(sealed), utime)
+            self.repeats.pace.on_air(len(sealed), utime, Speech.NEW, own.robot)
             self.repeats.push(entry.seq, utime)
 
     def on_echo(self, own: Chain, came: tuple[GraphEntry, bytes] | None, utime: int) -> None:
         """Something came back that says it is of ours: an entry that somebody said again need not
-        be said by us; what we did not say changes nothing."""
+        be said by us. What we no longer hold, as a chapter says it, is on the air like the rest."""
         log = self._logs.get(own.robot)
-        if came is None or log is None or log.sealed.get(came[0].seq) != came[1]:
+        if came is None or log is None:
             return
         seq, size = came[0].seq, len(came[1])
-        if utime - log.aired[seq] > ECHO_US:
-            self.repeats.pace.on_air(size, utime, Speech.AGAIN, heard=True)
-        log.aired[seq] = utime
+        is_held = log.sealed.get(seq) == came[1]
+        if not is_held or utime - log.aired[seq] > ECHO_US:
+            self.repeats.pace.on_air(size, utime, Speech.AGAIN, own.robot, heard=True)
+        if is_held:
+            log.aired[seq] = utime
 
     def next_states(self) -> tuple[LogState, ...]:
         """For our status: our own log, and those of the others, in turn when they are too many.
@@ -145,12 +150,13 @@ class LogSync:
 
     def is_filling(self, utime: int) -> bool:
         """Are the entries that our last status asked for on their way?"""
-        return 2 * self._came < self._asked and utime - self._came_utime < 2 * SECOND_US
+        expected = (1 - self.repeats.pace.loss) * self._asked
+        return self._came < expected and utime - self._came_utime < 2 * SECOND_US
 
     def is_asking(self, utime: int) -> bool:
         """Do we lack entries that are not on their way, and has the channel room for them?"""
         is_waiting = self.lacks_any() and not self.is_filling(utime)
-        return is_waiting and self.repeats.pace.has_room(utime, is_one_of_many=True)
+        return is_waiting and self.repeats.pace.has_room(utime, MUCH, is_one_of_many=True)
 
     def on_states(self, states: tuple[LogState, ...], sender: int, utime: int) -> None:
         """A peer said what it holds: learn what we lack, plan to repeat what it lacks."""

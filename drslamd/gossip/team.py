@@ -12,7 +12,6 @@ from drslamd.gossip.bounds import LAST_SEQ, Measurement, is_sayable
 from drslamd.gossip.entries.chapter_writer import ChapterWriter
 from drslamd.gossip.envelopes.opening import Opened, entry_of, opened
 from drslamd.gossip.envelopes.splitting import entries_of, parts_of
-from drslamd.gossip.log_repeats import Place, said_of
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.membership.acquaintance import Acquaintance, vouched
 from drslamd.gossip.membership.flood import BUDGET, Flood
@@ -21,6 +20,8 @@ from drslamd.gossip.membership.refusals import Fault, Refusals
 from drslamd.gossip.message_types import Received
 from drslamd.gossip.messages import Heard, Message, OdometryBatch, Pose, Status
 from drslamd.gossip.peer import Peer, carrier, shared_module
+from drslamd.gossip.repeats.allowance import said_of
+from drslamd.gossip.repeats.log_repeats import Place
 from drslamd.gossip.replicated_log import AHEAD
 from drslamd.gossip.seal import Header, Seal, SealFault
 from drslamd.gossip.starts import Starts
@@ -80,7 +81,7 @@ class Team:
         """Seal a message."""
         channel = messages.channel(messages.kind_of(message), self.own.robot)
         payload = messages.encode(self.seal.header(utime), message)
-        self.logs.repeats.pace.on_air(len(payload), utime, said_of(message))
+        self.logs.repeats.pace.on_air(len(payload), utime, said_of(message), self.own.robot)
         return Send(channel, self.seal.close(channel, payload))
 
     def send_public(self, public: PublicPoses, utime: int) -> list[Send]:
@@ -259,11 +260,10 @@ class Team:
     def _sort(self, header: Header, message: Message, sealed: bytes, utime: int) -> Received | None:
         origin = Chain(header.origin, header.epoch)
         latest = self.peers[origin.robot].latest_counter if self._is_peer(origin) else None
-        said = said_of(message, header.counter, latest)
-        self.logs.repeats.pace.on_air(len(sealed), utime, said, heard=True)
+        said, pace = said_of(message, header.counter, latest), self.logs.repeats.pace
+        pace.on_air(len(sealed), utime, said, header.origin, heard=True)
         if isinstance(message, GraphEntry):
-            # may come from a relay and long after it was made: says nothing about its origin's
-            # clock or whether it lives
+            # may come late and from a relay: says nothing of its origin's clock or life
             if not self.logs.add(origin, message.seq, sealed, utime, message.chapter):
                 self.repeats_heard += 1
                 return None

@@ -162,7 +162,7 @@ def test_nobody_knows_more_of_our_own_log_than_we() -> None:
 
 def test_a_boast_about_a_log_is_no_reason_to_count_to_it() -> None:
     logs = holding(5, OWNER, 0)
-    for sender in (OWNER.robot, OTHER.robot):
+    for sender in (OWNER.robot, OTHER.robot, OTHER.robot):
         logs.on_states(state(OWNER, 0, newest=2**31 - 1), sender, T0)
     assert repeated(logs, T0 + 2 * SECOND) == [said(OWNER, 0)]
 
@@ -279,6 +279,8 @@ def test_whoever_gets_what_it_asked_for_does_not_ask_again_at_once() -> None:
     logs.add(OWNER, 2, b"", T0 + SECOND)
     assert logs.is_filling(T0 + 2 * SECOND)
     logs.add(OWNER, 3, b"", T0 + 2 * SECOND)
+    assert logs.is_filling(T0 + 2 * SECOND)
+    logs.repeats.pace.reckon([0.4])  # then no more is expected of the five
     assert not logs.is_filling(T0 + 2 * SECOND)
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from message_builders import SECOND
 
 from drslamd.conventions import Chain
-from drslamd.gossip.log_repeats import REPEATS_AT_ONCE
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.message_types import LogState
+from drslamd.gossip.repeats.log_repeats import REPEATS_AT_ONCE
 
 OWNER, PEER, OTHER = Chain(3, 1), Chain(5, 1), Chain(6, 1)
 T0 = 100 * SECOND

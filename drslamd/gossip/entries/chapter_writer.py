@@ -39,15 +39,16 @@ class ChapterWriter:
             self._measurements += len(entry.keyframes) + len(entry.ranges) + len(entry.closures)
 
     def on_states(self, own: Chain, states: Iterable[LogState]) -> None:
-        """A peer says how much of our log it has."""
-        for state in states:
-            if (state.id, state.epoch) == own:
-                self.asked(state.complete)
-
-    def asked(self, complete: int) -> None:
-        """Somebody lacks our log from entry `complete` on: many entries are better said at once."""
-        entries = self._entries
-        self._is_asked |= len(entries) >= FEWEST and complete <= entries[-FEWEST].seq
+        """A peer says what it has of our log: if it lacks many entries, they are better said at
+        once. The first row says where its first gap is, others what lies beyond."""
+        rows = [state for state in states if (state.id, state.epoch) == own]
+        if not rows or self._is_asked or len(self._entries) < FEWEST:
+            return
+        held = [(0, rows[0].complete), *((row.first, row.complete) for row in rows[1:])]
+        lacking = sum(
+            not any(begin <= entry.seq < end for begin, end in held) for entry in self._entries
+        )
+        self._is_asked = lacking >= FEWEST
 
     def due(self, seq: int) -> list[GraphEntry]:
         """The entries that follow now, from number `seq` on: those of a chapter, most often none.

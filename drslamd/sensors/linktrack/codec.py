@@ -43,6 +43,7 @@ class Refusal(Enum):
     WRONG_ID = "printed by another module than the configured one"
     VOLTAGE = "a supply voltage on which no module lives"
     TIME = "a local time that does not continue the one before"
+    STEP = "something that goes on from frame to frame and did not, until the next says the same"
 
 
 @dataclass(frozen=True)

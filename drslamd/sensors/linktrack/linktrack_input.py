@@ -6,10 +6,12 @@ used only when all of this holds as well:
 
 1. it comes from the module that the configuration names,
 2. the supply voltage is one on which a module lives,
-3. its local time continues that of the frame before, which asks for two frames after a start.
+3. its local time continues that of the frame before, which asks for two frames after a start,
+4. what goes on from frame to frame goes on, or the next frame says the same (`continuity`).
 
-The role byte is a free label in the DR modes and never a reason. Whatever is turned away is
-counted under one reason. A range is stamped with the time at which the module measured it.
+The role byte is a free label in the DR modes and no reason, unless it changes from one frame to the
+next. Whatever is turned away is counted under one reason. A range is stamped with the time at which
+the module measured it.
 
 This is the border for numbers: every range passes `LinkTrackInput.feed`, and each one that leaves
 it is finite and within the limits of the module, whatever a table says of how numbers are sent.
@@ -27,6 +29,7 @@ from typing import Any, Final
 from drslamd.conventions import MILLISECOND_US
 from drslamd.sensors.device_clock import WINDOW_US, DeviceClock
 from drslamd.sensors.frame_scanner import FrameScanner
+from drslamd.sensors.linktrack import continuity
 from drslamd.sensors.linktrack.codec import LINKTRACK, Frame, Refusal, decode_intact
 from drslamd.sensors.linktrack.linktrack_advice import LinkTrackWatch, Oddity, shown_id
 from drslamd.sensors.linktrack.linktrack_frames import EMPTY_ID, Kind, ModuleFault
@@ -43,8 +46,6 @@ MIN_RANGE_M: Final = -0.5
 TIME_BITS: Final = 32
 SYSTEM_TIME_PERIOD_US: Final = (1 << TIME_BITS) * MILLISECOND_US
 """Both stamps of a module are u32 milliseconds and wrap after 49.7 days."""
-LEAD_JUMP_MS: Final = 10
-"""Two modules drift apart by 40 us a second; a new time base differs by more than this."""
 
 HEALTH_BITS: Final = (
     ModuleFault.DUPLICATE_ID
@@ -81,6 +82,7 @@ class RangeRefusal(Enum):
     SELF = "a range to itself"
     NOT_FINITE = "a value that is not a finite number"
     LIMITS = "a distance that this kind of module cannot measure"
+    STEP = "a step from the range before that the next one has not confirmed"
     DUPLICATE = "further distance to the same module, taken into the median"
 
 
@@ -110,6 +112,7 @@ class LinkTrackInput:
         self._watch = LinkTrackWatch(uwb_id, line)
         self._lead_ms: int | None = None
         self._lead_is_steady = False
+        self._heads, self._steps = continuity.HeadSteps(), continuity.RangeSteps()
         self.frames: Tally[Refusal] = Tally()
         self.ranges: Tally[RangeRefusal] = Tally()
         self.bytes_received = 0
@@ -173,14 +176,14 @@ class LinkTrackInput:
         if frame.kind in _REFUSED_KINDS:
             return self._refuse(_REFUSED_KINDS[frame.kind], frame.kind.name, utime)
         if frame.kind in _RANGING:
-            return self._on_ranging(frame, utime)
+            return self._on_ranging(data, frame, utime)
         if frame.kind is Kind.ERROR_FRAME0:
             self.module_faults = HEALTH_BITS & frame.values["error_bits"]
             self._watch.on_fault(self.module_faults, utime)
         self.frames.ignored += 1
         return []
 
-    def _on_ranging(self, frame: Frame, utime: int) -> list[RangeSample]:
+    def _on_ranging(self, data: bytes, frame: Frame, utime: int) -> list[RangeSample]:
         """Checks everything, then takes everything."""
         values = frame.values
         if values["id"] != self._uwb_id:
@@ -188,6 +191,13 @@ class LinkTrackInput:
             return self._refuse(Refusal.WRONG_ID, shown_id(values["id"]), utime)
         if not MIN_VOLTAGE_V <= values["voltage_v"] <= MAX_VOLTAGE_V:
             return self._refuse(Refusal.VOLTAGE, f"{values['voltage_v']:.1f} V", utime)
+        lead_ms = _lead_ms(frame) if self._lead_is_steady else None
+        head = continuity.head_of(data, frame, lead_ms, utime)
+        believed = self._heads.goes_on(head)
+        if believed is None:
+            return self._refuse(Refusal.STEP, "", utime)
+        for waited in believed:
+            self._clock.to_host(waited.local_ms, waited.utime)
         measured = self._clock.to_host(values["local_time_ms"], utime)
         if measured is None:
             return self._refuse(Refusal.TIME, "", utime)
@@ -223,14 +233,11 @@ class LinkTrackInput:
 
     def _follow_system_time(self, frame: Frame) -> None:
         """system_time leads local_time by a constant until one of the two starts anew."""
-        before, self._lead_ms = self._lead_ms, None
-        if frame.kind in _SHORT_IDS:
-            system_ms, local_ms = frame.values["system_time_ms"], frame.values["local_time_ms"]
-            self._lead_ms = wrapped_difference(system_ms, local_ms, TIME_BITS)
+        before, self._lead_ms = self._lead_ms, _lead_ms(frame)
         self._lead_is_steady = (
             before is not None
             and self._lead_ms is not None
-            and abs(wrapped_difference(self._lead_ms, before, TIME_BITS)) <= LEAD_JUMP_MS
+            and abs(wrapped_difference(self._lead_ms, before, TIME_BITS)) <= continuity.LEAD_STEP_MS
         )
 
     def _samples(self, frame: Frame, measured: int) -> list[RangeSample]:
@@ -241,10 +248,19 @@ class LinkTrackInput:
                 self.ranges.refuse(reason)
             else:
                 by_peer.setdefault(node["id"], []).append(node)
-        samples = [_sample(measured, peer, nodes) for peer, nodes in by_peer.items()]
+        samples, system_ms = [], frame.values["system_time_ms"]
+        for peer, nodes in by_peer.items():
+            sample = _sample(measured, peer, nodes)
+            is_step = not self._steps.goes_on(
+                {**nodes[0], "distance_m": sample.range_m}, system_ms, measured
+            )
+            if is_step:
+                self.ranges.refuse(RangeRefusal.STEP, len(nodes))
+                continue
+            samples.append(sample)
+            if len(nodes) > 1:
+                self.ranges.refuse(RangeRefusal.DUPLICATE, len(nodes) - 1)
         self.ranges.accepted += len(samples)
-        if duplicates := sum(map(len, by_peer.values())) - len(samples):
-            self.ranges.refuse(RangeRefusal.DUPLICATE, duplicates)
         return samples
 
     def _entry_refusal(self, kind: Kind, node: Mapping[str, Any]) -> RangeRefusal | None:
@@ -257,6 +273,14 @@ class LinkTrackInput:
         if not MIN_RANGE_M <= node["distance_m"] <= self._max_range_m:
             return RangeRefusal.LIMITS
         return None
+
+
+def _lead_ms(frame: Frame) -> int | None:
+    """Of system_time before local_time, where both are told."""
+    if frame.kind not in _SHORT_IDS:
+        return None
+    system_ms, local_ms = frame.values["system_time_ms"], frame.values["local_time_ms"]
+    return wrapped_difference(system_ms, local_ms, TIME_BITS)
 
 
 def _sample(measured: int, peer: int, nodes: list[Mapping[str, Any]]) -> RangeSample:

@@ -9,9 +9,13 @@ from message_builders import HEADER, an_entry
 
 from drslamd.conventions import Chain
 from drslamd.gossip import messages
+from drslamd.gossip.bounds import LAST_SEQ
 from drslamd.gossip.entries.chapter_writer import ChapterWriter
 from drslamd.gossip.lc02 import MAX_PAYLOAD
+from drslamd.gossip.message_types import LogState
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe, RangeMeasurement
+
+OWN = Chain(3, 7)
 
 
 def busy(seq: int, peers: int) -> GraphEntry:
@@ -46,11 +50,35 @@ def test_a_chapter_is_made_of_256_entries(count: int, is_due: bool) -> None:
 def test_a_chapter_is_made_early_when_somebody_lacks_sixteen_entries(
     count: int, complete: int, is_due: bool
 ) -> None:
+    writer = asked(count, LogState(*OWN, 0, complete, count))
+    assert bool(writer.due(count)) is is_due
+
+
+def asked(count: int, *rows: LogState) -> ChapterWriter:
+    """After so many entries and one status."""
     writer = ChapterWriter()
     for k in range(count):
         writer.take(an_entry(k, 10 * k))
-    writer.asked(complete)
-    assert bool(writer.due(count)) is is_due
+    writer.on_states(OWN, rows)
+    return writer
+
+
+@pytest.mark.parametrize(("first", "is_due"), [(15, False), (16, True)])
+def test_what_a_newcomer_heard_as_it_was_said_is_no_reason_for_a_chapter(
+    first: int, is_due: bool
+) -> None:
+    rows = LogState(*OWN, 0, 0, 40), LogState(*OWN, first, 40, 40)
+    assert bool(asked(40, *rows).due(40)) is is_due
+
+
+def test_the_log_of_somebody_else_or_of_another_start_is_no_reason_for_a_chapter() -> None:
+    for chain in (Chain(OWN.robot + 1, OWN.epoch), Chain(OWN.robot, OWN.epoch - 1)):
+        assert not asked(40, LogState(*chain, 0, 0, 40)).due(40)
+
+
+def test_rows_of_any_length_are_read_in_no_time() -> None:
+    rows = LogState(*OWN, 0, 0, 40), LogState(*OWN, 1, LAST_SEQ, LAST_SEQ)
+    assert not asked(40, *rows).due(40)
 
 
 def test_a_chapter_says_all_keyframes_and_its_last_part_says_of_how_many_it_is_made() -> None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lab.hunt import fuzz, liar, volume
+from lab.hunt import flips, fuzz, liar, volume
 from lab.hunt.lies import Liar
 from lab.hunt.targets import TARGETS, seeds
 
@@ -52,6 +52,16 @@ def test_malformed_datagrams_are_not_believed() -> None:
     poured = volume.datagrams(8_000, told=quiet)
     assert poured.accepted == 0
     assert "8e+03 malformed datagrams: 0 accepted" in poured.line()
+
+
+@pytest.mark.row("D2")
+def test_few_frames_with_two_damaged_bits_give_a_wrong_range() -> None:
+    """The checksum alone lets one in fifteen pass."""
+    found = flips.double_flips(3_000, told=quiet)
+    assert found.many == 3_000
+    assert found.wrong <= 25
+    assert found.harmful <= 10
+    assert found.lost < 5
 
 
 @pytest.mark.row("D1")

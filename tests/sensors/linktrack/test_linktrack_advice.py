@@ -184,7 +184,7 @@ def test_a_good_frame_ends_the_suspicion_of_lp_mode() -> None:
     uwb = healthy()
     uwb.feed(tag_frame0(), T0 + MS)
     assert uwb.wrong_mode == "TAG_FRAME0"
-    uwb.feed(node_frame3(5, local_ms=1200), T0 + 20 * MS)
+    uwb.feed(node_frame3(5, local_ms=1200, system_ms=1217), T0 + 20 * MS)
     assert uwb.wrong_mode is None
 
 

@@ -47,11 +47,13 @@ def an_input(uwb_id: int = OWN) -> LinkTrackInput:
     return LinkTrackInput(uwb_id, max_range_m=120.0)
 
 
-def trusting(uwb_id: int = OWN) -> LinkTrackInput:
+def trusting(uwb_id: int = OWN, role: int = 0, millivolts: int = 4939) -> LinkTrackInput:
     """An input whose module has just been believed: local time 1000 ms at T0."""
     uwb = an_input(uwb_id)
     for local_ms in (980, 1000):
-        frame = node_frame3(uwb_id, local_ms=local_ms, system_ms=local_ms + 17)
+        frame = node_frame3(
+            uwb_id, local_ms=local_ms, system_ms=local_ms + 17, role=role, millivolts=millivolts
+        )
         assert uwb.feed(frame, T0 + (local_ms - 1000) * MS) == []
     assert (uwb.frames.accepted, uwb.frames.refused.total()) == (1, 1)
     return uwb
@@ -93,7 +95,7 @@ def test_the_frame_of_dr_mode1_gives_ranges_under_long_ids() -> None:
 
 @pytest.mark.parametrize("role", [0, 1, 2, 7, 200, 254, 255])
 def test_no_role_is_a_reason_to_refuse(role: int) -> None:
-    uwb = trusting()
+    uwb = trusting(role=role)
     frame = node_frame3(OWN, [Peer(9, 1500, role=role)], local_ms=1020, role=role)
     assert len(uwb.feed(frame, T0 + 20 * MS)) == 1
 
@@ -111,7 +113,7 @@ def test_frames_of_another_id_give_no_range_and_the_id_is_reported(seen: int) ->
     ("millivolts", "believed"), [(3299, False), (3300, True), (6000, True), (6001, False)]
 )
 def test_a_module_lives_on_3_3_to_6_volts(millivolts: int, believed: bool) -> None:
-    uwb = trusting()
+    uwb = trusting(millivolts=min(max(millivolts, 3300), 6000))
     frame = node_frame3(OWN, [Peer(9, 1500)], local_ms=1020, millivolts=millivolts)
     assert len(uwb.feed(frame, T0 + 20 * MS)) == believed
     assert uwb.frames.refused[Refusal.VOLTAGE] == (not believed)
@@ -215,7 +217,7 @@ def frames_with(uwb: LinkTrackInput, count: int, role: int, *peers: Peer) -> str
 def test_roles_and_ids_that_should_not_be_are_named(
     role: int, peers: list[Peer], sentence: str | None
 ) -> None:
-    said = frames_with(trusting(), 3, role, *peers)
+    said = frames_with(trusting(role=role), 3, role, *peers)
     assert sentence in said if said and sentence else said is sentence
 
 

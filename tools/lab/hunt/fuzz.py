@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-from lab.hunt import liar, volume
+from lab.hunt import flips, liar, volume
 from lab.hunt.targets import TARGETS, seeds
 from lab.progress import Progress
 
@@ -26,6 +26,7 @@ examples:
   tools/fuzz                               every decoder, 20 s each, guided by coverage (atheris)
   tools/fuzz uwb robot --seconds 300       these two, five minutes each
   tools/fuzz --datagrams 1e7 --bytes 1e8   so many malformed ones, counted; no atheris is needed
+  tools/fuzz --flips 1e5                   frames of a LinkTrack module with two damaged bits
   tools/fuzz --lies 1e6                    a member of the team says so many well-formed lies
 """
 
@@ -42,12 +43,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seconds", type=int, default=SECONDS, help="for each target")
     parser.add_argument("--datagrams", type=float, default=0, metavar="N", help="malformed ones")
     parser.add_argument("--bytes", type=float, default=0, metavar="N", help="of serial noise")
+    parser.add_argument("--flips", type=float, default=0, metavar="N", help="two bits in a frame")
     parser.add_argument("--lies", type=float, default=0, metavar="N", help="of a member")
     options = parser.parse_args(arguments)
     for name in options.target:
         if name not in TARGETS:
             parser.error(f"{name!r} is none of: {', '.join(TARGETS)}")
-    if options.datagrams or options.bytes or options.lies:
+    if options.datagrams or options.bytes or options.flips or options.lies:
         return _pour(options)
     if importlib.util.find_spec("atheris") is None:
         parser.error("atheris is not installed: pip install atheris, or count with --datagrams")
@@ -68,6 +70,7 @@ def _pour(options: argparse.Namespace) -> int:
     pours: list[tuple[float, Callable[[int, Progress], Result]]] = [
         (options.datagrams, lambda many, told: volume.datagrams(many, told=told)),
         (options.bytes, lambda many, told: volume.serial_bytes(many, told=told)),
+        (options.flips, lambda many, told: flips.double_flips(many, told=told)),
         (options.lies, lambda many, told: liar.compared(many, told)),
     ]
     kept = []

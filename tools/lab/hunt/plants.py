@@ -172,10 +172,10 @@ SURVIVORS = (
     ),
     Plant(
         "bound-of-repeats",
-        "gossip/log_repeats.py",
+        "gossip/repeats/log_repeats.py",
         "        if len(self._planned) < MAX_PLANNED:\n",
         "        if True:\n",
-        ("gossip/test_log_repeats.py",),
+        ("gossip/repeats/test_log_repeats.py",),
     ),
     Plant(
         "bound-of-leaps",

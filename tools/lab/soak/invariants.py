@@ -22,8 +22,8 @@ from drslamd.conditions.health import MAX_CONDITIONS
 from drslamd.conventions import MAX_ROBOT_ID, SECOND_US
 from drslamd.events import Datagram, Effect, Event, JobDone, Restart, Send, Solve
 from drslamd.gossip import messages, seal
-from drslamd.gossip.log_repeats import MAX_PLANNED
 from drslamd.gossip.message_types import Pose, PoseState
+from drslamd.gossip.repeats.log_repeats import MAX_PLANNED
 from drslamd.gossip.replicated_log import MAX_ENTRIES
 from drslamd.robot import Robot
 from drslamd.sensors.frame_scanner import MAX_BUFFER_BYTES

@@ -1,8 +1,8 @@
 """One run: a team is played in virtual time, and each second everybody is asked what it claims.
 
 A robot's own pose is held against the truth in the frame that it names, which is where the robot of
-that frame stood at first; the pose of one robot in another against the truth of both, at the
-keyframes that it is of, each on its own robot's clock.
+that frame stood when it began, or began again; the pose of one robot in another against the truth
+of both, at the keyframes that it is of, each on its own robot's clock.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from drslamd import report
-from drslamd.conventions import grid_utime
+from drslamd.conventions import Chain, grid_utime
 from lab.play import virtual_team
 from lab.play.playback import Hardware
 from lab.play.simulator import Simulator
@@ -28,6 +28,8 @@ from lab.trust.naming import Said
 
 LOCALISED, DOUBTFUL = "localised", "doubtful"
 """Words for a pose that is given: as one to rely on, or as one to take care with."""
+FIRST_S = 2.0
+"""A start before that is a robot's first, which began where its recording does."""
 
 
 @dataclass(frozen=True)
@@ -147,12 +149,24 @@ def _add_pose(
     estimate, found = member.robot.back.estimate, where.pose
     if estimate is None or found is None or estimate.frame.segment:
         return
-    origin = recording.trails[estimate.frame.robot].truth[0]
+    origin = _origin(recording, simulator, estimate.frame.chain)
+    if origin is None:
+        return
     t = member.clock.world(found.utime) / 1e6
     truth = metrics.relative(origin, _true(recording, robot, t))
     stated = claim(found.pose, found.covariance, truth)
     of_frame = estimate.frame.robot == robot
     run.poses.append(Stated(t, (robot,), called, stated, of_frame))
+
+
+def _origin(recording: Recording, simulator: Simulator, chain: Chain) -> Array | None:
+    """Where a robot truly stood when this start of it began; None when it has begun again since."""
+    member = simulator.members[chain.robot]
+    if member.robot.own != chain:
+        return None
+    begun = member.robot.back.graph.chains[chain.robot].keyframes.n[0]
+    t = member.clock.world(grid_utime(int(begun))) / 1e6
+    return _true(recording, chain.robot, t if t > FIRST_S else 0.0)
 
 
 def _add_pair(

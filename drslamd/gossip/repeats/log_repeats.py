@@ -1,25 +1,25 @@
 """Who repeats a lost log entry, and when.
 
 Each status names how far its sender has got with every log. Whoever holds what it lacks sends it
-again, sealed as it came: the owner at once, and once a second until the next status comes; the
-others a little later, in groups by their ids, and only if nobody else did. Where most messages are
-lost, requests are too: then an owner says each new entry again before it is asked, until everybody
-says that it is there.
+again, sealed as it came: the owner at once, and again when the next status is overdue; the others
+when the owner is silent or it is asked for a second time, a little later, in groups by their ids,
+and only if nobody else did and nobody says that it is there by now. Where most messages are lost,
+requests are too: then an owner says each new entry again before it is asked, until everybody says
+that it is there.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence, Set
-from dataclasses import dataclass
-from enum import Enum
+from collections.abc import Iterable, Mapping, Set
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from drslamd.conventions import MILLISECOND_US, SECOND_US
-from drslamd.gossip.message_types import LogState, Status
+from drslamd.gossip.message_types import LogState
+from drslamd.gossip.repeats.allowance import Allowance, Speech
 from drslamd.gossip.replicated_log import ReplicatedLog
 from drslamd.slam.graph.chapters import SPAN
-from drslamd.slam.graph.measurements import GraphEntry
 
 REPEATS_AT_ONCE = 12
 """Entries of one log that one status of a lagging peer asks for, and all that one call of
@@ -35,6 +35,8 @@ TURN_US = 300 * MILLISECOND_US
 """Between one group of robots and the next that may repeat an entry."""
 TURNS = 5
 """The owner, then four groups of relays by their ids."""
+SPEAKS_US = 5 * SECOND_US
+"""An owner whose last status is not older repeats what is asked for the first time alone."""
 PATIENCE = 3
 """Statuses in a row that may ask for the same entry; then the order moves on by one, because
 whoever has the first turn may be heard by the others and not by the one who asks."""
@@ -53,108 +55,6 @@ PUSH_US = 20 * SECOND_US
 entry after half of that."""
 PRESENT_US = 30 * SECOND_US
 """Whose last status is not older may lack something."""
-
-
-LEAST_RATE, LEAST_EACH = 1_500, 400
-"""Bytes a second that repeats may have where hardly anything else is said; for each robot."""
-SHARE = 1.15
-"""Of what else is said, asking left out, that may be repeats and requests: all together stays below
-twice as much as is said when nobody lacks anything."""
-ASKING = 3
-"""Statuses for one that says nothing new; all beyond that ask for something."""
-RESERVE = 0.1
-"""Of repeats, for those who have few of them: what is lacked by few is there soon."""
-MOST_LOSS = 0.8
-"""That is reckoned with."""
-LOOK_BACK_S = 5.0
-"""Over which it is counted what else is said."""
-FLOOD = 2.0
-"""Times as much as may be said: somebody does not keep to it."""
-
-
-class Speech(Enum):
-    """What a message is to the others."""
-
-    NEW = 1
-    STATUS = 2
-    AGAIN = 3
-
-
-NEWS = {Speech.NEW: 1.0, Speech.STATUS: 1 / ASKING, Speech.AGAIN: 0.0}
-"""Share of each kind that is said when nobody lacks anything."""
-
-
-def said_of(message: object, counter: int = 0, latest: int | None = 0) -> Speech:
-    """What a message is.
-
-    Args:
-        counter: of the message.
-        latest: counter of the last status or pose that was heard of its robot, None if none was. An
-            entry made before that is said again; chapters are said late.
-    """
-    if not isinstance(message, GraphEntry):
-        return Speech.STATUS if isinstance(message, Status) else Speech.NEW
-    is_again = latest is None or counter < latest or message.chapter is not None
-    return Speech.AGAIN if is_again else Speech.NEW
-
-
-class Allowance:
-    """How many bytes of repeats a team sends together: hardly more than it says anyhow.
-
-    Everybody counts what is on the air, its own messages and what it hears, so that those who heal
-    a partition or fill a newcomer share one allowance: in no second is more said than it allows.
-    Where messages are lost it grows: entries then need several repeats.
-
-    Attributes:
-        loss: share of the messages that are lost, 0 to 1.
-    """
-
-    def __init__(self) -> None:
-        self.loss, self._robots = 0.0, 1
-        self._rate, self._utime = 0.0, 0
-        """Bytes a second of late that were no repeats."""
-        self._last_second: deque[tuple[int, float, float]] = deque()
-        """When each message came, its bytes, and how many of them ask."""
-        self._said = self._asked = 0.0
-        self._own_utime = 0
-        """When a repeat of ours went out last."""
-
-    def _pass(self, utime: int) -> None:
-        passed = max(0, utime - self._utime) / SECOND_US
-        self._utime = max(utime, self._utime)
-        self._rate *= max(0.0, 1 - passed / LOOK_BACK_S)
-        while self._last_second and utime - self._last_second[0][0] >= SECOND_US:
-            _, said, asked = self._last_second.popleft()
-            self._said, self._asked = self._said - said, self._asked - asked
-
-    def reckon(self, losses: Sequence[float]) -> None:
-        """How much of what each peer says is lost; of a newcomer little is known."""
-        self._robots = 1 + len(losses)
-        self.loss = min(sorted(losses)[len(losses) // 2], MOST_LOSS) if losses else 0.0
-
-    def on_air(
-        self, size: int, utime: int, kind: Speech = Speech.NEW, *, heard: bool = False
-    ) -> None:
-        """A message of so many bytes; of what is heard others were not."""
-        self._pass(utime)
-        bytes_sent = size / (1 - self.loss) if heard else size
-        if kind is Speech.AGAIN and not heard:
-            self._own_utime = utime
-        self._rate += NEWS[kind] * bytes_sent / LOOK_BACK_S
-        asked = (1 - NEWS[kind]) * bytes_sent if kind is Speech.STATUS else 0.0
-        self._last_second.append((utime, bytes_sent, asked))
-        self._said, self._asked = self._said + bytes_sent, self._asked + asked
-
-    def has_room(self, utime: int, size: int = 0, *, is_one_of_many: bool = False) -> bool:
-        """May a repeat of so many bytes go out? Where others flood the channel, one each second."""
-        self._pass(utime)
-        needed = 1 / (1 - self.loss) ** 2
-        least = max(LEAST_RATE, LEAST_EACH * self._robots)
-        repeats = max(SHARE * self._rate * needed - self._asked, least * needed)
-        most = self._rate + self._asked + repeats
-        room = most - RESERVE * repeats if is_one_of_many else most
-        is_flooded = self._said > FLOOD * most
-        return self._said + size <= room or (is_flooded and utime - self._own_utime >= SECOND_US)
 
 
 class Holding(NamedTuple):
@@ -186,12 +86,15 @@ class Place(NamedTuple):
     seq: int
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Repeat:
-    """When somebody asked for an entry, and when it is our turn to send it."""
+    """When somebody asked for an entry, when it is our turn to send it, and who still lacks it."""
 
     asked: int
     due: int
+    askers: set[int] = field(default_factory=set)
+    is_own_news: bool = False
+    """Nobody asked for it."""
 
 
 @dataclass
@@ -221,6 +124,8 @@ class LogRepeats:
         self._planned: dict[Place, _Repeat] = {}
         self._questions: dict[int, _Question] = {}
         """By the peer that asks."""
+        self._spoke: dict[int, int] = {}
+        """When each peer sent a status."""
         self._present: dict[int, tuple[int, Holding | None]] = {}
         """When each peer said last what it holds of our log, and what that is."""
         self._pushed: deque[tuple[int, int]] = deque(maxlen=MAX_PLANNED)
@@ -237,6 +142,7 @@ class LogRepeats:
             named: the logs of its status, by robot.
             left_out: robots whose logs had no room in it.
         """
+        self._spoke[sender] = utime
         if self._robot not in left_out:
             self._present[sender] = utime, named.get(self._robot)
         last = self._questions.get(sender)
@@ -248,8 +154,18 @@ class LogRepeats:
         self._questions[sender] = _Question(
             {**still, **lacking}, again=utime + OVERDUE_US, until=utime + BELIEVED_US
         )
+        self._forget_answered(sender, named)
         for place, times in lacking.items():
-            self._plan(place, times, utime)
+            self._plan(place, times, utime, sender)
+
+    def _forget_answered(self, sender: int, named: Mapping[int, Holding]) -> None:
+        """What a peer holds now need not be said for it: we did not hear who said it again."""
+        for place, repeat in list(self._planned.items()):
+            held = named.get(place.robot)
+            if held is not None and held.epoch == place.epoch and held.has(place.seq):
+                repeat.askers.discard(sender)
+                if not repeat.askers and not repeat.is_own_news:
+                    del self._planned[place]
 
     def _lacking(
         self, sender: int, named: Mapping[int, Holding], left_out: Set[int]
@@ -275,15 +191,22 @@ class LogRepeats:
             for seq in lacked:
                 yield Place(robot, log.epoch, seq)
 
-    def _plan(self, place: Place, times: int, utime: int) -> None:
+    def _plan(self, place: Place, times: int, utime: int, asker: int) -> None:
+        is_alone = place.robot == self._robot or not self._speaks(place.robot, utime)
+        if times == 1 and not is_alone and self.pace.loss < PUSH_LOSS:
+            return
         turn = 0 if place.robot == self._robot else 1 + self._robot % (TURNS - 1)
         wait = (turn - (times - 1) // PATIENCE) % TURNS * TURN_US
-        if len(self._planned) < MAX_PLANNED:
-            self._planned.setdefault(place, _Repeat(utime, utime + wait))
+        if place in self._planned or len(self._planned) < MAX_PLANNED:
+            self._planned.setdefault(place, _Repeat(utime, utime + wait)).askers.add(asker)
+
+    def _speaks(self, robot: int, utime: int) -> bool:
+        return utime - self._spoke.get(robot, utime - SPEAKS_US) < SPEAKS_US
 
     def say_when_there_is_room(self, place: Place, utime: int) -> None:
         """An entry of ours, before anybody asks for it: until it is said, all others see a gap."""
-        self._planned = {place: _Repeat(utime + QUIET_US, utime), **self._planned}
+        news = _Repeat(utime + QUIET_US, utime, is_own_news=True)
+        self._planned = {place: news, **self._planned}
 
     def push(self, seq: int, utime: int) -> None:
         """A new entry of ours: said again unasked where most messages are lost."""
@@ -310,7 +233,7 @@ class LogRepeats:
                 question.again = utime + SECOND_US
                 for place in question.lacking:
                     if place.robot == self._robot:
-                        self._plan(place, 1, utime)
+                        self._plan(place, 1, utime, sender)
 
     def take_due(self, utime: int) -> list[tuple[int, bytes]]:
         """What to repeat now: owner's id and sealed message."""
@@ -333,6 +256,6 @@ class LogRepeats:
             del self._planned[place]
             log.aired[place.seq] = utime
             self.repeated += 1
-            self.pace.on_air(size, utime, Speech.AGAIN)
+            self.pace.on_air(size, utime, Speech.AGAIN, self._robot)
             out.append((place.robot, log.sealed[place.seq]))
         return out

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 from log_scenes import OTHER, OWNER, PEER, T0, holding, repeated, said, state
-from message_builders import MS, SECOND, a_status, an_entry
+from message_builders import MS, SECOND
 
 from drslamd.conventions import Chain
-from drslamd.gossip.log_repeats import Allowance, Holding, Speech, holdings, said_of
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.message_types import LogState
-from drslamd.slam.graph.measurements import Chapter, GraphEntry
+from drslamd.gossip.repeats.log_repeats import Holding, holdings
+from drslamd.slam.graph.measurements import Chapter
 
 
 def test_the_owner_repeats_what_a_peer_lacks_at_once_and_in_order() -> None:
@@ -230,6 +230,41 @@ def test_rows_of_another_start_say_nothing_of_this_one() -> None:
     assert holdings(rows) == {3: Holding(1, 2)}
 
 
+def test_what_a_peer_got_from_somebody_else_meanwhile_is_not_repeated_for_it() -> None:
+    """We may not have heard who said it again."""
+    logs = holding(4, OWNER, 0, 1)
+    logs.on_states((), OTHER.robot, T0)
+    logs.on_states(state(OWNER, 1), OTHER.robot, T0 + 200 * MS)
+    assert repeated(logs, T0 + 300 * MS) == [said(OWNER, 1)]
+
+
+def test_what_somebody_else_still_lacks_is_repeated() -> None:
+    logs = holding(4, OWNER, 0)
+    for peer in (OTHER.robot, 9):
+        logs.on_states((), peer, T0)
+    logs.on_states(state(OWNER, 1), OTHER.robot, T0 + 200 * MS)
+    assert repeated(logs, T0 + 300 * MS) == [said(OWNER, 0)]
+
+
+@pytest.mark.parametrize(("after_ms", "is_said"), [(4_999, False), (5_000, True)])
+def test_what_is_asked_for_the_first_time_is_left_to_an_owner_that_speaks(
+    after_ms: int, is_said: bool
+) -> None:
+    logs = holding(4, OWNER, 0)
+    logs.on_states((), OWNER.robot, T0)
+    logs.on_states((), OTHER.robot, T0 + after_ms * MS)
+    assert bool(repeated(logs, T0 + after_ms * MS + 300 * MS)) is is_said
+
+
+def test_what_is_asked_for_the_second_time_a_relay_says_too() -> None:
+    logs = holding(4, OWNER, 0)
+    for k in range(2):
+        logs.on_states((), OWNER.robot, T0 + k * SECOND)
+        logs.on_states((), OTHER.robot, T0 + k * SECOND)
+    assert repeated(logs, T0 + SECOND) == []
+    assert repeated(logs, T0 + SECOND + 300 * MS) == [said(OWNER, 0)]
+
+
 # entries that are said again unasked
 
 
@@ -276,107 +311,6 @@ def test_for_those_who_were_silent_for_half_a_minute_nothing_is_said_again() -> 
         logs.add(OWNER, 1, said(OWNER, 1), later)
         logs.repeats.push(1, later)
         assert bool(repeated(logs, later + 500 * MS)) is is_said
-
-
-# their pace
-
-
-def repeated_in(seconds: int, pace: Allowance, size: int = 500, said_ms: int = 0) -> int:
-    """Bytes of repeats that go out in the last ten seconds, when somebody always has one.
-
-    Args:
-        said_ms: how often 100 new bytes are said, 0 never.
-    """
-    sent = 0
-    for ms in range(0, 1000 * seconds, 10):
-        if said_ms and ms % said_ms == 0:
-            pace.on_air(100, T0 + ms * MS)
-        if pace.has_room(T0 + ms * MS, size):
-            pace.on_air(size, T0 + ms * MS, Speech.AGAIN)
-            sent += size if ms >= 1000 * (seconds - 10) else 0
-    return sent
-
-
-def test_repeats_have_a_least_rate_where_nothing_else_is_said() -> None:
-    assert repeated_in(10, Allowance()) == 15_000
-
-
-@pytest.mark.parametrize(("others", "least"), [(2, 15_000), (9, 40_000)])
-def test_a_large_team_has_more_of_them(others: int, least: int) -> None:
-    pace = Allowance()
-    pace.reckon([0.0] * others)
-    assert repeated_in(10, pace) == least
-
-
-def test_repeats_have_about_as_many_bytes_as_everything_else() -> None:
-    assert 20_000 <= repeated_in(30, Allowance(), said_ms=50) <= 23_000
-
-
-def test_in_no_second_is_much_more_than_twice_as_much_on_the_air() -> None:
-    """Of what is said when nobody lacks anything, of which a fifth are statuses, it is twice."""
-    pace, said_at = Allowance(), []
-    for ms in range(0, 30_000, 10):
-        # in one half of each second three times as much is said as in the other
-        for _ in range(3 if ms % 1000 < 500 else 1):
-            pace.on_air(20, T0 + ms * MS)
-            said_at.append((ms, 20))
-        if ms >= 10_000 and pace.has_room(T0 + ms * MS, 500):
-            pace.on_air(500, T0 + ms * MS, Speech.AGAIN)
-            said_at.append((ms, 500))
-    for begin in range(10_000, 29_000, 100):
-        assert (
-            sum(size for ms, size in said_at if begin <= ms < begin + 1000) <= 2.15 * 4_000 * 1.08
-        )
-
-
-def test_statuses_that_ask_are_no_reason_to_say_more() -> None:
-    pace = Allowance()
-    for ms in range(0, 20_000, 10):
-        pace.on_air(100, T0 + ms * MS, Speech.STATUS)
-    same = Allowance()
-    for ms in range(0, 20_000, 30):
-        same.on_air(100, T0 + ms * MS)
-    assert pace._rate == pytest.approx(same._rate, rel=0.05)
-
-
-@pytest.mark.parametrize(
-    ("counter", "latest", "said_as"),
-    [(7, 7, Speech.NEW), (6, 7, Speech.AGAIN), (7, None, Speech.AGAIN)],
-)
-def test_an_entry_from_before_the_last_status_of_its_robot_is_said_again(
-    counter: int, latest: int | None, said_as: Speech
-) -> None:
-    assert said_of(an_entry(3, 30), counter, latest) is said_as
-    assert said_of(GraphEntry(3, chapter=Chapter(0, 0, (0, 0, 1))), counter, latest) is Speech.AGAIN
-    assert said_of(a_status(), counter, latest) is Speech.STATUS
-
-
-def test_one_of_many_leaves_a_tenth_of_the_room() -> None:
-    few, many = Allowance(), Allowance()
-    assert few.has_room(T0, 1_500)
-    assert not few.has_room(T0, 1_501)
-    assert many.has_room(T0, 1_350, is_one_of_many=True)
-    assert not many.has_room(T0, 1_351, is_one_of_many=True)
-
-
-def test_they_may_be_more_where_messages_are_lost() -> None:
-    lossy = Allowance()
-    lossy.reckon([0.5, 0.5, 0.0])
-    assert repeated_in(10, lossy) == 4 * repeated_in(10, Allowance())
-    hopeless = Allowance()
-    hopeless.reckon([1.0])
-    assert hopeless.loss == 0.8
-
-
-def test_whoever_floods_the_channel_with_repeats_leaves_each_robot_one_a_second() -> None:
-    pace, sent = Allowance(), 0
-    for ms in range(0, 10_000, 10):
-        pace.on_air(1_000, T0 + ms * MS, Speech.AGAIN, heard=True)
-        if pace.has_room(T0 + ms * MS, 500):
-            pace.on_air(500, T0 + ms * MS, Speech.AGAIN)
-            sent += 1
-    assert 9 <= sent <= 13
-    assert pace.has_room(T0 + 12 * SECOND, 500)
 
 
 # chapters
