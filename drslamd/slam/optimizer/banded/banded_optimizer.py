@@ -272,10 +272,9 @@ def solved(
     solution, kept = solve(team, last, tolerance, kept)
     learned, spread, doubted = solution.calibration, solution.spread, solution.doubted
     assert spread is not None
+    n, poses = team.problem.n, solution.poses
     paths = {
-        chain.robot: Trajectory(
-            chain, team.problem.n[mine[chain.robot]], solution.poses[mine[chain.robot]]
-        )
+        chain.robot: Trajectory(chain, n[mine[chain.robot]], poses[mine[chain.robot]])
         for chain in team.chains
     }
     points = frozenset(s.robot for s in group.points) - {s.robot for s in group.members}
