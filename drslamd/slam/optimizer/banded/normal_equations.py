@@ -77,12 +77,7 @@ class _Assembly:
         # most often no mounting is an unknown
         self._columns = np.flatnonzero((unknowns != NOWHERE).any(axis=0))
         self._unknowns = unknowns[:, self._columns]
-
-    @cached_property
-    def _twos(self) -> tuple[Index, Index]:
-        """(t,) all columns that are used, two and two."""
-        one, other = np.tril_indices(len(self._columns))
-        return one, other
+        self._twos = np.tril_indices(len(self._columns))
 
     @cached_property
     def _places(self) -> tuple[tuple[Index, Index], ...]:
@@ -123,10 +118,7 @@ class _Assembly:
     def _products(self, factors: Linearised) -> Array:
         """(t, m) entries of J' W J."""
         jacobian = np.ascontiguousarray(factors.jacobian[:, :, self._columns].transpose(2, 1, 0))
-        if jacobian.shape[1] == 1:
-            weighed = jacobian * factors.information[:, 0, 0]
-        else:
-            weighed = np.einsum("cem,mde->cdm", jacobian, factors.information)
+        weighed = np.einsum("cem,mde->cdm", jacobian, factors.information)
         one, other = self._twos
         return np.asarray(np.einsum("tdm,tdm->tm", jacobian[one], weighed[other]))
 

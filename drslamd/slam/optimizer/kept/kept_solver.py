@@ -27,7 +27,7 @@ from drslamd.slam.optimizer.kept.kept_factor import (
     Current,
     KeptFactor,
 )
-from drslamd.slam.optimizer.kept.quick_check import Checked
+from drslamd.slam.optimizer.kept.quick_check import Freedom
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.se2 import Array
@@ -88,7 +88,7 @@ class Kept:
     claimed: KeptFactor
     sure: Sureness
     variances: Array
-    checked: Checked
+    checked: Freedom
 
 
 def solve(
@@ -124,7 +124,7 @@ def _solved(
     variances = kept.variances if kept else mountings.variances(equations, point, current)
     if variances is None:
         return None
-    checked = kept.checked if kept else Checked.of(equations, point, current)
+    checked = kept.checked if kept else Freedom.of(equations, point, current)
     ratio = quick_check.misfit_as_modelled(problem, point, checked, variances)
     if ratio is None:
         return None

@@ -35,40 +35,40 @@ from drslamd.slam.se2 import Array, Index
 
 
 @dataclass(frozen=True)
-class Checked:
+class Freedom:
     """What the other measurements could check of each robot's odometry, some seconds ago.
 
     It grows with the way, as the links do. To compute it takes as long as several steps, and a
     sigma goes with the fourth root of it.
 
     Attributes:
-        freedom: (robots,) g, see `misfit`; links: (robots,) of so many.
+        checked: (robots,) g, see `misfit`; links: (robots,) of so many.
     """
 
-    freedom: Array
+    checked: Array
     links: Array
 
     @staticmethod
-    def of(equations: Equations, point: Point, matrix: Solver) -> Checked:
+    def of(equations: Equations, point: Point, matrix: Solver) -> Freedom:
         """
         Args:
             equations: in the layout of `matrix`.
         """
         odometry, robots = equations.problem.odometry, len(equations.problem.priors.scale)
         checked = guessed_misfit(equations, point, matrix).checked
-        freedom = np.bincount(odometry.robot, checked, robots)
-        return Checked(freedom, np.bincount(odometry.robot, minlength=robots).astype(float))
+        sums = np.bincount(odometry.robot, checked, robots)
+        return Freedom(sums, np.bincount(odometry.robot, minlength=robots).astype(float))
 
     def ratio(self, problem: Problem, point: Point) -> Array:
         """(robots,) s / g now."""
         robot, robots = problem.odometry.robot, len(self.links)
         squares = np.bincount(robot, squares_of(problem, point), robots)
         links = np.bincount(robot, minlength=robots)
-        return ratio_of(squares, self.freedom * links / np.maximum(self.links, 1.0))
+        return ratio_of(squares, self.checked * links / np.maximum(self.links, 1.0))
 
 
 def misfit_as_modelled(
-    problem: Problem, point: Point, checked: Checked, variances: Array
+    problem: Problem, point: Point, checked: Freedom, variances: Array
 ) -> Array | None:
     """(robots,) s / g of odometry, see `misfit`; None where something may not be as modelled.
 

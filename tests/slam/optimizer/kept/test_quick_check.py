@@ -71,7 +71,7 @@ def test_a_misfit_is_told_where_all_is_as_modelled_and_not_where_it_is_not() -> 
     assert factor is not None
     left = mountings.variances(equations, point, factor)
     assert left is not None
-    checked = quick_check.Checked.of(equations, point, factor)
+    checked = quick_check.Freedom.of(equations, point, factor)
     ratio = quick_check.misfit_as_modelled(problem, point, checked, left)
     assert ratio is not None
     expected = misfit.guessed_misfit(equations, point, factor).ratio(problem.odometry.robot, 3)
@@ -90,7 +90,7 @@ def test_what_could_be_checked_grows_with_the_way() -> None:
     point = shaken(problem)
     squares, robot = misfit.squares_of(problem, point), problem.odometry.robot
     links = np.bincount(robot, minlength=3).astype(float)
-    then = quick_check.Checked(np.array([7.0, 20.0, 0.0]), links / [1, 2, 1])
+    then = quick_check.Freedom(np.array([7.0, 20.0, 0.0]), links / [1, 2, 1])
     s = [squares[robot == k].sum() for k in range(3)]
     expected = [(s[0] + 1) / (7 + 1), (s[1] + 1) / (40 + 1), s[2] + 1]
     assert then.ratio(problem, point) == pytest.approx(expected)
