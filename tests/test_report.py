@@ -44,6 +44,7 @@ def test_the_whole_picture_begins_with_who_it_is_and_what_is_wrong() -> None:
         "network",
         "peers",
         "pairs",
+        "hypotheses",
         "points",
         "site",
         "graph",
