@@ -16,7 +16,7 @@ from drslamd.slam.graph.measurements import Chapter, GraphEntry
 
 ECHO_US = 200 * MILLISECOND_US
 """So late at most we hear ourselves."""
-MUCH = 500
+MUCH = 650
 """Bytes of a large repeat: where there is no room for it, others say again what they can."""
 
 

@@ -18,13 +18,13 @@ from drslamd.slam.graph.measurements import GraphEntry
 
 FRAMING = 25
 """Bytes that LCM puts around each message: eight, and its channel."""
-MOST = 1.95
+MOST = 2.0
 """Times as much as is said when nobody lacks anything: what is counted is a little uneven."""
 LEAST_RATE, LEAST_EACH = 1_500, 700
 """Bytes a second of all messages that a team may say, however quiet it is; for each robot."""
 LEAST_SHARE = 0.2
 """Of what may be said, for repeats: however much else there is, they go on."""
-RESERVE = 0.05
+RESERVE = 0.02
 """Of repeats, for those who have few of them: what is lacked by few is there soon."""
 MOST_LOSS = 0.8
 """That is reckoned with."""

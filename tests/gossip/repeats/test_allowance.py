@@ -86,12 +86,12 @@ def test_an_entry_from_before_the_last_status_of_its_robot_is_said_again(
     assert said_of(a_status(), counter, latest) is Speech.STATUS
 
 
-def test_one_of_many_leaves_a_twentieth_of_the_room() -> None:
+def test_one_of_many_leaves_a_fiftieth_of_the_room() -> None:
     few, many = Allowance(), Allowance()
     assert few.has_room(T0, 1_500 - FRAMING)
     assert not few.has_room(T0, 1_501 - FRAMING)
-    assert many.has_room(T0, 1_425 - FRAMING, is_one_of_many=True)
-    assert not many.has_room(T0, 1_426 - FRAMING, is_one_of_many=True)
+    assert many.has_room(T0, 1_470 - FRAMING, is_one_of_many=True)
+    assert not many.has_room(T0, 1_471 - FRAMING, is_one_of_many=True)
 
 
 def test_they_may_be_more_where_messages_are_lost() -> None:

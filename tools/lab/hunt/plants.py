@@ -173,7 +173,7 @@ SURVIVORS = (
     Plant(
         "bound-of-repeats",
         "gossip/repeats/log_repeats.py",
-        "        if len(self._planned) < MAX_PLANNED:\n",
+        "        if place in self._planned or len(self._planned) < MAX_PLANNED:\n",
         "        if True:\n",
         ("gossip/repeats/test_log_repeats.py",),
     ),
