@@ -155,7 +155,9 @@ def _few(most: int, at: Between, order: tuple[Array, ...]) -> Index:
     """
     chains = at.chains
     there = at.a.there & at.b.there
-    old = np.flatnonzero(there & (chains.is_old[at.a.rows] | chains.is_old[at.b.rows]))
+    # (a newcomer may hear of measurements before any keyframe)
+    found = np.flatnonzero(there)
+    old = found[chains.is_old[at.a.rows[found]] | chains.is_old[at.b.rows[found]]]
     one, other = chains.near[at.a.rows[old]], chains.near[at.b.rows[old]]
     part = at.part[old]
     ranked = np.lexsort((*(key[old] for key in reversed(order)), other, one, part))
