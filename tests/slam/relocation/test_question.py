@@ -83,8 +83,6 @@ def test_a_segment_that_ended_has_no_keyframe_to_tell() -> None:
 
 
 @pytest.mark.parametrize(("degrees", "expected"), [(39.9, False), (40.1, True)])
-def test_a_heading_is_known_to_forty_degrees_or_it_is_none(
-    degrees: float, expected: bool
-) -> None:
+def test_a_heading_is_known_to_forty_degrees_or_it_is_none(degrees: float, expected: bool) -> None:
     assert is_vague(np.diag([9.0, 9.0, np.radians(degrees) ** 2])) is expected
     assert not is_vague(None)
