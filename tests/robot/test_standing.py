@@ -179,9 +179,9 @@ def test_a_robot_whose_id_another_uses_has_no_pose() -> None:
 @pytest.mark.parametrize(
     ("degrees", "is_told", "state"),
     [
-        (14.0, True, PoseState.LOCALISED),
-        (16.0, True, PoseState.NOT_LOCALISED),
-        (16.0, False, PoseState.LOCALISED),
+        (39.0, True, PoseState.LOCALISED),
+        (41.0, True, PoseState.NOT_LOCALISED),
+        (41.0, False, PoseState.LOCALISED),
     ],
 )
 def test_who_was_just_placed_has_no_pose_before_its_heading_is_known(

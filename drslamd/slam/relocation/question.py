@@ -25,7 +25,7 @@ LATE_US = 5 * SECOND_US // 2
 LONGEST_US = 10 * SECOND_US
 """Of the odometry after a hole that is placed at once."""
 
-VAGUE_RAD = np.radians(15.0)
+VAGUE_RAD = np.radians(40.0)
 """Module 3 has a range a second and placings have more, so its first answers may say next to
 nothing of a heading: until they do, there is no pose."""
 

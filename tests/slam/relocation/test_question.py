@@ -82,8 +82,8 @@ def test_a_segment_that_ended_has_no_keyframe_to_tell() -> None:
     assert last_keyframe(found, scene.own) is None
 
 
-@pytest.mark.parametrize(("degrees", "expected"), [(14.9, False), (15.1, True)])
-def test_a_heading_is_known_to_fifteen_degrees_or_it_is_none(
+@pytest.mark.parametrize(("degrees", "expected"), [(39.9, False), (40.1, True)])
+def test_a_heading_is_known_to_forty_degrees_or_it_is_none(
     degrees: float, expected: bool
 ) -> None:
     assert is_vague(np.diag([9.0, 9.0, np.radians(degrees) ** 2])) is expected

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from long_drives import Drive, logs
+from slam_scenes import keyframes, range_item
 
+from drslamd.conventions import Chain
+from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.thinning.thinned_pairs import NOTHING, PairPart, Unthinned, thinned_pairs
 
@@ -75,3 +78,12 @@ def test_a_digest_sees_each_of_what_a_part_holds_and_nothing_of_an_empty_one() -
     assert len({part.digest, *(other.digest for other in others)}) == 4
     assert PairPart(part.ranges, part.moves.copy(), part.closures).digest == part.digest
     assert NOTHING.digest == b""
+
+
+def test_ranges_of_old_times_wait_for_their_keyframes() -> None:
+    """A newcomer hears entries in any order: of an old stretch no keyframe at all may be held."""
+    graph, a, b = PoseGraph(), Chain(0, 1), Chain(1, 1)
+    graph.insert(b, GraphEntry(1, keyframes=keyframes([9_000], [(0, 0, 0)])))
+    said = tuple(range_item(n, b, n, 3.0) for n in (10, 500, 99_000, 100_000))
+    graph.insert(a, GraphEntry(1, keyframes=keyframes([9_000], [(0, 0, 0)]), ranges=said))
+    assert [len(pair.ranges) for pair in graph.view.pairs] == [0]
