@@ -67,7 +67,7 @@ def a_broadcast(team: Team, ranged: set[int]) -> Broadcast:
     """Of a localised robot with nothing to say that ranges to these UWB ids."""
     front = SimpleNamespace(ranged=lambda utime: list(ranged), needed=lambda near, utime: ())
     estimate = SimpleNamespace(frame=SimpleNamespace(robot=0))
-    back = SimpleNamespace(estimate=estimate, digest=lambda: 0)
+    back = SimpleNamespace(estimate=estimate, said_digest=lambda: 0)
     config = SimpleNamespace(uwb_id=9)
     return Broadcast(cast(Config, config), team, cast(FrontEnd, front), cast(BackEnd, back))
 
