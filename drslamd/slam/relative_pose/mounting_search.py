@@ -55,8 +55,7 @@ the same robot must be worse. Of eighteen robots that count wrongly all begin ne
 is blocked half of the time one does."""
 FITS = 0.7
 """Chi-squared per degree of freedom of windows that a track, a scale or a curve really explains: it
-is 0.2 to 0.6, because noise is allowed for generously. Where sight is blocked it is more, whatever
-is tried."""
+is 0.2 to 0.6, because noise is allowed for generously; more, where sight is blocked."""
 MUCH = 0.6
 """Of chi-squared that is left where a track, a scale or a curve explains some of it."""
 INDIFFERENT = -5.0
