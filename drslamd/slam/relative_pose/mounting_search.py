@@ -2,9 +2,10 @@
 
 Several windows are asked `what_if`; the sums of their chi-squared decide. Short windows fit wheels
 that run backwards as well as wheels as configured, so a pair is believed only once its windows
-exclude that: then it is confirmed, for mountings do not change. If they disagree again and again, a
-clear winner that fits is named. Track and scale look much alike in a window: where one of them wins
-and it is not clear which, nothing is named, and module 3 begins at the best of them.
+exclude that: then it is confirmed, for mountings do not change; by one window alone until a later
+one contradicts it. If they disagree again and again, a clear winner that fits is named. Track and
+scale look much alike in a window: where one of them wins and it is not clear which, nothing is
+named, and module 3 begins at the best of them.
 """
 
 from __future__ import annotations
@@ -54,15 +55,13 @@ the same robot must be worse. Of eighteen robots that count wrongly all begin ne
 is blocked half of the time one does."""
 FITS = 0.7
 """Chi-squared per degree of freedom of windows that a track, a scale or a curve really explains: it
-is 0.2 to 0.6, because noise is allowed for generously. Where sight is blocked it is more, whatever
-is tried."""
+is 0.2 to 0.6, because noise is allowed for generously; more, where sight is blocked."""
 MUCH = 0.6
 """Of chi-squared that is left where a track, a scale or a curve explains some of it."""
 INDIFFERENT = -5.0
 """Who drives straight for long is the same in a mirror: then what is configured is believed. So is
 it against wheels of unlike size: healthy pairs are confirmed as soon as without, of six with bent
 ways none is."""
-
 QUICKLY_US = SECOND_US * 9 // 10
 """Between two windows that are asked quickly, while a pair waits for nothing else."""
 SURELY = 7.0
@@ -75,7 +74,6 @@ SURE_FIT = 0.45
 """As `FITS`, of such a window: one with a burst of wrong ranges had 11 for the mirror image."""
 SLIGHTLY = -2.0
 """By how much a track, a scale or a curve may seem better in such a window: chance."""
-
 _SAID = (Verdict.UNIQUE, Verdict.AMBIGUOUS, Verdict.POOR_FIT)
 
 
@@ -107,12 +105,14 @@ class MountingSearch:
         found: what explains the windows of late; None while nothing does.
         is_clear: is it that and nothing else?
         is_confirmed: did windows exclude what would look like the configuration?
+        is_provisional: did one window do that alone, and not yet several together?
     """
 
     def __init__(self) -> None:
         self.found: Case | None = None
         self.is_clear = False
         self.is_confirmed = False
+        self.is_provisional = False
         self._fits: deque[bool] = deque(maxlen=RECENT)
         self._answers: deque[_Answer] = deque(maxlen=MOST_ASKED)
         self._asked_at: int | None = None
@@ -162,7 +162,8 @@ class MountingSearch:
 
     def _is_due(self, utime: int, awaits: bool) -> bool:
         is_late = self._asked_at is None or utime - self._asked_at >= APART_US
-        is_open = self.found is None and not self.is_confirmed and (self.poor >= MANY or awaits)
+        is_doubtful = self.poor >= MANY or awaits or self.is_provisional
+        is_open = self.found is None and not self._is_final and is_doubtful
         is_vague = self.found is not None and is_learned(self.found) and self.disagrees
         return is_late and (is_open or is_vague)
 
@@ -170,6 +171,15 @@ class MountingSearch:
         last = self._asked_quickly_at
         is_late = last is None or utime - last >= QUICKLY_US
         return is_late and awaits and self.found is None and not self.is_confirmed
+
+    @property
+    def _is_final(self) -> bool:
+        return self.is_confirmed and not self.is_provisional
+
+    def _confirm(self, is_as_configured: bool) -> None:
+        """Several windows together have answered."""
+        if is_as_configured:
+            self.is_confirmed, self.is_provisional = True, False
 
     def begin(self, utime: int, awaits: bool) -> None:
         """A window is asked now."""
@@ -195,7 +205,7 @@ class MountingSearch:
         return partial(_asked, question, self.cases, noise, delta, self.asked_first)
 
     def on_costs(self, costs: Array, measurements: int, is_mirror_told: bool) -> bool:
-        """`what_if.Question.costs` of a window are known. Is something found that was not before?
+        """`what_if.Question.costs` of a window are known. Is another mounting believed than before?
 
         Args:
             is_mirror_told: did both robots drive so that mirrored wheels would show?
@@ -203,16 +213,21 @@ class MountingSearch:
         if self.found is None and is_mirror_told:
             found = against_backwards(costs, measurements - 3)
             is_alone = found >= self._enough and bool((costs - costs[0] >= SLIGHTLY).all())
-            self.is_confirmed |= is_alone
+            if is_alone and not self.is_confirmed:
+                self.is_confirmed = self.is_provisional = True
             self._recent.append(found)
         if self._is_quick:
             return False
         self._answers.append(_Answer(costs, measurements - 3))
         if self.found is not None:
             return self._refine(self.found)
+        if self.is_provisional and costs.min() <= costs[0] - EXCLUDED:
+            # one window may fit in a wrong valley
+            self.is_confirmed = self.is_provisional = False
+            return True
         newest = list(self._answers)[-FEWEST_ASKED:]
         chi2, degrees = np.sum([n.costs for n in newest], axis=0), sum(n.freedom for n in newest)
-        self.is_confirmed |= is_as_configured(chi2, degrees, is_mirror_told)
+        self._confirm(is_as_configured(chi2, degrees, is_mirror_told))
         asked = len(self._answers)
         if asked < FEWEST_ASKED:
             return False
@@ -220,13 +235,13 @@ class MountingSearch:
         total = worth * np.mean([answer.costs for answer in self._answers], axis=0)
         freedom = worth * float(np.mean([answer.freedom for answer in self._answers]))
         if asked == MOST_ASKED:
-            self.is_confirmed |= bool(_backwards(total - total[0], True) >= INDIFFERENT)
+            self._confirm(bool(_backwards(total - total[0], True) >= INDIFFERENT))
         case, is_clear = winner(total, freedom)
         # whatever happens to a mounting that was right is something else
-        if case is None or self.is_confirmed:
+        if case is None or self._is_final:
             return False
         self.found, self.is_clear = case, is_clear
-        self.is_confirmed = is_learned(case)
+        self.is_confirmed, self.is_provisional = is_learned(case), False
         # windows with the repair speak for themselves
         self._fits.clear()
         self._answers.clear()

@@ -496,6 +496,46 @@ def test_who_is_sure_is_confirmed_where_both_robots_drove(is_told: bool) -> None
     assert confirms(excluding(20.0), is_told=is_told) is is_told
 
 
+def sure() -> MountingSearch:
+    """One window has confirmed it alone."""
+    search = MountingSearch()
+    search.begin(0, True)
+    search.begin(QUICKLY_US, True)
+    search.on_costs(excluding(20.0), FREE + 3, True)
+    search.begin(APART_US, False)
+    return search
+
+
+def test_who_was_confirmed_by_one_window_is_asked_until_several_do_so_together() -> None:
+    search = sure()
+    assert (search.is_confirmed, search.is_provisional) == (True, True)
+    assert not search.is_due(2 * APART_US - 1, False)
+    assert search.is_due(2 * APART_US, False)
+    assert not ask(search, {AS_IT_IS: GOOD}, rest=GOOD + EXCLUDED)
+    assert (search.is_confirmed, search.is_provisional) == (True, False)
+    assert not search.is_due(3 * APART_US, False)
+
+
+@pytest.mark.parametrize("case", [TRACK, SCALE, LEFT, Case(a=CURVES[0])])
+@pytest.mark.parametrize(("by", "is_left"), [(EXCLUDED - LITTLE, True), (EXCLUDED + LITTLE, False)])
+def test_nothing_is_left_of_that_where_a_later_window_has_a_much_better_explanation(
+    case: Case, by: float, is_left: bool
+) -> None:
+    """The first window may fit in a wrong valley."""
+    search = sure()
+    assert ask(search, {AS_IT_IS: GOOD + by, case: GOOD}) is not is_left
+    assert (search.is_confirmed, search.is_provisional) == (is_left, is_left)
+    assert search.found is None
+
+
+def test_what_several_windows_say_finds_a_mistake_after_that() -> None:
+    search = sure()
+    for _ in range(FEWEST_ASKED - 1):
+        ask(search, {AS_IT_IS: GOOD + BETTER, TRACK: GOOD})
+    assert ask(search, {AS_IT_IS: GOOD + BETTER, TRACK: GOOD})
+    assert search.found == TRACK
+
+
 class Asked:
     """A window that is asked: what each case costs, and which were asked."""
 
