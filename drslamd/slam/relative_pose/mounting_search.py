@@ -51,8 +51,7 @@ twenty-one such robots all are, after 20 to 48 s, and in eighty pairs without su
 BETTER, UNLIKE = 100.0, 40.0
 """Likewise for a track or a scale to begin with, and by how much all that is no track or scale of
 the same robot must be worse. Of eighteen robots that count wrongly all begin near the truth after
-24 to 72 s; of fifteen healthy pairs none begins elsewhere than configured, and of six whose sight
-is blocked half of the time one does."""
+24 to 72 s; of fifteen healthy pairs none begins elsewhere, of six with blocked sight one does."""
 FITS = 0.7
 """Chi-squared per degree of freedom of windows that a track, a scale or a curve really explains: it
 is 0.2 to 0.6, because noise is allowed for generously; more, where sight is blocked."""
@@ -60,8 +59,7 @@ MUCH = 0.6
 """Of chi-squared that is left where a track, a scale or a curve explains some of it."""
 INDIFFERENT = -5.0
 """Who drives straight for long is the same in a mirror: then what is configured is believed. So is
-it against wheels of unlike size: healthy pairs are confirmed as soon as without, of six with bent
-ways none is."""
+it against wheels of unlike size: of six pairs with bent ways none is confirmed."""
 QUICKLY_US = SECOND_US * 9 // 10
 """Between two windows that are asked quickly, while a pair waits for nothing else."""
 SURELY = 7.0
@@ -119,7 +117,8 @@ class MountingSearch:
         self._asked_quickly_at: int | None = None
         self._is_quick = False
         self._recent: deque[float] = deque(maxlen=STEADY - 1)
-        """Evidence against wheels that run backwards, of late."""
+        self._worst = 0.0
+        """Evidence against wheels that run backwards: of late, and the least ever."""
 
     def on_verdict(self, verdict: Verdict) -> None:
         """Module 1 has answered, with what is known of the mountings."""
@@ -191,9 +190,9 @@ class MountingSearch:
     @property
     def _enough(self) -> float:
         """Evidence that confirms the pair, of the newest window."""
-        if len(self._recent) < STEADY - 1:
-            return SURELY
-        return min(SURELY, STEADY * STEADILY - sum(self._recent))
+        is_known = len(self._recent) == STEADY - 1
+        steadily = STEADY * STEADILY - sum(self._recent) if is_known else SURELY
+        return min(SURELY, steadily) - self._worst
 
     def question(
         self, question: what_if.Question, noise: PairNoise, delta: float
@@ -216,6 +215,7 @@ class MountingSearch:
             if is_alone and not self.is_confirmed:
                 self.is_confirmed = self.is_provisional = True
             self._recent.append(found)
+            self._worst = min(self._worst, found)
         if self._is_quick:
             return False
         self._answers.append(_Answer(costs, measurements - 3))

@@ -470,6 +470,17 @@ def test_so_may_a_few_in_a_row(by: float, count: int, is_sure: bool) -> None:
     assert confirms(*[excluding(by)] * count) is is_sure
 
 
+@pytest.mark.parametrize(("by", "is_sure"), [(LITTLE, True), (-LITTLE, False)])
+def test_a_window_must_outweigh_what_ever_spoke_for_wheels_that_run_backwards(
+    by: float, is_sure: bool
+) -> None:
+    """Mountings do not change: however long ago it was."""
+    mirrored = costs({AS_IT_IS: 40.0, MIRROR: BEST})
+    contrary = -against_backwards(mirrored, FREE)
+    between = [excluding(0.0)] * 20
+    assert confirms(mirrored, *between, excluding(SURELY + contrary + by)) is is_sure
+
+
 def test_a_window_for_wheels_that_run_backwards_speaks_against_those_beside_it() -> None:
     mirrored = costs({AS_IT_IS: 40.0, MIRROR: BEST})
     assert against_backwards(mirrored, FREE) < -10
