@@ -175,13 +175,14 @@ def _fewest_blamed(equations: Equations, seen: Array, point: Point) -> tuple[Arr
     problem, robot = equations.problem, equations.problem.odometry.robot
     robots = len(problem.priors.scale)
     blame = np.bincount(robot, np.log(seen), robots)
-    bound = np.maximum(outlier_share(problem, point), FEW_OUTLIERS)
+    if (outlier_share(problem, point) >= FEW_OUTLIERS).any():
+        return seen, point  # odometry alone does not explain it, so it is not for us to say whose
     for count in range(1, min(int(np.count_nonzero(blame)), MOST_TRIED + 1)):
         alone = np.isin(robot, np.argsort(-blame)[:count])
         fewer, near = _cells_settled(equations, point, np.where(alone, seen, 1.0), alone)
         near, now = _solved(equations, fewer, near)
         fits = now.ratio(robot, robots) <= STANDS_OUT
-        if fits.all() and (outlier_share(problem, near) <= bound).all():
+        if fits.all() and (outlier_share(problem, near) < FEW_OUTLIERS).all():
             return fewer, near
     return seen, point
 
