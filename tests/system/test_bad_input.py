@@ -76,7 +76,11 @@ async def print_frames(robot: RealRobot, count: int, start: int = 0, junk: bytes
 @pytest.mark.row("D1")
 def test_garbage_between_frames_costs_no_frame() -> None:
     async def test(team: RealTeam, robot: RealRobot) -> None:
-        await print_frames(robot, 300, junk=os.urandom(40))
+        junk = os.urandom(40)
+        await print_frames(robot, 300, junk=junk)
+        size = 300 * (len(junk) + len(robot.hardware.uwb.frame(0.0, [(7, 5.0)])))
+        # ports are read in rounds
+        await until(robot, lambda a: a["uwb"]["counters"]["bytes"] >= size, 2.0)
         answer = await status(robot)
         # two consistent frames come before the first that is believed
         assert answer["uwb"]["counters"]["frames.accepted"] >= 298
