@@ -22,9 +22,9 @@ from deploy_helpers import (
 from drslamd.cli.exit_codes import BAD_CONFIG, OK, USAGE
 from drslamd.gossip.seal import KEY_BYTES
 
-LONGEST_CPU_S = 1.5
-"""Of a process that starts Python and reads its configuration: 0.3 to 0.8 s. What other programs do
-to the clock does not count."""
+LONGEST_CPU_S = 2.5
+"""Of a process that starts Python and reads its configuration: 0.3 to 0.8 s, twice as much where
+other programs share the core. What they do to the clock does not count."""
 SECRET = "5e" * KEY_BYTES
 
 slow = pytest.mark.slow

@@ -105,6 +105,8 @@ def test_headings_that_are_not_known_modules_and_possible_places_are_drawn(tmp_p
             await page.until("document.querySelector('#robots li.position')")
             assert "position only" in (await item(page, 1))["words"]
 
+            # where it was a second ago must have been told
+            await asyncio.sleep(max(0.0, 2.0 - stage.t))
             t = stage.t
             closure = replace(first.closure_to(second, t - 1, 0), peer=node_chain(101))
             said = entry(1, (), (), (closure,))
