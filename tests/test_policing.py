@@ -107,6 +107,7 @@ def as_test(number: int, deed: str) -> str:
     return f"\ndef test_{number}():\n    {deed}\n"
 
 
+@pytest.mark.slow
 def test_a_test_that_leaves_something_behind_fails(court: pytest.Pytester) -> None:
     tests = [as_test(k, deed) for k, deed in enumerate(BAD)]
     said = verdicts(court, IMPORTS + "".join(tests))

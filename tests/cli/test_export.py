@@ -61,6 +61,7 @@ def test_all_formats_at_once_print_each_file_once(
     assert set(to.iterdir()) == set(printed)
 
 
+@pytest.mark.slow
 def test_a_wall_clock_that_nobody_sets_is_said_and_what_to_do(
     socket: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -37,6 +37,7 @@ def test_a_newcomer_gets_chapters_and_not_the_whole_log() -> None:
     assert len(talk.digests()) == 1
 
 
+@pytest.mark.slow
 def test_a_team_that_loses_a_third_of_its_messages_comes_to_one_graph() -> None:
     talk = Conversation(4, loss=0.3, seed=3)
     talk.seconds(SPAN + 40)

@@ -50,6 +50,7 @@ def batches(team: VirtualTeam, robot: int) -> list[OdometryBatch]:
     return [batch for batch in out if isinstance(batch, OdometryBatch)]
 
 
+@pytest.mark.slow
 def test_nobody_says_odometry_to_robots_that_make_no_closures_with_it(team: VirtualTeam) -> None:
     """The lower id makes the closures of a pair."""
     # when they meet it asks once, before it knows that the other measures the ranges too
@@ -58,6 +59,7 @@ def test_nobody_says_odometry_to_robots_that_make_no_closures_with_it(team: Virt
     assert batches(team, 2) != []
 
 
+@pytest.mark.slow
 def test_every_sample_of_odometry_is_said_once_while_nothing_is_lost(team: VirtualTeam) -> None:
     later = batches(team, 2)[5:]
     assert len(later) > 30
@@ -65,6 +67,7 @@ def test_every_sample_of_odometry_is_said_once_while_nothing_is_lost(team: Virtu
         assert batch.n0 == before.n0 + len(before.steps)
 
 
+@pytest.mark.slow
 def test_a_heartbeat_without_news_comes_every_third_second(team: VirtualTeam) -> None:
     times = np.array([t for t, _ in sent(team, 1, "STATUS")])
     early, late = np.diff(times[times < 8]), np.diff(times[times > 30])
@@ -72,6 +75,7 @@ def test_a_heartbeat_without_news_comes_every_third_second(team: VirtualTeam) ->
     assert np.median(late) == pytest.approx(3.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_localised_robot_says_where_it_is_every_second(team: VirtualTeam) -> None:
     times = np.array([t for t, _ in sent(team, 1, "POSE")])
     assert np.diff(times[times > 30]).max() < 1.2
@@ -129,6 +133,7 @@ def test_odometry_that_was_lost_is_said_again_so_that_no_hole_remains() -> None:
         assert np.isfinite(track.poses).all()
 
 
+@pytest.mark.slow
 def test_a_robot_that_comes_late_gets_the_odometry_of_the_last_fifteen_seconds() -> None:
     team = VirtualTeam(EASY, on=(1, 2))
     team.run(30.0)

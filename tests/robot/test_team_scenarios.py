@@ -31,6 +31,7 @@ def kinds_sent(team: VirtualTeam, robot: int) -> set[str | None]:
     return {messages.kind_of_channel(channel) for _, channel, _ in sent}
 
 
+@pytest.mark.slow
 def test_a_team_agrees_on_one_frame_that_of_the_lowest_robot(clean: VirtualTeam) -> None:
     assert clean.frames() == {0: 0, 1: 0, 2: 0}
 
@@ -139,6 +140,7 @@ def test_when_the_lowest_robot_dies_the_next_gives_the_frame() -> None:
     assert team.frames() == {1: 1, 2: 1}
 
 
+@pytest.mark.slow
 def test_a_robot_that_leaves_in_order_is_gone_within_two_heartbeats() -> None:
     team = VirtualTeam()
     team.run(30.0)
@@ -230,6 +232,7 @@ def test_after_silent_wheels_the_path_is_a_new_piece_that_finds_its_place() -> N
 
 
 @pytest.mark.row("S2")
+@pytest.mark.slow
 def test_another_team_key_does_not_merge_and_both_sides_say_so() -> None:
     team = VirtualTeam(secrets={0: bytes(32), 1: bytes(32), 2: bytes([1] * 32)})
     team.run(45.0)
@@ -273,6 +276,7 @@ def test_a_robot_that_can_keep_nothing_says_no_word_under_a_number_that_peers_kn
     assert team.member(0).robot.team.peers[1].chain.epoch == forgetful.robot.own.epoch
 
 
+@pytest.mark.slow
 def test_a_robot_that_starts_under_an_epoch_that_it_used_before_begins_again_above_it() -> None:
     """A copied disk, or a computer without clock and disk: its peers hold what it never said."""
     team = VirtualTeam()

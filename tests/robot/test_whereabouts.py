@@ -223,6 +223,7 @@ def said(team: VirtualTeam, robot: int) -> list[tuple[float, float, Pose]]:
     return out
 
 
+@pytest.mark.slow
 def test_no_pose_that_is_called_valid_is_older_than_a_second(team: VirtualTeam) -> None:
     poses = said(team, 1)
     assert max(age for _, age, pose in poses if pose.state == PoseState.LOCALISED) <= 1.0
@@ -231,6 +232,7 @@ def test_no_pose_that_is_called_valid_is_older_than_a_second(team: VirtualTeam) 
     assert len(later) >= 15
 
 
+@pytest.mark.slow
 def test_meanwhile_ranges_say_where_it_is_and_nobody_knows_how_it_stands(
     team: VirtualTeam,
 ) -> None:
@@ -249,6 +251,7 @@ def test_meanwhile_ranges_say_where_it_is_and_nobody_knows_how_it_stands(
     assert np.median(errors) < 0.5
 
 
+@pytest.mark.slow
 def test_status_says_that_the_pose_is_stale_and_what_is_wrong(team: VirtualTeam) -> None:
     member = team.member(1)
     utime = member.clock.local(team.simulator.now)
@@ -259,6 +262,7 @@ def test_status_says_that_the_pose_is_stale_and_what_is_wrong(team: VirtualTeam)
     assert "no odometry for 19 s: the position is that of ranges" in team.problems(1)
 
 
+@pytest.mark.slow
 def test_the_others_hear_that_it_is_stale(team: VirtualTeam) -> None:
     for robot in (0, 2):
         member = team.member(robot)
@@ -268,12 +272,14 @@ def test_the_others_hear_that_it_is_stale(team: VirtualTeam) -> None:
         assert peers[other]["pose"] == "localised"
 
 
+@pytest.mark.slow
 def test_the_poses_of_the_others_stay_valid(team: VirtualTeam) -> None:
     for robot in (0, 2):
         states = {pose.state for sent, _, pose in said(team, robot) if sent > OUT_S}
         assert states == {PoseState.LOCALISED}
 
 
+@pytest.mark.slow
 def test_when_the_cable_is_back_it_waits_for_its_heading(team: VirtualTeam) -> None:
     team.run(BACK_S + 2)
     member = team.member(1)

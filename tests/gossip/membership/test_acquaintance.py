@@ -163,6 +163,7 @@ def test_who_speaks_of_an_earlier_start_of_ours_for_long_is_a_recording(
 
 @pytest.mark.row("S4")
 @pytest.mark.parametrize("epochs", [{}, {1: 1, 2: 1}], ids=["memory lost", "epochs kept"])
+@pytest.mark.slow
 def test_a_recording_of_absent_robots_changes_nothing_and_is_called_one(
     epochs: dict[int, int],
 ) -> None:

@@ -64,6 +64,7 @@ def test_without_gnc_closures_are_believed_as_module_2_left_them() -> None:
     assert simulator.members[0].robot.back.estimate is not None
 
 
+@pytest.mark.slow
 def test_the_same_run_comes_to_the_same_answer() -> None:
     """So what differs above differs because of the piece."""
     assert said(played(ALL)) == with_everything()
