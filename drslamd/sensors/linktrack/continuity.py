@@ -10,7 +10,7 @@ waits until the next one says the same:
 3. of each peer: distance, powers and the age of its entry.
 
 What changes in truth costs one frame or one range; a module whose frames never agree is believed at
-every third one.
+every third one, and who is heard less often than every ten seconds is not believed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,9 @@ from drslamd.sensors.linktrack.linktrack_frames import LAYOUTS, Kind
 from drslamd.sensors.wheels.wrapping import wrapped_difference
 
 REMEMBERED_US: Final = SECOND_US
-"""What is older says nothing about now."""
+"""A frame that is older says nothing about now."""
+PEER_REMEMBERED_US: Final = 10 * SECOND_US
+"""Likewise of the range to a peer, which may be far away or one of many and heard now and then."""
 SETTLED_US: Final = 2 * SECOND_US
 """After so long a module has named all peers that it hears; one more waits for its second range."""
 PATIENCE: Final = 2
@@ -155,7 +157,7 @@ class RangeSteps:
         if self._began is None:
             self._began = utime
         last, waiting = self._fresh(self._last, peer, utime), self._waiting.pop(peer, None)
-        if waiting is not None and utime - waiting.utime > REMEMBERED_US:
+        if waiting is not None and utime - waiting.utime > PEER_REMEMBERED_US:
             waiting = None
         is_new = last is None and utime - self._began > SETTLED_US
         breaks = is_new if last is None else last.breaks(entry)
@@ -167,7 +169,7 @@ class RangeSteps:
 
     def _fresh(self, known: dict[int, _Reported], peer: int, utime: int) -> _Reported | None:
         entry = known.get(peer)
-        return entry if entry is not None and utime - entry.utime <= REMEMBERED_US else None
+        return entry if entry is not None and utime - entry.utime <= PEER_REMEMBERED_US else None
 
     def _keep(self, known: dict[int, _Reported], peer: int, entry: _Reported) -> None:
         if peer not in known and len(known) >= MAX_PEERS:

@@ -121,11 +121,24 @@ def test_a_peer_that_appears_late_is_believed_at_its_second_range(
     assert module.prints(Peer(4, 2000)) == [2.0]
 
 
-def test_after_a_second_of_silence_whatever_comes_is_believed() -> None:
+def test_after_a_second_of_silence_any_frame_is_believed() -> None:
     for silence_ms, is_believed in ((980, False), (981, True)):
         module = Module()
         module.ms += silence_ms
-        assert bool(module.prints(Peer(9, 90_000))) is is_believed
+        assert bool(module.prints(role=1)) is is_believed
+
+
+@pytest.mark.parametrize(("every_s", "believed"), [(2.5, 7), (9.9, 7), (10.1, 0)])
+def test_who_is_heard_now_and_then_is_believed_but_for_the_first_time(
+    every_s: float, believed: int
+) -> None:
+    """Another peer is heard in every frame."""
+    module, came = Module(), []
+    for k in range(1, round(8 * every_s * 50) + 1):
+        is_heard = k % round(every_s * 50) == 0
+        found = module.prints(Peer(9, 3000), *([Peer(4, 4000 + 2 * k)] if is_heard else []))
+        came += [metres for metres in found if metres != 3.0]
+    assert len(came) == believed
 
 
 @pytest.mark.parametrize(("age_ms", "is_believed"), [(250, True), (251, False)])
