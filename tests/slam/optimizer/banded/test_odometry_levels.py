@@ -131,6 +131,20 @@ def test_fewer_are_not_blamed_where_that_leaves_more_outliers(
     assert np.delete(levels(problem, explained(problem).seen), 1, axis=0).max() > 1
 
 
+@pytest.mark.parametrize(
+    ("share", "is_asked"), [(FEW_OUTLIERS - 1e-6, True), (FEW_OUTLIERS, False)]
+)
+def test_whose_fault_it_is_is_not_asked_where_odometry_does_not_explain_it(
+    monkeypatch: pytest.MonkeyPatch, share: float, is_asked: bool
+) -> None:
+    """All that were raised stay so, for none of them is the cause."""
+    problem = slipping(a_team(2)[0], 1, *FAULT)
+    shares = iter([np.full(problem.pairs, share), *[np.zeros(problem.pairs)] * 9])
+    monkeypatch.setattr(odometry_levels, "outlier_share", lambda *_: next(shares))
+    others = np.delete(levels(problem, explained(problem).seen), 1, axis=0)
+    assert bool(others.max() == 1) is is_asked
+
+
 def test_what_was_seen_is_feared_to_have_gone_on_before_and_not_less() -> None:
     problem = stuck(a_team(2)[0], 1, *FAULT)
     found = explained(problem)
