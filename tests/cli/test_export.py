@@ -9,24 +9,10 @@ from typing import Any
 
 import pytest
 import team_answers
-from status_answers import answering_all
+from status_answers import WITHOUT_DEVICES, answering_all
 
 from drslamd import cli
 from drslamd.cli.exit_codes import CANNOT_CREATE, OK, UNAVAILABLE, USAGE
-
-TOML = """
-[robot]
-id = 1
-[team]
-insecure = true
-[uwb]
-port = "/dev/none"
-[wheels]
-source = "kobuki"
-port = "/dev/none"
-[daemon]
-status_socket = "{}"
-"""
 
 
 @pytest.fixture
@@ -37,7 +23,7 @@ def socket() -> Iterator[Path]:
 
 def export(socket: Path, to: Path, answers: dict[str, Any], *formats: str) -> int:
     config = to.parent / "1.toml"
-    config.write_text(TOML.format(socket))
+    config.write_text(WITHOUT_DEVICES.format(robot=1, socket=socket))
     with answering_all(socket, answers):
         return cli.main(["export", "-c", str(config), "--to", str(to), "--format", *formats])
 
@@ -103,7 +89,7 @@ def test_no_daemon_and_no_folder_are_sentences(
     socket: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = tmp_path / "1.toml"
-    config.write_text(TOML.format(socket))
+    config.write_text(WITHOUT_DEVICES.format(robot=1, socket=socket))
     arguments = ["export", "-c", str(config), "--to", str(tmp_path), "--format", "csv"]
     assert cli.main(arguments) == UNAVAILABLE
     assert "no daemon answers" in capsys.readouterr().err

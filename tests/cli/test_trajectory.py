@@ -13,7 +13,7 @@ import pytest
 from lab.recordings import world
 from lab.score import metrics
 from scipy.spatial.transform import Rotation
-from status_answers import answering
+from status_answers import WITHOUT_DEVICES, answering
 from teams import EASY, VirtualTeam
 
 from drslamd import cli, report
@@ -21,19 +21,6 @@ from drslamd import cli, report
 SCENE = world.Scene(
     robots=2, seconds=40.0, ranges=EASY.ranges, odometry=EASY.odometry, odometry_hz=20, range_hz=10
 )
-TOML = """
-[robot]
-id = 1
-[team]
-insecure = true
-[uwb]
-port = "/dev/none"
-[wheels]
-source = "kobuki"
-port = "/dev/none"
-[daemon]
-status_socket = "{}"
-"""
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +34,7 @@ def team() -> VirtualTeam:
 def config(tmp_path: Path) -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as short:
         path = tmp_path / "1.toml"
-        path.write_text(TOML.format(Path(short) / "s"))
+        path.write_text(WITHOUT_DEVICES.format(robot=1, socket=Path(short) / "s"))
         yield path
 
 

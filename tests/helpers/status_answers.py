@@ -12,6 +12,21 @@ from typing import Any
 
 from drslamd.io.status_socket import StatusSocket
 
+WITHOUT_DEVICES = """
+[robot]
+id = {robot}
+[team]
+insecure = true
+[uwb]
+port = "/dev/none"
+[wheels]
+source = "kobuki"
+port = "/dev/none"
+[daemon]
+status_socket = "{socket}"
+"""
+"""A configuration that leads to a status socket, and to no device."""
+
 
 @contextmanager
 def answering(path: Path, answer: Any, question: str = "trajectory") -> Iterator[None]:

@@ -13,23 +13,10 @@ from pathlib import Path
 
 from near_scenes import NEAR
 from places import REPOSITORY
+from status_answers import WITHOUT_DEVICES
 
 from drslamd.gossip.seal import VERSION, Header
 from drslamd.near.near_message import encode
-
-CONFIG = """
-[robot]
-id = 3
-[team]
-insecure = true
-[uwb]
-port = "/dev/none"
-[wheels]
-source = "kobuki"
-port = "/dev/none"
-[daemon]
-status_socket = "{folder}/3.sock"
-"""
 
 START_S, EVERY_S, ENOUGH = 30.0, 0.02, 20
 
@@ -39,7 +26,7 @@ def feeding(folder: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
     """`drslamd feed` with these arguments, once it was told enough to have told some of it; it is
     ended by SIGTERM if it did not end before."""
     config, told, ended = folder / "3.toml", threading.Event(), threading.Event()
-    config.write_text(CONFIG.format(folder=folder))
+    config.write_text(WITHOUT_DEVICES.format(robot=3, socket=folder / "3.sock"))
     daemon = _daemon(folder / "3.near", told, ended)
     kind, *more = arguments
     command = (sys.executable, "-m", "drslamd", "feed", kind, "-c", str(config), *more)
@@ -58,7 +45,6 @@ def _daemon(path: Path, told: threading.Event, ended: threading.Event) -> thread
     daemon = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     daemon.bind(str(path))
     daemon.listen(1)
-
     daemon.settimeout(START_S)
 
     def serve() -> None:
