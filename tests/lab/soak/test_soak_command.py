@@ -73,8 +73,10 @@ def test_the_page_says_how_many_runs_failed_and_what_every_hour_was_like() -> No
         "descriptors": 4,
         "solve_ms": 2.0,
     }
-    hour |= {"pair_rms_m": 0.1, "entries": 7, "commit": "abc"}
-    page = "\n".join(results.page(json.loads(json.dumps([*rows, hour]))))
+    hour |= {"pair_rms_m": 0.1, "entries": 7, "sitting": 2, "commit": "abc"}
+    earlier_day = {**hour, "took_s": 8.5}
+    page = "\n".join(results.page(json.loads(json.dumps([*rows, earlier_day, hour]))))
+    assert "8.5" not in page
     assert "| parted | one robot cut off | 2 | 1 | 9 | 0 |" in page
     assert "* 1 x parted: P4" in page
-    assert "| 1 | 9.5 | 80.0 | 4 | 2.0 | 0.1 | 7 |" in page
+    assert "| 1 | 9.5 | 2 | 80.0 | 4 | 2.0 | 0.1 | 7 |" in page

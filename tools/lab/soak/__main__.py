@@ -105,7 +105,7 @@ def _run(job: tuple[str, int]) -> Result:
 def _day(hours: float, path: Path) -> int:
     progress = Progress("played", hours * 3600)
     try:
-        for hour in churn.hours(1, hours, progress):
+        for hour in churn.hours(1, hours, progress, (path.with_suffix(".day"), commit())):
             results.add(path, {**hour.as_json(), "commit": commit()})
     except Broken as broken:
         print(f"FAIL day seed=1 commit={commit()} {broken}\n  repeat: tools/soak --hours {hours:g}")

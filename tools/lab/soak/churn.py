@@ -12,6 +12,7 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from lab.score import metrics
 from lab.soak import radio
 from lab.soak.harm import on_the_air
 from lab.soak.invariants import Invariants
+from lab.soak.put_aside import put_aside, taken_up
 from lab.soak.stage import Bench, Stage
 
 ROBOTS = 5
@@ -57,6 +59,7 @@ class Hour:
         solve_ms: mean of module 3.
         pair_rms_m: how far wrong robots were about each other's place, root of the mean square.
         entries: of all logs that robot 0 holds at the end.
+        sitting: how many processes played the day by then; memory is that of the latest.
     """
 
     hour: int
@@ -66,6 +69,7 @@ class Hour:
     solve_ms: float
     pair_rms_m: float
     entries: int
+    sitting: int
 
     def as_json(self) -> dict[str, Any]:
         return asdict(self)
@@ -118,18 +122,41 @@ class DayStage(Stage):
 
     def chunks(self, device: Hardware, since_s: float) -> Iterator[Chunk]:
         assert self.day is not None
-        left = right = 0.0
-        for k in range(int(since_s // BLOCK_S), 1_000_000):
-            block = self.day.block(k)
-            part = Hardware(block, device.robot, device.base, 2)
-            part.uwb = device.uwb
-            ways: list[tuple[float, float]] = []
-            part.wiring = _going_on(left, right, ways)
-            for chunk in part.chunks():
-                at_s = k * BLOCK_S + chunk.t
-                if at_s >= since_s:
-                    yield Chunk(at_s, chunk.port, chunk.printed)
-            left, right = ways[0]
+        return _Printing(self.day, device, since_s)
+
+
+class _Printing:
+    """What the devices of a robot print, block after block. (A generator cannot be put aside.)"""
+
+    def __init__(self, day: Day, device: Hardware, since_s: float) -> None:
+        self._day, self._device, self._since_s = day, device, since_s
+        self._block = int(since_s // BLOCK_S)
+        self._left = self._right = 0.0
+        self._chunks: Iterator[Chunk] = iter(())
+
+    def __iter__(self) -> Iterator[Chunk]:
+        return self
+
+    def __next__(self) -> Chunk:
+        while True:
+            chunk = next(self._chunks, None)
+            if chunk is None:
+                self._chunks = iter(self._printed())
+                self._block += 1
+            elif chunk.t >= self._since_s:
+                return chunk
+
+    def _printed(self) -> list[Chunk]:
+        """Of this block, in the times of the day."""
+        device = self._device
+        part = Hardware(self._day.block(self._block), device.robot, device.base, 2)
+        part.uwb = device.uwb
+        ways: list[tuple[float, float]] = []
+        part.wiring = _going_on(self._left, self._right, ways)
+        begins_s = self._block * BLOCK_S
+        chunks = [Chunk(begins_s + c.t, c.port, c.printed) for c in part.chunks()]
+        self._left, self._right = ways[0]
+        return chunks
 
 
 def _going_on(left: float, right: float, ways: list[tuple[float, float]]) -> Any:
@@ -142,33 +169,61 @@ def _going_on(left: float, right: float, ways: list[tuple[float, float]]) -> Any
     return wiring
 
 
-def hours(seed: int, count: float, progress: Callable[[float], None]) -> Iterator[Hour]:
+@dataclass
+class _Play:
+    """A day so far: its team, what is watched, and how many seconds of it are over."""
+
+    bench: Bench
+    invariants: Invariants
+    measured: _Measured
+    second: int = 0
+
+
+def hours(
+    seed: int,
+    count: float,
+    progress: Callable[[float], None],
+    aside: tuple[Path, str] | None = None,
+) -> Iterator[Hour]:
     """Play so many hours; a row after each.
 
     Args:
         progress: told the seconds of the team that have passed.
+        aside: a file in which the day is put aside every half hour of the team, and the commit that
+            plays it. A day that is there, of the same commit, seed and length, is gone on with.
 
     Raises:
         Broken: a promise was not kept.
     """
+    until_s = LOOK_S * round(count * 3600 / LOOK_S)
+    path, commit = aside or (Path(), "")
+    mark = (commit, seed, until_s)
+    play: _Play = (taken_up(path, mark) if aside else None) or _begun(seed, until_s)
+    play.measured.sit_down()
+    while play.second < until_s:
+        play.second += LOOK_S
+        play.bench.run(play.second)
+        play.invariants.look()
+        play.measured.look()
+        play.bench.stage.radio.damaged.clear()
+        progress(play.second)
+        if play.second % RESTART_S == 0:
+            _restart(play.bench, play.second // RESTART_S % ROBOTS)
+        if play.second % 3600 == 0 or play.second == until_s:
+            yield play.measured.hour(-(-play.second // 3600))
+        if aside and play.second % RESTART_S == 0:
+            put_aside(path, play, mark)
+    if aside:
+        path.unlink(missing_ok=True)
+
+
+def _begun(seed: int, until_s: int) -> _Play:
     day = Day(seed)
     stage = DayStage(day.block(0), np.random.default_rng([seed, 3]), 0.0, float("inf"), day=day)
     stage.radio.troubles.append(radio.Trouble(0, 2**62, radio.lossy(LOSS)))
-    until_s = LOOK_S * round(count * 3600 / LOOK_S)
     on_the_air.stranger(stage, STRANGE_PER_S, until_s)
     bench = Bench(stage, seed, RATES)
-    invariants = Invariants(bench, keeps_journal=False)
-    measured = _Measured(bench, day)
-    for second in range(LOOK_S, until_s + 1, LOOK_S):
-        bench.run(second)
-        invariants.look()
-        measured.look()
-        stage.radio.damaged.clear()
-        progress(second)
-        if second % RESTART_S == 0:
-            _restart(bench, second // RESTART_S % ROBOTS)
-        if second % 3600 == 0 or second == until_s:
-            yield measured.hour(-(-second // 3600))
+    return _Play(bench, Invariants(bench, keeps_journal=False), _Measured(bench, day))
 
 
 def _restart(bench: Bench, robot: int) -> None:
@@ -185,12 +240,20 @@ class _Measured:
 
     def __init__(self, bench: Bench, day: Day) -> None:
         self._bench, self._day = bench, day
-        self._began = time.process_time()
+        self._sitting = 0
+        self._took_s = self._looked_s = 0.0
         self._errors: list[float] = []
         self._solve_ms: list[float] = []
 
+    def sit_down(self) -> None:
+        """A process begins to play, or goes on."""
+        self._sitting += 1
+        self._looked_s = time.process_time()
+
     def look(self) -> None:
         """Take what was found since the last look, so that nothing piles up."""
+        now = time.process_time()
+        self._took_s, self._looked_s = self._took_s + now - self._looked_s, now
         for member in self._bench.members.values():
             traces = member.traces
             self._solve_ms += traces.solve_ms.pop("optimizer", [])
@@ -218,17 +281,17 @@ class _Measured:
         self._errors.append(float(np.hypot(*(found[0] - there)[:2])))
 
     def hour(self, number: int) -> Hour:
-        now = time.process_time()
         row = Hour(
             number,
-            round(now - self._began, 1),
+            round(self._took_s, 1),
             round(_rss_mb(), 1),
             len(os.listdir("/proc/self/fd")),
             round(float(np.mean(self._solve_ms or [0.0])), 2),
             round(float(np.sqrt(np.mean(np.square(self._errors or [0.0])))), 4),
             sum(len(log.sealed) for log in self._bench.members[0].robot.team.logs._logs.values()),
+            self._sitting,
         )
-        self._began, self._errors, self._solve_ms = now, [], []
+        self._took_s, self._errors, self._solve_ms = 0.0, [], []
         return row
 
 

@@ -28,7 +28,7 @@ from drslamd.gossip.replicated_log import MAX_ENTRIES
 from drslamd.robot import Robot
 from drslamd.sensors.frame_scanner import MAX_BUFFER_BYTES
 from drslamd.slam.relative_pose.range_buffer import MAX_UWB_IDS
-from lab.play.simulator import Member, Simulator
+from lab.play.simulator import Disk, Member, Simulator
 from lab.soak import agreement
 
 VALID_US = SECOND_US
@@ -145,10 +145,11 @@ class Invariants:
     def __init__(self, simulator: Simulator, keeps_journal: bool) -> None:
         self._simulator = simulator
         self._keeps_journal = keeps_journal
-        self._received: dict[int, tuple[Robot, int]] = {}
+        self._received: dict[Disk, tuple[Robot, int]] = {}
         """By computer, which is its disk; so are the numbers that were used."""
-        self._numbers: dict[int, Numbers] = defaultdict(Numbers)
-        self._sent = blake2b(digest_size=8)
+        self._numbers: dict[Disk, Numbers] = defaultdict(Numbers)
+        self._sent = b""
+        """A digest of all that was sent, each over the one before: a hash cannot be put aside."""
         self.journals: dict[int, tuple[Member, Journal]] = {}
         self.bytes_sent: deque[int] = deque([0], maxlen=1_000)
         self.seconds = 0
@@ -157,7 +158,7 @@ class Invariants:
     @property
     def digest(self) -> str:
         """Of all that was sent so far."""
-        return self._sent.hexdigest()
+        return self._sent.hex()
 
     def after(self, member: Member, event: Event, effects: list[Effect]) -> None:
         """An event was handled."""
@@ -177,16 +178,17 @@ class Invariants:
 
     def _count(self, member: Member) -> None:
         robot, team = member.robot, member.robot.team
-        known, count = self._received.get(id(member.disk), (robot, 0))
+        known, count = self._received.get(member.disk, (robot, 0))
         count = count + 1 if known is robot else 1
-        self._received[id(member.disk)] = robot, count
+        self._received[member.disk] = robot, count
         counted = team.accepted + team.repeats_heard + team.own_echoes + sum(team.refused.values())
         if counted != count:
             raise Broken("P3", robot.own.robot, f"{count} datagrams came, {counted} were counted")
 
     def _on_send(self, member: Member, utime: int, effect: Send) -> None:
         robot = member.robot
-        self._sent.update(effect.channel.encode() + effect.payload)
+        said = self._sent + effect.channel.encode() + effect.payload
+        self._sent = blake2b(said, digest_size=8).digest()
         self.bytes_sent[-1] += len(effect.payload)
         kind = messages.kind_of_channel(effect.channel)
         if kind is None:
@@ -196,7 +198,7 @@ class Invariants:
             raise Broken("P3", robot.own.robot, f"says what is refused: {header.value}")
         if header.origin != robot.own.robot:
             return
-        fault = self._numbers[id(member.disk)].use(header, kind, effect.payload)
+        fault = self._numbers[member.disk].use(header, kind, effect.payload)
         if fault:
             raise Broken("P8", robot.own.robot, fault)
         if kind == "POSE":

@@ -70,8 +70,20 @@ def _summary(rows: Sequence[Row]) -> str:
 def _day(hours: Sequence[Row]) -> list[str]:
     if not hours:
         return []
-    out = ["", "Five robots, one restarted every half hour, 30 % of datagrams lost:", ""]
-    out += ["| hour | of a core [s] | RSS [MB] | descriptors | solve [ms] | pairs [m] | entries |"]
-    out += ["| ---: | ---: | ---: | ---: | ---: | ---: | ---: |"]
-    keys = ("hour", "took_s", "rss_mb", "descriptors", "solve_ms", "pair_rms_m", "entries")
+    begins = [k for k, row in enumerate(hours) if row["hour"] == 1]
+    hours = hours[begins[-1] if begins else 0 :]
+    out = ["", "Five robots, one restarted every half hour, 30 % of datagrams lost. Where a second"]
+    out += ["process went on with the day, memory begins anew.", ""]
+    columns = {
+        "hour": "hour",
+        "of a core [s]": "took_s",
+        "process": "sitting",
+        "RSS [MB]": "rss_mb",
+        "descriptors": "descriptors",
+        "solve [ms]": "solve_ms",
+        "pairs [m]": "pair_rms_m",
+        "entries": "entries",
+    }
+    out += [f"| {' | '.join(columns)} |", f"|{' ---: |' * len(columns)}"]
+    keys = columns.values()
     return [*out, *("| " + " | ".join(str(row[key]) for key in keys) + " |" for row in hours)]
