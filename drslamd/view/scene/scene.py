@@ -20,7 +20,7 @@ from drslamd.view.scene import robot_path
 from drslamd.view.scene.hearing import Said
 from drslamd.view.scene.modules_seen import ModulesSeen
 from drslamd.view.scene.pair_seen import ClosureSeen, PairSeen, closure_seen, residual
-from drslamd.view.scene.possible_seen import possible
+from drslamd.view.scene.possible_drawn import possible
 from drslamd.view.scene.robot_path import RobotPath
 from drslamd.view.scene.robot_seen import RobotSeen, picture
 
