@@ -51,6 +51,7 @@ from drslamd.jobs import OPTIMIZER, RELATIVE_POSE, Jobs
 from drslamd.memory import Memory
 from drslamd.modules import Modules
 from drslamd.near.surroundings import Surroundings
+from drslamd.neighbourhood import Neighbourhood
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.samples import Motion
 from drslamd.sensors.wheels.wheel_input import WheelInput
@@ -115,6 +116,7 @@ class Robot:
         self.network: NetworkState | None = None
         self.slept: Slept | None = None
         self.jobs = Jobs()
+        self.neighbourhood = Neighbourhood(self.own, self.team, self.front)
         self.modules = Modules(self.front, self.back, self.team, self.jobs, self.neighbours)
         self.timers = Timers(self._periods())
         self.memory = Memory(self.own, self.team.seal, self.calibration, place)
@@ -159,6 +161,8 @@ class Robot:
     def handle(self, event: Event) -> list[Effect]:
         """Take one event; what follows from it."""
         effects, outbox = self._handlers[type(event)](event), self.outbox
+        if not effects:
+            return effects
         if self.memory.is_listening(event.utime):
             return [e for e in effects if not isinstance(e, Send)]
         return [e for e in effects if not isinstance(e, Send) or outbox.passes(e, event.utime)]
@@ -222,6 +226,7 @@ class Robot:
         clock, where = self.uwb.system_offset_us(utime), self.whereabouts(utime)
         neighbours = self.neighbours(utime)
         status = self.broadcast.heartbeat(neighbours, clock, where.state, utime)
+        self.neighbourhood.look_again()  # the clocks of peers were compared with ours
         status += self.broadcast.hypotheses(neighbours, utime)
         # solutions come with news; that a pose grew old or doubtful is said without any
         is_odd = where.is_old or where.doubt
@@ -232,9 +237,7 @@ class Robot:
 
     def neighbours(self, utime: int) -> list[PeerInRange]:
         """Living peers within UWB range of us, as either side measures it."""
-        mine = set(self.front.ranged(utime))
-        peers = (peer.neighbour(self.own, utime) for peer in self.team.living(utime).values())
-        return [peer for peer in peers if peer.ranges_to_us or peer.uwb_id in mine]
+        return self.neighbourhood.at(utime)
 
     # our log
 
@@ -330,7 +333,8 @@ class Robot:
         due = self.timers.take_due(event.utime)
         if self.memory.is_listening(event.utime):
             due = [action for action in due if action not in self._speaking]
-        return [effect for action in due for effect in action(event.utime)]
+        with self.neighbourhood.held():
+            return [effect for action in due for effect in action(event.utime)]
 
     def _on_slept(self, event: Slept) -> list[Effect]:
         """Nothing was seen meanwhile, and the clocks of the others may have gone elsewhere."""

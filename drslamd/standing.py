@@ -12,7 +12,8 @@ from drslamd.slam import settings
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.doubt import Doubt, Partners, doubt_of, doubted_partners
 from drslamd.slam.front_end import FrontEnd
-from drslamd.slam.graph.estimate import PoseNow
+from drslamd.slam.graph.estimate import PoseNow, TeamEstimate
+from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.points.point_targets import point_targets
 from drslamd.slam.points.points import Answer
@@ -32,6 +33,22 @@ class Asked(NamedTuple):
     told: Callable[[Any, int], bool]
 
 
+class _Kept(NamedTuple):
+    """A pose and all that it follows from; a track only grows, so its end stands for it."""
+
+    estimate: TeamEstimate
+    noise: OdometryNoise
+    end: int
+    boldness: float
+    pose: PoseNow | None
+
+    def follows(
+        self, estimate: TeamEstimate, noise: OdometryNoise, end: int, boldness: float
+    ) -> bool:
+        is_same = self.estimate is estimate and self.noise is noise
+        return is_same and (self.end, self.boldness) == (end, boldness)
+
+
 class Standing:
     """Of one robot."""
 
@@ -40,16 +57,20 @@ class Standing:
         self._namesakes, self._front, self._back = team.namesakes, front, back
         self.survey = settings.survey(config)
         self._ranges_solve = config.optimizer.algorithm == "banded"
+        self._kept: _Kept | None = None
 
     def pose(self) -> PoseNow | None:
         """Our latest pose in the frame of the team; None while we are not localised."""
-        estimate, front = self._back.estimate, self._front
+        estimate, front, boldness = self._back.estimate, self._front, self._back.revisions.boldness
         if estimate is None:
             return None
-        found = pose_now(estimate, self._robot, front.reckoning.track, front.model.noise)
-        if found is None:
-            return None
-        return found._replace(covariance=found.covariance * self._back.revisions.boldness)
+        track, noise = front.reckoning.track, front.model.noise
+        if self._kept is None or not self._kept.follows(estimate, noise, track.end, boldness):
+            found = pose_now(estimate, self._robot, track, noise)
+            if found is not None:
+                found = found._replace(covariance=found.covariance * boldness)
+            self._kept = _Kept(estimate, noise, track.end, boldness, found)
+        return self._kept.pose
 
     def whereabouts(self, utime: int) -> Whereabouts:
         """What that pose is worth now; nothing while another robot lives under our id."""

@@ -26,6 +26,7 @@ RINGS = {
         "recording",
         "setup",
         "memory",
+        "neighbourhood",
         "timers",
         "jobs",
         "whereabouts",

@@ -77,8 +77,9 @@ def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
     yield "network", None if network is None or network.up else network.detail
     yield "sleep", _sleep(robot.slept, utime)
     yield from robot.team.conditions(utime)
-    yield "pose", why_not_localised(robot, utime)
-    doubt = robot.whereabouts(utime).doubt
+    where = robot.whereabouts(utime)
+    yield "pose", _why_not_localised(robot, where, utime)
+    doubt = where.doubt
     yield "doubt", contradictions.doubt(doubt)
     yield "partners", contradictions.partners(_doubted_partners(robot) if not doubt else ())
     yield "mounting", _mountings(robot)
@@ -163,7 +164,10 @@ def _state(robot: Stages, utime: int) -> str | None:
 
 def why_not_localised(robot: Stages, utime: int) -> str | None:
     """The first stage at which it stops, None when the robot is localised."""
-    where = robot.whereabouts(utime)
+    return _why_not_localised(robot, robot.whereabouts(utime), utime)
+
+
+def _why_not_localised(robot: Stages, where: Whereabouts, utime: int) -> str | None:
     if robot.team.namesakes.is_own_id_used(utime):
         return "not localised: another robot uses the id of this one; no other reason counts"
     if where.state is PoseState.POSITION:

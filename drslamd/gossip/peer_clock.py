@@ -52,12 +52,14 @@ class PeerClock:
 
     Attributes:
         since: from when on our clock the offset holds: either clock jumped before, us.
+        delay_us: our smallest (arrival here - stamp of the peer), to be told to the peer.
     """
 
     def __init__(self) -> None:
         self.since = 0
         self._smallest: deque[tuple[int, int]] = deque()
         """(second, smallest arrival - stamp in it), at most `WINDOW_S` of them."""
+        self.delay_us: int | None = None
         self._last_two: deque[int] = deque(maxlen=2)
         self._arrived = 0
         self._echo: tuple[int, int] | None = None
@@ -72,6 +74,7 @@ class PeerClock:
         self._smallest.append((second, value))
         while self._smallest[0][0] <= second - WINDOW_S:
             self._smallest.popleft()
+        self.delay_us = min(value for _, value in self._smallest)
         self._arrived = arrived
         self._notice_jump()
 
@@ -84,6 +87,7 @@ class PeerClock:
     def begin_again(self, utime: int) -> None:
         """Our own clock may have jumped: nothing that was known holds any more."""
         self._smallest.clear()
+        self.delay_us = None
         self._last_two.clear()
         self._echo = self._radio = None
         self.since = utime
@@ -94,7 +98,8 @@ class PeerClock:
         if not self._contradicts_itself():
             return
         self.since = self._arrived
-        self._smallest = deque([(self._arrived // SECOND_US, self._last_two[-1])])
+        self.delay_us = self._last_two[-1]
+        self._smallest = deque([(self._arrived // SECOND_US, self.delay_us)])
         if self._contradicts_itself():
             self._echo = None
 
@@ -109,11 +114,6 @@ class PeerClock:
     def radio(self, own_minus_system: int, peer_minus_system: int, utime: int) -> None:
         """Both clocks against LinkTrack's system_time, each modulo its period."""
         self._radio = (peer_minus_system - own_minus_system, utime)
-
-    @property
-    def delay_us(self) -> int | None:
-        """Our smallest (arrival here - stamp of the peer), to be told to the peer."""
-        return min((value for _, value in self._smallest), default=None)
 
     def offset(self, utime: int) -> Offset | None:
         """The best of what is known, or None before the first message."""

@@ -7,7 +7,7 @@ reserved and may hold anything. Offsets count from the first byte of the block t
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, Final, NamedTuple
 
 
@@ -82,22 +82,39 @@ class Block(NamedTuple):
     slots: Slots | None = None
 
 
+def narrowed(block: Block, names: Collection[str]) -> Block:
+    """The same block of which only these values are read, in its entries too.
+
+    The values by which entries are counted and left out are always read.
+    """
+    tail, slots = block.tail, block.slots
+    if tail is not None and tail.entry is not None:
+        tail = tail._replace(entry=narrowed(tail.entry, names))
+    if slots is not None:
+        slots = slots._replace(entry=narrowed(slots.entry, {*names, "id"}))
+    fields = tuple(field for field in block.fields if field.name in names)
+    return Block(block.size, fields, tail, slots)
+
+
 class _Value(NamedTuple):
     """A value that needs more than to be unpacked: where it stands among those that were."""
 
     name: str
     first: int
     last: int
-    made: Callable[[bytes], Any] | None
-    divisor: int
+    made: Callable[[Any], Any]
 
     def of(self, raw: tuple[Any, ...]) -> Any:
-        values = raw[self.first : self.last]
-        if self.made is not None:
-            values = tuple(map(self.made, values))
-        if self.divisor != 1:
-            values = tuple(value / self.divisor for value in values)
+        values = tuple(map(self.made, raw[self.first : self.last]))
         return values[0] if len(values) == 1 else values
+
+
+def _making(field: Field) -> Callable[[Any], Any]:
+    """What is made of one unpacked value of a field."""
+    made, divisor = field.type.made, field.divisor
+    if made is None:
+        return lambda raw: raw if divisor == 1 else raw / divisor
+    return made if divisor == 1 else lambda raw: made(raw) / divisor
 
 
 class BlockReader:
@@ -113,15 +130,18 @@ class BlockReader:
         fields = sorted((*block.fields, *number), key=lambda field: field.offset)
         codes, at = "<", 0
         names: list[str] = []
-        self._more: list[_Value] = []
+        self._single: list[tuple[str, int, Callable[[Any], Any]]] = []
+        self._repeated: list[_Value] = []
         for field in fields:
             if field.offset < at:
                 raise ValueError(f"{field.name} overlaps what stands before it")
             codes += f"{field.offset - at}x" + field.type.code * field.repeat
             at = field.offset + field.type.size * field.repeat
             first, last = len(names), len(names) + field.repeat
-            if field.repeat > 1 or field.type.made is not None or field.divisor != 1:
-                self._more.append(_Value(field.name, first, last, field.type.made, field.divisor))
+            if field.repeat > 1:
+                self._repeated.append(_Value(field.name, first, last, _making(field)))
+            elif field.type.made is not None or field.divisor != 1:
+                self._single.append((field.name, first, _making(field)))
             names += [field.name] * field.repeat
         if at > block.size:
             raise ValueError(f"{fields[-1].name} passes the end of its block")
@@ -156,7 +176,9 @@ class BlockReader:
 
     def _values(self, raw: tuple[Any, ...]) -> dict[str, Any]:
         values = dict(zip(self._names, raw, strict=True))
-        for value in self._more:
+        for name, at, made in self._single:
+            values[name] = made(raw[at])
+        for value in self._repeated:
             values[value.name] = value.of(raw)
         return values
 

@@ -44,11 +44,9 @@ class _Track:
         # One (bucket, smallest offset) for each half second of device time: a host that was held
         # up and reads its backlog late must not lose what it knew before.
         self._offsets: deque[tuple[int, int]] = deque(maxlen=BUCKETS)
+        self.offset_us = arrival - reading * unit_us
+        """The smallest of them."""
         self._keep(arrival)
-
-    @property
-    def offset_us(self) -> int:
-        return min(offset for _, offset in self._offsets)
 
     def host_time(self) -> int:
         """Time of the last reading on the clock of the host."""
@@ -60,23 +58,30 @@ class _Track:
         beyond = wrapped_difference(reading, self._reading + expected, self._bits)
         return expected + beyond
 
-    def is_continued_by(self, reading: int, arrival: int) -> bool:
-        step_us = self.step_to(reading, arrival) * self._unit_us
-        return step_us > 0 and abs(step_us - (arrival - self._arrival)) <= CONTINUITY_US
-
-    def extend(self, reading: int, arrival: int) -> None:
-        self._reading += self.step_to(reading, arrival)
+    def extend(self, reading: int, arrival: int) -> bool:
+        """Take a reading that continues this run; False when it does not."""
+        step = self.step_to(reading, arrival)
+        step_us = step * self._unit_us
+        if step_us <= 0 or abs(step_us - (arrival - self._arrival)) > CONTINUITY_US:
+            return False
+        self._reading += step
         self._arrival = arrival
         self._keep(arrival)
+        return True
 
     def _keep(self, arrival: int) -> None:
         device_us = self._reading * self._unit_us
         bucket, offset = device_us // BUCKET_US, arrival - device_us
-        if self._offsets and self._offsets[-1][0] == bucket:
-            offset = min(offset, self._offsets.pop()[1])
-        while self._offsets and self._offsets[0][0] <= bucket - BUCKETS:
-            self._offsets.popleft()
-        self._offsets.append((bucket, offset))
+        offsets = self._offsets
+        if offsets and offsets[-1][0] == bucket:
+            offset = min(offset, offsets.pop()[1])
+        gone = False
+        while offsets and offsets[0][0] <= bucket - BUCKETS:
+            offsets.popleft()
+            gone = True
+        offsets.append((bucket, offset))
+        least = min(known for _, known in offsets) if gone else min(self.offset_us, offset)
+        self.offset_us = least
 
 
 class DeviceClock:
@@ -107,19 +112,19 @@ class DeviceClock:
 
         None while the reading continues neither the believed counter nor the reading before it.
         """
-        track = self._continued(reading, arrival)
+        track = self._extended(reading, arrival)
         if track is None:
             self._candidate = _Track(self._bits, self._unit_us, reading, arrival)
             return None
-        track.extend(reading, arrival)
         if track is not self._believed:
             self.restarts += self._believed is not None
             self._believed = track
         self._candidate = None
         return track.host_time()
 
-    def _continued(self, reading: int, arrival: int) -> _Track | None:
+    def _extended(self, reading: int, arrival: int) -> _Track | None:
+        """The run that this reading continues."""
         for track in (self._believed, self._candidate):
-            if track is not None and track.is_continued_by(reading, arrival):
+            if track is not None and track.extend(reading, arrival):
                 return track
         return None

@@ -16,7 +16,7 @@ Whatever is wrong with the bytes is counted; nothing here raises for them.
 from __future__ import annotations
 
 import re
-from typing import Final, NamedTuple, Protocol
+from typing import Final, Protocol
 
 MAX_BUFFER_BYTES: Final = 4096
 """Longest frame that any format may announce, and the most that a scanner ever holds. At 1450
@@ -47,14 +47,6 @@ class FrameFormat(Protocol):
         """Is the checksum of this frame of the announced length right?"""
 
 
-class _Found(NamedTuple):
-    """An intact frame and where it starts, or None and where to go on with more bytes."""
-
-    frame: bytes | None
-    at: int
-    bad_checksums: int
-
-
 class FrameScanner:
     """Cuts intact frames out of a stream.
 
@@ -64,7 +56,7 @@ class FrameScanner:
     """
 
     def __init__(self, frame_format: FrameFormat) -> None:
-        self._format = frame_format
+        self._format, self._start = frame_format, frame_format.head.search
         self._rest = b""
         self._last_byte_utime = 0
         self.garbage_bytes = 0
@@ -90,32 +82,36 @@ class FrameScanner:
         return frames
 
     def _take(self, buffer: bytes, frames: list[bytes], patient: bool) -> bytes:
-        """Moves the intact frames of `buffer` to `frames` and returns what has to wait."""
-        at = 0
-        while True:
-            found = self._search(buffer, at, patient)
-            if found.frame is None and not patient:
-                return buffer[at:]
-            self.garbage_bytes += found.at - at
-            self.bad_checksums += found.bad_checksums
-            if found.frame is None:
-                return buffer[found.at :]
-            frames.append(found.frame)
-            at = found.at + len(found.frame)
+        """Moves the intact frames of `buffer` to `frames` and returns what has to wait.
 
-    def _search(self, buffer: bytes, at: int, patient: bool) -> _Found:
-        """The next intact frame; a patient search stops at the first unfinished candidate."""
-        bad_checksums = 0
-        while (head := self._format.head.search(buffer, at)) is not None:
+        A patient search stops at the first unfinished candidate; another one that finds nothing
+        more leaves all that is behind the last frame.
+        """
+        start, length_at, is_intact = self._start, self._format.length_at, self._format.is_intact
+        at = taken = bad_checksums = 0
+        while (head := start(buffer, at)) is not None:
             at = head.start()
-            length = self._format.length_at(buffer, at)
+            length = length_at(buffer, at)
             unfinished = length == NEED_MORE or at + length > len(buffer)
             if unfinished and patient:
-                return _Found(None, at, bad_checksums)
+                break
             if not unfinished and length != NOT_A_FRAME:
                 frame = buffer[at : at + length]
-                if self._format.is_intact(frame):
-                    return _Found(frame, at, bad_checksums)
+                if is_intact(frame):
+                    frames.append(frame)
+                    self._count(at - taken, bad_checksums)
+                    at = taken = at + length
+                    bad_checksums = 0
+                    continue
                 bad_checksums += 1
             at += 1
-        return _Found(None, len(buffer), bad_checksums)
+        else:
+            at = len(buffer)
+        if not patient:
+            return buffer[taken:]
+        self._count(at - taken, bad_checksums)
+        return buffer[at:]
+
+    def _count(self, garbage_bytes: int, bad_checksums: int) -> None:
+        self.garbage_bytes += garbage_bytes
+        self.bad_checksums += bad_checksums

@@ -8,6 +8,7 @@ two seconds is doubt, long before anybody can say who is wrong.
 from __future__ import annotations
 
 from collections import deque
+from statistics import median
 from typing import NamedTuple
 
 import numpy as np
@@ -185,7 +186,7 @@ class RangeWatch:
         if joint is None:
             return None
         models = own.data.model, partner.data.model
-        measured = float(np.median(level(found.range_m, *models)))
+        measured = median(level(found.range_m, *models).tolist())
         u = b.place - a.place
         distance = max(float(np.hypot(*u)), LEAST_M)
         u = u / distance
@@ -235,9 +236,9 @@ def _own_way(estimate: TeamEstimate, own: PairEnd, utime: int) -> Array | None:
     if now < last:
         # solved already: back along the way, of which the noise is as large
         last, now = now, last
-        way = track.poses[last - track.n0 : now - track.n0 + 1] if track.covers(last, now) else None
+        way = track.between(last, now) if track.covers(last, now) else None
         return None if way is None else way[::-1]
-    return track.poses[last - track.n0 : now - track.n0 + 1] if track.covers(last, now) else None
+    return track.between(last, now) if track.covers(last, now) else None
 
 
 def _antenna(estimate: TeamEstimate, data: ChainData, way: Array | None) -> _End | None:

@@ -10,11 +10,10 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
-from drslamd.sensors.binary_layout import BlockReader
+from drslamd.sensors.binary_layout import BlockReader, narrowed
 from drslamd.sensors.frame_scanner import MAX_BUFFER_BYTES, NEED_MORE, NOT_A_FRAME
 from drslamd.sensors.linktrack.linktrack_frames import LAYOUTS, Kind, Layout
 
@@ -29,7 +28,18 @@ at 1450 bytes a second this holds the scanner for 0.7 s, not for the 2.8 s of a 
 
 _LENGTH: Final = struct.Struct("<2xH")
 _KINDS: Final = {kind.value: kind for kind in Kind}
-_READERS: Final = {kind: BlockReader(layout.body) for kind, layout in LAYOUTS.items()}
+_LAYOUTS: Final = {kind.value: layout for kind, layout in LAYOUTS.items()}
+"""By the mark with which a frame begins: asked for each frame, and bytes are found fast."""
+_READERS: Final = {mark: BlockReader(layout.body) for mark, layout in _LAYOUTS.items()}
+
+RANGING_VALUES: Final = frozenset(
+    {"id", "role", "local_time_ms", "system_time_ms", "voltage_v", "error_bits"}
+    | {"distance_m", "fp_rssi_db", "rx_rssi_db"}
+)
+"""What ranging asks of a frame and of its entries."""
+_RANGING_READERS: Final = {
+    mark: BlockReader(narrowed(layout.body, RANGING_VALUES)) for mark, layout in _LAYOUTS.items()
+}
 
 
 class Refusal(Enum):
@@ -46,8 +56,7 @@ class Refusal(Enum):
     STEP = "something that goes on from frame to frame and did not, until the next says the same"
 
 
-@dataclass(frozen=True)
-class Frame:
+class Frame(NamedTuple):
     """One frame: its values by the names of its table.
 
     Entries are under the name of their tail or slots (``nodes``, ``tags``), as a tuple of mappings.
@@ -66,21 +75,21 @@ class LinkTrackFormat:
         """Length of the frame at `at`; refused as soon as length and entry count disagree."""
         if at + 2 > len(buffer):
             return NEED_MORE
-        kind = _KINDS.get(buffer[at : at + 2])
-        if kind is None and buffer[at] != NODE_OUTPUT:
+        layout = _LAYOUTS.get(buffer[at : at + 2])
+        if layout is None and buffer[at] != NODE_OUTPUT:
             return NOT_A_FRAME
-        if kind is not None and not LAYOUTS[kind].has_length:
-            return LAYOUTS[kind].body.size + 1
+        if layout is not None and not layout.has_length:
+            return layout.body.size + 1
         if at + _LENGTH.size > len(buffer):
             return NEED_MORE
         length: int = _LENGTH.unpack_from(buffer, at)[0]
-        if kind is None:
+        if layout is None:
             return length if UNKNOWN_MIN_BYTES <= length <= UNKNOWN_MAX_BYTES else NOT_A_FRAME
-        return _checked_length(buffer, at, length, LAYOUTS[kind])
+        return _checked_length(buffer, at, length, layout)
 
     def is_intact(self, frame: bytes) -> bool:
-        kind = _KINDS.get(frame[:2])
-        end = None if kind is None else LAYOUTS[kind].end
+        layout = _LAYOUTS.get(frame[:2])
+        end = None if layout is None else layout.end
         return frame[-1] == (sum(frame[:-1]) & 0xFF if end is None else end)
 
 
@@ -113,16 +122,22 @@ def decode(frame: bytes) -> Frame | Refusal:
         return Refusal.LENGTH
     if not LINKTRACK.is_intact(frame):
         return Refusal.CHECKSUM
-    return decode_intact(frame)
+    return _read(frame, _READERS)
 
 
 def decode_intact(frame: bytes) -> Frame | Refusal:
-    """The same of a frame whose length and sum are right, as a scanner with `LINKTRACK` knows."""
-    kind = _KINDS.get(frame[:2])
+    """The same of a frame whose length and sum are right, as a scanner with `LINKTRACK` knows, and
+    of its values only what ranging asks for."""
+    return _read(frame, _RANGING_READERS)
+
+
+def _read(frame: bytes, readers: Mapping[bytes, BlockReader]) -> Frame | Refusal:
+    mark = frame[:2]
+    kind = _KINDS.get(mark)
     if kind is None:
         return Refusal.UNKNOWN_KIND
     body_end = len(frame) - 1
-    block = _READERS[kind].read(frame, 0, body_end)
+    block = readers[mark].read(frame, 0, body_end)
     if block is None or block[1] != body_end:
         return Refusal.ENTRIES
     return Frame(kind, block[0])

@@ -15,7 +15,7 @@ every third one, and who is heard less often than every ten seconds is not belie
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, Final, NamedTuple
 
 from drslamd.conventions import SECOND_US
@@ -47,7 +47,8 @@ class FrameHead(NamedTuple):
     """Of one frame, what all of its entries share."""
 
     kind: Kind
-    data: bytes
+    still: int
+    """All bytes of its head that may well be the same for ever, as one number."""
     volts: float
     lead_ms: int | None
     """Of system_time before local_time, where that is told and steady."""
@@ -57,24 +58,30 @@ class FrameHead(NamedTuple):
 
 def head_of(data: bytes, frame: Frame, lead_ms: int | None, utime: int) -> FrameHead:
     values = frame.values
-    size = LAYOUTS[frame.kind].body.size
+    size, mask = _LOOKED_AT[frame.kind]
+    still = int.from_bytes(data[:size], "little") & mask
     return FrameHead(
-        frame.kind, data[:size], values["voltage_v"], lead_ms, values["local_time_ms"], utime
+        frame.kind, still, values["voltage_v"], lead_ms, values["local_time_ms"], utime
     )
 
 
-def _looked_at(kind: Kind) -> tuple[int, ...]:
-    """Places in the head of a frame whose bytes may well be the same for ever."""
+def _looked_at(kind: Kind) -> tuple[int, int]:
+    """Size of the head of a frame, and ones in all bytes of it that may be the same for ever."""
     body = LAYOUTS[kind].body
     moving = {"local_time_ms", "system_time_ms", "voltage_v", "id"}
     places = set(range(4, body.size - 1))  # all but kind, length and number of entries
     for field in body.fields:
         if field.name in moving:
             places -= set(range(field.offset, field.offset + field.type.size))
-    return tuple(sorted(places))
+    return body.size, _ones(places)
 
 
-_PLACES: Final = {
+def _ones(places: Collection[int]) -> int:
+    """A number whose bytes are full in these places."""
+    return sum(0xFF << 8 * place for place in places)
+
+
+_LOOKED_AT: Final = {
     kind: _looked_at(kind) for kind in (Kind.NODE_FRAME2, Kind.NODE_FRAME3, Kind.NODE_FRAME5)
 }
 
@@ -85,7 +92,8 @@ class HeadSteps:
     def __init__(self) -> None:
         self._last: FrameHead | None = None
         self._waiting: list[FrameHead] = []
-        self._changing: dict[Kind, set[int]] = {kind: set() for kind in _PLACES}
+        self._changing = dict.fromkeys(_LOOKED_AT, 0)
+        """Ones in the bytes that have changed."""
 
     def goes_on(self, head: FrameHead) -> list[FrameHead] | None:
         """Heads that are now believed besides this one, oldest first; None while it waits."""
@@ -102,12 +110,20 @@ class HeadSteps:
         else:
             believed = self._waiting[-1:]
         if last is not None and last.kind is head.kind:
-            self._changing[head.kind] |= self._changed(last, head)
+            self._note_changes(last, head)
         self._last, self._waiting = head, []
         return believed
 
-    def _changed(self, before: FrameHead, now: FrameHead) -> set[int]:
-        return {place for place in _PLACES[now.kind] if before.data[place] != now.data[place]}
+    def _note_changes(self, before: FrameHead, now: FrameHead) -> None:
+        bits = self._changed(before, now)
+        if bits:
+            size, _ = _LOOKED_AT[now.kind]
+            places = [place for place, byte in enumerate(bits.to_bytes(size, "little")) if byte]
+            self._changing[now.kind] |= _ones(places)
+
+    def _changed(self, before: FrameHead, now: FrameHead) -> int:
+        """Bits that differ, in bytes that never did before."""
+        return (before.still ^ now.still) & ~self._changing[now.kind]
 
     def _breaks(self, before: FrameHead, now: FrameHead) -> bool:
         if abs(now.volts - before.volts) > VOLTAGE_STEP_V:
@@ -116,7 +132,7 @@ class HeadSteps:
             step = wrapped_difference(now.lead_ms, before.lead_ms, TIME_BITS)
             if abs(step) > LEAD_STEP_MS:
                 return True
-        return bool(self._changed(before, now) - self._changing[now.kind])
+        return self._changed(before, now) != 0
 
 
 class _Reported(NamedTuple):
@@ -129,11 +145,14 @@ class _Reported(NamedTuple):
     def breaks(self, now: _Reported) -> bool:
         """Does `now` not follow this one?"""
         passed_s = (now.utime - self.utime) / SECOND_US
-        is_far = abs(now.metres - self.metres) > RANGE_STEP_M + RANGE_SPEED_MPS * passed_s
-        powers = zip(now.powers, self.powers, strict=True)
-        is_loud = any(abs(a - b) > POWER_STEP_DB for a, b in powers)
-        is_old = abs(wrapped_difference(now.age_ms, self.age_ms, TIME_BITS)) > AGE_STEP_MS
-        return is_far or is_loud or is_old or now.role != self.role
+        (first_path, received), (first_path_before, received_before) = now.powers, self.powers
+        return (
+            now.role != self.role
+            or abs(now.metres - self.metres) > RANGE_STEP_M + RANGE_SPEED_MPS * passed_s
+            or abs(first_path - first_path_before) > POWER_STEP_DB
+            or abs(received - received_before) > POWER_STEP_DB
+            or abs(wrapped_difference(now.age_ms, self.age_ms, TIME_BITS)) > AGE_STEP_MS
+        )
 
 
 class RangeSteps:

@@ -127,13 +127,15 @@ class LinkTrackWatch:
             self._try_anew(utime)
         self._last_byte = utime
         self._strange_bytes += len(data)
+        seen = self._last + data
         for head in _HEADS:
-            self._strange[head] += (self._last + data).count(head)
+            if count := seen.count(head):
+                self._strange[head] += count
         self._last = data[-1:]
-        self._text += data
-        for _ in _NMEA.finditer(self._text):
+        text = self._text + data
+        for _ in _NMEA.finditer(text):
             self.on_refused(Refusal.LP_MODE, "NMEA sentences", utime)
-        self._text = self._text[1 - _NMEA_BYTES :]
+        self._text = text[1 - _NMEA_BYTES :]
 
     def _try_anew(self, utime: int) -> None:
         self._trying_since, self._strange_bytes = utime, 0

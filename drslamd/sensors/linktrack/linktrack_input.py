@@ -214,13 +214,14 @@ class LinkTrackInput:
         nodes = frame.values["nodes"]
         if nodes and frame.values["role"] == _TAG and all(n["role"] == _ANCHOR for n in nodes):
             self._watch.on_odd(Oddity.LP_ROLES, "", utime)
+        ids = {node["id"] for node in nodes}
+        if self._uwb_id in ids:
+            self._watch.on_odd(Oddity.OWN_ID, shown_id(self._uwb_id), utime)
+        if len(ids) == len(nodes):
+            return
         heard: dict[int, list[float]] = {}
         for node in nodes:
             heard.setdefault(node["id"], []).append(node["distance_m"])
-        if self._uwb_id in heard:
-            self._watch.on_odd(Oddity.OWN_ID, shown_id(self._uwb_id), utime)
-        if len(heard) == len(nodes):
-            return
         for uwb_id, metres in heard.items():
             is_empty = uwb_id == EMPTY_ID and frame.kind in _SHORT_IDS
             if not is_empty and max(metres) - min(metres) > ONE_MODULE_M:
@@ -251,10 +252,8 @@ class LinkTrackInput:
         samples, system_ms = [], frame.values["system_time_ms"]
         for peer, nodes in by_peer.items():
             sample = _sample(measured, peer, nodes)
-            is_step = not self._steps.goes_on(
-                {**nodes[0], "distance_m": sample.range_m}, system_ms, measured
-            )
-            if is_step:
+            entry = nodes[0] if len(nodes) == 1 else {**nodes[0], "distance_m": sample.range_m}
+            if not self._steps.goes_on(entry, system_ms, measured):
                 self.ranges.refuse(RangeRefusal.STEP, len(nodes))
                 continue
             samples.append(sample)
@@ -268,9 +267,10 @@ class LinkTrackInput:
             return RangeRefusal.EMPTY
         if node["id"] == self._uwb_id:
             return RangeRefusal.SELF
-        if not all(map(math.isfinite, _measured(node))):
+        metres, first_path_db, all_db = _measured(node)
+        if not (math.isfinite(metres) and math.isfinite(first_path_db) and math.isfinite(all_db)):
             return RangeRefusal.NOT_FINITE
-        if not MIN_RANGE_M <= node["distance_m"] <= self._max_range_m:
+        if not MIN_RANGE_M <= metres <= self._max_range_m:
             return RangeRefusal.LIMITS
         return None
 

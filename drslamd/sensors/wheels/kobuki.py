@@ -11,8 +11,6 @@ from __future__ import annotations
 import math
 import re
 import struct
-from functools import reduce
-from operator import xor
 from typing import Final
 
 from drslamd.conventions import MILLISECOND_US
@@ -35,6 +33,9 @@ _RAW_GYRO: Final = 13
 _RAW_DEG_PER_S: Final = 0.00875
 """One digit of the gyro's z; x, y, z are one after the other behind two bytes."""
 
+_HALVES: Final = tuple(8 << step for step in reversed(range(9)))
+"""Bits: a row of up to 512 bytes, folded nine times, is the exclusive or of all of them."""
+
 _LENGTHS: Final = {_CORE: {15}, 3: {3}, 4: {7}, 5: {6}, 6: {2}, 13: {14, 20}, 16: {16}, 21: {21}}
 """Sub-payloads of known length: another one means that the packet is damaged."""
 
@@ -53,7 +54,10 @@ class KobukiFormat:
         return len(_HEADER) + 1 + start[2] + 1 if start[2] else NOT_A_FRAME
 
     def is_intact(self, frame: bytes) -> bool:
-        return reduce(xor, frame[2:]) == 0
+        rest = int.from_bytes(frame[2:], "little")
+        for half in _HALVES:
+            rest = rest >> half ^ rest & (1 << half) - 1
+        return rest == 0
 
 
 def sub_payloads(packet: bytes) -> dict[int, bytes] | None:

@@ -195,7 +195,7 @@ class WheelInput:
         self._trying_since = 0
         self._samples_before = 0
         self._not_finite_before = 0
-        self._refused_before: Counter[WheelRefusal] = Counter()
+        self._refused_before: dict[WheelRefusal, int] = {}
         self.last_motion_utime: int | None = None
 
     def feed(self, data: bytes, utime: int) -> list[Motion]:
@@ -254,13 +254,18 @@ class WheelInput:
         self._last_input = utime
 
     def _motions(self, samples: list[WheelSample], utime: int) -> list[Motion]:
-        outcomes = [self._motion(sample) for sample in samples]
-        motions = [motion for motion in outcomes if motion is not None]
-        if any(not motion.gap for motion in motions):
+        motions, is_linked = [], False
+        for sample in samples:
+            motion = self._motion(sample)
+            if motion is not None:
+                motions.append(motion)
+                is_linked = is_linked or not motion.gap
+        if is_linked:
+            refused = self.driver.tally.refused
             self.last_motion_utime = self._trying_since = utime
             self._samples_before = self.base.tally.received
-            self._refused_before = self.driver.tally.refused.copy()
-            self._not_finite_before = self.driver.tally.refused[WheelRefusal.NOT_FINITE]
+            self._refused_before = dict(refused)
+            self._not_finite_before = refused[WheelRefusal.NOT_FINITE]
         return motions
 
     def _motion(self, sample: WheelSample) -> Motion | None:
@@ -281,7 +286,7 @@ class WheelInput:
 
     def _damaged(self) -> str | None:
         """What is wrong with most of what was meant for us and came to nothing."""
-        refused = self.driver.tally.refused - self._refused_before
+        refused = self.driver.tally.refused - Counter(self._refused_before)
         worst = max(_DAMAGES, key=lambda reason: refused[reason])
         return _DAMAGES[worst] if refused[worst] >= REPEATED else None
 

@@ -91,13 +91,16 @@ class SensorCalibration:
 
     def corrected(self, motion: Motion) -> Motion:
         """Odometry without its known errors."""
+        scale, longer, yaw = self.scale.value, self.turn.value, self.yaw.value
+        if scale == longer == yaw == 0:
+            return motion
         distance, turn = motion.distance_m, motion.turn_rad
         if motion.gyro is not None:
-            return replace(motion, distance_m=(1 - self.scale.value) * distance)
+            return replace(motion, distance_m=(1 - scale) * distance)
         return replace(
             motion,
-            distance_m=(1 - self.scale.value) * distance,
-            turn_rad=(1 + self.turn.value) * turn - self.yaw.value * abs(distance),
+            distance_m=(1 - scale) * distance,
+            turn_rad=(1 + longer) * turn - yaw * abs(distance),
         )
 
     def mounted(self, model: RobotModel) -> RobotModel:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from drslamd.conventions import grid_index, grid_utime
 from drslamd.sensors.samples import Motion
 from drslamd.slam.odometry.track import OWN_TRACK_SAMPLES, RESOLUTION, Track
+
+_RESOLUTION = tuple(RESOLUTION.tolist())
 
 
 class DeadReckoning:
@@ -63,8 +63,8 @@ class DeadReckoning:
     def _sample(self, first: int, since: int, before: tuple[float, float, float]) -> None:
         """Put on the track what lies on the grid from `first` on; `since` then we were `before`."""
         assert self._utime is not None
-        start = np.array(before)
-        step = np.array(self.pose) - start
         for n in range(first, grid_index(self._utime) + 1):
             share = (grid_utime(n) - since) / (self._utime - since)
-            self.track.append(n, np.round((start + share * step) / RESOLUTION))
+            pose = [a + share * (b - a) for a, b in zip(before, self.pose, strict=True)]
+            steps = [value / step for value, step in zip(pose, _RESOLUTION, strict=True)]
+            self.track.append(n, [float(round(step)) for step in steps])

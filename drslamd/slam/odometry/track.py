@@ -8,6 +8,8 @@ across the hole is not known.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from drslamd.conventions import GRID_HZ, ROTATION_STEP_RAD, TRANSLATION_STEP_M
@@ -58,6 +60,10 @@ class Track:
         """o_T_a at sample n, (3,)."""
         return np.asarray(self._poses[n - self.n0] * RESOLUTION)
 
+    def between(self, first: int, last: int) -> Array:
+        """o_T_a at samples first .. last, (k, 3); a long track is not made of metres for a few."""
+        return np.asarray(self.steps(first, last - first + 1) * RESOLUTION)
+
     def at_time(self, n: Array) -> Array:
         """o_T_a at fractional samples n (k,), linear between neighbours, (k, 3)."""
         n = np.clip(n, self.n0, self.end - 1)
@@ -66,7 +72,7 @@ class Track:
         before, after = self._poses[left - self.n0], self._poses[right - self.n0]
         return np.asarray((before + (after - before) * (n - left)[:, None]) * RESOLUTION)
 
-    def append(self, n: int, steps: Array) -> None:
+    def append(self, n: int, steps: Array | Sequence[float]) -> None:
         """Add sample n; what lies between it and the last one is a hole.
 
         Args:

@@ -68,13 +68,13 @@ class Joiner:
         if utime - self._asked < EVERY_US:
             return None
         self._asked = utime
-        mine = points_told(graph, self._own)
         whole = set() if estimate is None else estimate.trajectories.keys() - estimate.points
         others = [
             data.chain
             for robot, data in graph.chains.items()
             if robot > self._own.robot and robot not in whole and robot not in self.told
         ]
+        mine = points_told(graph, self._own) if others else set()
         others = [chain for chain in others if mine & points_told(graph, chain)] if mine else []
         if not others:
             return None

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from statistics import median
 from typing import NamedTuple
 
 import numpy as np
@@ -206,14 +207,14 @@ class PointTracker:
         found = found.in_sight(self._sensors.model)
         if not len(found.utime):
             return
-        when = int(np.median(found.utime))
+        when = int(median(found.utime.tolist()))
         at, place = anchor(own, when), own.poses(when)[0, :2]
         is_still = self._place is not None and np.hypot(*(place - self._place)) < STILL_M
         if at is None or is_still or when <= self._sampled:
             return
         self._sampled, self._place = when, place
         noise, model = self._sensors
-        metres, doubt = float(np.median(found.range_m)), float(np.median(found.doubt_m))
+        metres, doubt = median(found.range_m.tolist()), median(found.doubt_m.tolist())
         near = float(model.near_range_sigma(metres))
         x, y = se2.transform(at.keyframe_T_body, own.data.model.antenna).tolist()
         self._ranges.append(
@@ -270,14 +271,14 @@ class PointTracker:
         seen = ranges.between(last - SECOND_US, last).in_sight(self._sensors.model)
         if not len(seen.utime) or not own.track.covers(n, own.track.end - 1):
             return None
-        when = float(np.median(seen.utime))
-        step = se2.between(own.track.poses[n - own.track.n0], own.poses(when)[0])
+        when = median(seen.utime.tolist())
+        step = se2.between(own.track.at(n), own.poses(when)[0])
         antenna = se2.transform(se2.compose(solved.poses[-1], step), own.data.model.antenna)
         sight = there.poses[-1, :2] - antenna
         distance = max(float(np.hypot(*sight)), 1e-3)
         u = np.concatenate([-sight, [0.0], sight, [0.0]]) / distance
         bias = estimate.bias_m.get((min(robot, number), max(robot, number)), Learned())
-        off = distance + bias.value - float(np.median(seen.range_m))
+        off = distance + bias.value - median(seen.range_m.tolist())
         noise, model = self._sensors
         variance = u @ joint @ u + noise.sigma**2 + float(model.near_range_sigma(distance)) ** 2
         variance += min(bias.sigma, MOST_BIAS_M) ** 2

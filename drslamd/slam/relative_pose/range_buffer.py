@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from statistics import median
 from typing import NamedTuple
 
@@ -18,6 +17,7 @@ KEEP_S = 130
 """The longest window that a configuration may ask for, and some delay."""
 MAX_UWB_IDS = 64
 """Modules whose ranges are remembered, 2 MB; a radio cell holds no more."""
+MOST_BINS = KEEP_S * 10
 RANGES_FRESH_US = 3 * SECOND_US
 """A module that was silent for longer is not in range."""
 RAW_IN_BIN = 32
@@ -65,7 +65,9 @@ class RangeBuffer:
             nlos_db: see `RangeModel.blocked_sigma`.
         """
         self._nlos_db, self._model = nlos_db, model
-        self._done: deque[tuple[float, float, float]] = deque(maxlen=KEEP_S * 10)
+        self._done = np.empty((2 * MOST_BINS, 3))
+        """Time, range and doubt; those that count stand from `_first` to `_end`."""
+        self._first = self._end = 0
         self._bin: list[tuple[int, float, float]] = []
         self.count = 0
         self.newest: int | None = None
@@ -83,15 +85,22 @@ class RangeBuffer:
     def _close(self) -> None:
         clear = [row for row in self._bin if row[2] < self._model.blocked_sigma_m]
         times, values, doubts = zip(*(clear or self._bin), strict=True)
-        self._done.append((float(median(times)), median(values), median(doubts)))
+        if self._end == len(self._done):
+            kept = self._done[self._first : self._end].copy()
+            self._first, self._end = 0, len(kept)
+            self._done[: len(kept)] = kept
+        self._done[self._end] = float(median(times)), median(values), median(doubts)
+        self._end += 1
+        self._first = max(self._first, self._end - MOST_BINS)
         self._bin = []
 
     def between(self, first: int, last: int) -> TimedRanges:
         """What came with first < utime <= last."""
-        rows = [*self._done, *((float(t), r, d) for t, r, d in self._bin)]
-        utime, range_m, doubt_m = np.array(rows).reshape(-1, 3).T
-        found = TimedRanges(utime, range_m - self.bias_m, doubt_m)
-        return found.chosen((utime > first) & (utime <= last))
+        rows = self._done[self._first : self._end]
+        if self._bin:
+            rows = np.concatenate([rows, np.array(self._bin, dtype=float)])
+        utime, range_m, doubt_m = rows[(rows[:, 0] > first) & (rows[:, 0] <= last)].T
+        return TimedRanges(utime, range_m - self.bias_m, doubt_m)
 
     def is_fresh(self, utime: int, within_us: int) -> bool:
         return self.newest is not None and utime - self.newest < within_us

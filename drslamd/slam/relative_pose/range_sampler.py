@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from statistics import median
+
 import numpy as np
 
 from drslamd.conventions import SECOND_US, Chain
@@ -49,7 +51,7 @@ class RangeSampler:
         found = ranges.between(since, last).in_sight(self._model)
         if not len(found.utime):
             return None
-        when = int(np.median(found.utime))
+        when = int(median(found.utime.tolist()))
         anchor_a, anchor_b = anchor(a, when), anchor(b, when)
         place = np.concatenate([a.poses(when)[0, :2], b.poses(when)[0, :2]])
         is_still = self._place is not None and np.abs(place - self._place).max() < STILL_M
@@ -59,8 +61,8 @@ class RangeSampler:
         self._utime, self._place = last, place
         q_a = se2.transform(anchor_a.keyframe_T_body, a.data.model.antenna).tolist()
         q_b = se2.transform(anchor_b.keyframe_T_body, b.data.model.antenna).tolist()
-        metres = float(np.median(level(found.range_m, a.data.model, b.data.model)))
-        doubt = float(np.median(found.doubt_m))
+        metres = median(level(found.range_m, a.data.model, b.data.model).tolist())
+        doubt = median(found.doubt_m.tolist())
         near = self._model.near_range_sigma(metres)
         return RangeMeasurement(
             a_n=anchor_a.n,

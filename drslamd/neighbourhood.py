@@ -1,0 +1,47 @@
+"""Who is within UWB range of a robot: asked again and again in one moment, looked up once in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from drslamd.conventions import Chain
+from drslamd.gossip.team import Team
+from drslamd.slam.front_end import FrontEnd
+from drslamd.slam.peer_in_range import PeerInRange
+
+
+class Neighbourhood:
+    """Of one robot."""
+
+    def __init__(self, own: Chain, team: Team, front: FrontEnd) -> None:
+        self._own, self._team, self._front = own, team, front
+        self._found: dict[int, list[PeerInRange]] | None = None
+        """By time, us; None while what is found must not be kept."""
+
+    def at(self, utime: int) -> list[PeerInRange]:
+        """Living peers within UWB range of us, as either side measures it."""
+        if self._found is None:
+            return self._look(utime)
+        if utime not in self._found:
+            self._found[utime] = self._look(utime)
+        return self._found[utime]
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Nothing is heard or measured meanwhile, so what was found stays right."""
+        self._found = {}
+        try:
+            yield
+        finally:
+            self._found = None
+
+    def look_again(self) -> None:
+        """Something about peers has changed all the same."""
+        if self._found:
+            self._found.clear()
+
+    def _look(self, utime: int) -> list[PeerInRange]:
+        mine = set(self._front.ranged(utime))
+        peers = (peer.neighbour(self._own, utime) for peer in self._team.living(utime).values())
+        return [peer for peer in peers if peer.ranges_to_us or peer.uwb_id in mine]
