@@ -155,7 +155,7 @@ class DbcSection(CanWheelSection, GyroKeys):
     """`Message.Signal` of a twist: m/s and rad/s after `unit`."""
     counts_per_metre: Scale | None = None
     counter_bits: Annotated[int, Field(ge=4, le=64)] | None = None
-    """At which power of two the counters wrap; the width of their signals when left out."""
+    """At which power of two the counters wrap; what the DBC file says of them when left out."""
     id_mask: Annotated[int, Field(ge=1, le=0x1FFFFFFF)] = 0x1FFFFFFF
     """Applied to an id before the look-up, for ids that hold a node number."""
     left_node: Annotated[int, Field(ge=0)] | None = None

@@ -300,8 +300,8 @@ class Daemon:
         picture = report.status(self.robot, self._clock.now())
         picture["network"]["dropped"] = self._transport.dropped
         picture["network"]["flooded"] = self._transport.flooded
-        picture["cpu_s"] = round(cpu_s(), 3)
-        picture["recording"] = self._recorder.status()
+        picture["wheels"]["counters"].update(self._wheels.counters())
+        picture["cpu_s"], picture["recording"] = round(cpu_s(), 3), self._recorder.status()
         picture["problems"] += self._complaints()
         return {**picture, "ms": self._pace.milliseconds(), "loop_lag_ms": self._pace.lag()}
 

@@ -108,7 +108,7 @@ class Robot:
         self.front = FrontEnd(config, self.own, self.calibration.used, tuning, place)
         self.back = BackEnd(config, self.own, tuning)
         self.broadcast = Broadcast(config, self.team, self.front, self.back)
-        self.standing = Standing(config, self.team, self.front, self.back)
+        self.standing = Standing(config, self.team, self.front, self.back, self.wheels.rhythm)
         self.near = Surroundings(config, self.own, self.front, self.back, self.team, self.standing)
         self.outbox = Outbox(config.robot.id, config.gossip.max_bytes_per_s)
         self.health = Health()

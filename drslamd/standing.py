@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from drslamd.config import Config
 from drslamd.gossip.team import Team
 from drslamd.jobs import JOINING, POINTS, RELOCATION
+from drslamd.sensors.rhythm import Rhythm
 from drslamd.slam import settings
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.doubt import Doubt, Partners, doubt_of, doubted_partners
@@ -52,9 +53,16 @@ class _Kept(NamedTuple):
 class Standing:
     """Of one robot."""
 
-    def __init__(self, config: Config, team: Team, front: FrontEnd, back: BackEnd) -> None:
+    def __init__(
+        self, config: Config, team: Team, front: FrontEnd, back: BackEnd, rhythm: Rhythm
+    ) -> None:
+        """
+        Args:
+            rhythm: of the wheels.
+        """
         self._most_mps, self._robot = config.wheels.max_speed_mps, team.own.robot
         self._namesakes, self._front, self._back = team.namesakes, front, back
+        self._rhythm = rhythm
         self.survey = settings.survey(config)
         self._ranges_solve = config.optimizer.algorithm == "banded"
         self._kept: _Kept | None = None
@@ -82,7 +90,8 @@ class Standing:
         most, pose = self._most_mps, self.pose()
         if pose is not None and is_vague(pose.covariance) and self._comes_back(pose, utime):
             pose = None
-        return whereabouts(pose, track, most, self._doubt(), utime, gap_m, by_ranges, is_point)
+        doubt, valid_us = self._doubt(), self._rhythm.valid_us
+        return whereabouts(pose, track, most, doubt, utime, gap_m, by_ranges, is_point, valid_us)
 
     def _comes_back(self, pose: PoseNow, utime: int) -> bool:
         """Were we just placed, after a hole or after a start?"""

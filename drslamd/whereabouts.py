@@ -1,4 +1,5 @@
-"""Where a robot is now, and what that is worth: a pose is valid for a second, then it grows old.
+"""Where a robot is now, and what that is worth: a pose is valid for a second at most, as long as
+its wheels may be silent (`sensors/rhythm`), then it grows old.
 
 Without odometry a robot may stand still or drive on. It drives as it drove: the fastest second of
 its last ten minutes bounds how far it can have come, in any direction. So after t seconds sigma is
@@ -65,6 +66,7 @@ def whereabouts(
     gap_m: float = 0.0,
     by_ranges: ByRanges | None = None,
     is_point: bool = False,
+    valid_us: int = VALID_US,
 ) -> Whereabouts:
     """What to say of a robot at `utime`.
 
@@ -77,14 +79,15 @@ def whereabouts(
             reason, and long before anybody can say which.
         by_ranges: where it is without odometry, as ranges have it.
         is_point: is its heading unknown?
+        valid_us: how long a pose is that of now.
     """
-    is_old = found is None or utime - found.utime > VALID_US
+    is_old = found is None or utime - found.utime > valid_us
     if is_old and by_ranges is not None:
         return Whereabouts(PoseState.STALE, by_ranges.pose, by_ranges.age_us)
     if found is None:
         return NOWHERE
     age_us = utime - found.utime
-    if age_us <= VALID_US:
+    if age_us <= valid_us:
         known = PoseState.DOUBTFUL if doubt else PoseState.LOCALISED
         state = PoseState.POSITION if is_point else known
         wider = found.covariance + np.diag([gap_m**2, gap_m**2, 0.0])

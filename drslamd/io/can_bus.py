@@ -20,6 +20,7 @@ from drslamd.config_wheels import CanSection
 from drslamd.events import CanFrame, Event, PortCondition, PortState
 from drslamd.io.backoff import Backoff
 from drslamd.io.clock import Clock
+from drslamd.sensors.can_errors import CanErrors
 
 if TYPE_CHECKING:
     import can
@@ -48,6 +49,7 @@ class CanBus:
 
     Attributes:
         reads: how often it has read since the start.
+        errors: what its error frames say.
     """
 
     def __init__(self, section: CanSection, clock: Clock, deliver: Callable[[Event], None]) -> None:
@@ -58,10 +60,15 @@ class CanBus:
         self._last_state: tuple[PortCondition, str] | None = None
         self._read_from = -1
         self.reads = 0
+        self.errors = CanErrors(has_classes=section.interface == "socketcan")
 
     @property
     def name(self) -> str:
         return _name(self._section)
+
+    def counters(self) -> dict[str, int]:
+        """What only the bus can count, by flat names."""
+        return self.errors.counters()
 
     def descriptor(self) -> int:
         """Of the open bus; -1 where it is closed or has none."""
@@ -83,6 +90,7 @@ class CanBus:
         if isinstance(bus, str):
             self._state(PortCondition.MISSING, bus)
             return None
+        self.errors.begin()
         self._state(PortCondition.OPEN, self.name)
         return bus
 
@@ -135,16 +143,19 @@ class CanBus:
         return None
 
     def _take(self, message: can.Message | None) -> None:
-        if message is None or message.is_error_frame or message.is_remote_frame:
+        if message is None or message.is_remote_frame:
             return
-        self._deliver(
-            CanFrame(
-                self._clock.now(),
-                message.arbitration_id,
-                message.is_extended_id,
-                bytes(message.data),
-            )
-        )
+        utime, data, before = self._clock.now(), bytes(message.data), self.errors.trouble
+        if message.is_error_frame:
+            self.errors.on_error(message.arbitration_id, data, utime)
+        else:
+            self.errors.on_frame(utime)
+        if (trouble := self.errors.trouble) != before:
+            condition = PortCondition.LOST if trouble else PortCondition.OPEN
+            self._state(condition, f"{self.name}: {trouble}" if trouble else self.name)
+        if not message.is_error_frame:
+            frame = CanFrame(utime, message.arbitration_id, message.is_extended_id, data)
+            self._deliver(frame)
 
     def _state(self, condition: PortCondition, detail: str) -> None:
         if (condition, detail) != self._last_state:

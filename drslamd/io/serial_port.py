@@ -105,6 +105,10 @@ class SerialPort:
         """Of the open port, or -1."""
         return -1 if self._line is None or self._lost.is_set() else self._line.fileno()
 
+    def counters(self) -> dict[str, int]:
+        """What only a port can count; a serial line says nothing of what it lost."""
+        return {}
+
     def write(self, data: bytes) -> None:
         """Send without waiting; what a full or dead line does not take is dropped."""
         if self._line is None:

@@ -29,7 +29,7 @@ class pose_t(object):
         0 not localised: the other fields then say nothing
         1 localised: the pose is at most a second old and the covariance is meant
         2 doubtful: there is a pose, but what was measured contradicts it
-        3 stale: no odometry for more than a second; a position by ranges, with the sigma of any
+        3 stale: no odometry for ten periods of its own, half a second to one; a position by ranges, with the sigma of any
         heading, or the last pose, with a covariance that grows as fast as the robot drove
         4 position: it stands, and others have found its place; theta means nothing and has the
         sigma of any

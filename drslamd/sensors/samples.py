@@ -23,12 +23,21 @@ class RangeSample:
 
 @dataclass(frozen=True)
 class WheelCounts:
-    """Counters of both sides, as read: they wrap at 2 ** bits and may restart at zero."""
+    """Counters of both sides, as read: they go around after `values`, and may restart at zero.
+
+    Attributes:
+        unused: of the numbers that so many bits can say, those that never come.
+    """
 
     utime: int
     left: int
     right: int
     bits: int
+    unused: int = 0
+
+    @property
+    def values(self) -> int:
+        return (1 << self.bits) - self.unused
 
 
 @dataclass(frozen=True)

@@ -215,8 +215,8 @@ def test_counters_in_any_order_are_accepted_once_each() -> None:
 
 
 @pytest.mark.row("S3")
-def test_the_window_reaches_back_1023_counters_and_not_1024() -> None:
-    assert counters(1000, 2000, 2000 - 1023, 2000 - 1024) == [True, True, True, False]
+def test_the_window_reaches_back_1024_counters_and_not_1025() -> None:
+    assert counters(1000, 2000, 2000 - 1024, 2000 - 1025) == [True, True, True, False]
     moved = counters(1000, 2000, 2000 - 1023, 2001, 2001 - 1023, 2001 - 1024)
     assert moved == [True] * 5 + [False]
 
@@ -233,8 +233,8 @@ def test_counters_below_the_first_are_never_new(counter: int) -> None:
 
 def test_the_largest_counter_is_the_last_one() -> None:
     last = [LAST_COUNTER - k for k in (2, 1, 0)]
-    assert counters(*last, *last, LAST_COUNTER - 1023) == [True] * 3 + [False] * 3 + [True]
-    assert counters(*last, LAST_COUNTER - 1024) == [True] * 3 + [False]
+    assert counters(*last, *last, LAST_COUNTER - 1024) == [True] * 3 + [False] * 3 + [True]
+    assert counters(*last, LAST_COUNTER - 1025) == [True] * 3 + [False]
 
 
 # nothing is remembered of what is not proven

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import os
+import socket
 import struct
+import time
 import tty
 from collections.abc import Callable
 from typing import Any
@@ -179,6 +181,85 @@ def test_a_bus_whose_reader_dies_is_opened_again(monkeypatch: pytest.MonkeyPatch
     states = [e.condition for e in events if isinstance(e, PortState)]
     assert states[:2] == [PortCondition.OPEN, PortCondition.LOST]
     assert any("adapter gone" in e.detail for e in events if isinstance(e, PortState))
+
+
+# error frames and floods
+
+
+@pytest.mark.row("D9")
+def test_a_bus_that_is_off_is_named_and_comes_back() -> None:
+    events: list[Event] = []
+    now = [0]
+    clock = MonotonicClock()
+    clock.now = lambda: now[0]  # type: ignore[method-assign]
+    bus = CanBus(CanSection(), clock, events.append)
+    bus._take(can.Message(arbitration_id=0x40, is_error_frame=True, data=bytes(8)))
+    bus._take(can.Message(arbitration_id=0x40, is_error_frame=True, data=bytes(8)))
+    now[0] = 6_000_000
+    bus._take(can.Message(arbitration_id=0x311, is_extended_id=False, data=bytes(8)))
+    lost, well, frame = events
+    assert isinstance(lost, PortState)
+    assert lost.condition is PortCondition.LOST
+    assert lost.detail.startswith("socketcan can0: the controller is off the bus (bus-off)")
+    assert well == PortState(6_000_000, "wheels", PortCondition.OPEN, "socketcan can0")
+    assert isinstance(frame, CanFrame)
+
+
+class Pipe(can.BusABC):  # type: ignore[misc,name-defined]
+    """A bus with a descriptor, as SocketCAN has: frames are datagrams of 16 bytes."""
+
+    def __init__(self, ours: socket.socket) -> None:
+        super().__init__(channel="pipe")
+        self._ours = ours
+
+    def fileno(self) -> int:
+        return self._ours.fileno()
+
+    def _recv_internal(self, timeout: float | None) -> tuple[Any, bool]:
+        can_id, length, data = struct.unpack("=IB3x8s", self._ours.recv(16))
+        message = can.Message(arbitration_id=can_id, is_extended_id=False, data=data[:length])
+        return message, True
+
+    def send(self, msg: Any, timeout: float | None = None) -> None: ...
+
+
+FLOOD_HZ, ODOMETRY_HZ = 8_000, 50
+"""As many frames as a bus of 1 Mbit/s has room for, and how many of them are meant for us."""
+
+
+@pytest.mark.row("D9")
+def test_on_a_full_bus_the_others_have_their_turn_after_each_frame() -> None:
+    """So nobody is late by more than a frame takes; and a second of it takes half a second."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    events: list[Event] = []
+    between: list[int] = []
+
+    def pour() -> None:
+        for k in range(FLOOD_HZ):
+            is_odometry = k % (FLOOD_HZ // ODOMETRY_HZ) == 0
+            can_id, data = (0x311, struct.pack(">ii", k, k)) if is_odometry else (0x500, bytes(8))
+            theirs.send(struct.pack("=IB3x8s", can_id, 8, data))
+
+    async def run() -> float:
+        bus = CanBus(CanSection(), MonotonicClock(), events.append)
+        reading = asyncio.ensure_future(bus._read_until_it_fails(Pipe(ours)))
+        began = time.thread_time()
+        pouring = asyncio.ensure_future(asyncio.to_thread(pour))
+        while not pouring.done() or len(events) < FLOOD_HZ:
+            before = len(events)
+            await asyncio.sleep(0)
+            between.append(len(events) - before)
+        took = time.thread_time() - began
+        reading.cancel()
+        await asyncio.gather(reading, return_exceptions=True)
+        return took
+
+    with ours, theirs:
+        took_s = asyncio.run(asyncio.wait_for(run(), 20))
+    assert sum(isinstance(e, CanFrame) and e.can_id == 0x311 for e in events) == ODOMETRY_HZ
+    assert len(events) == FLOOD_HZ
+    assert max(between) == 1
+    assert took_s < 0.5
 
 
 # adapters that raise

@@ -23,7 +23,7 @@ from drslamd.standing import Standing
 
 def standing(scene: RobotScene) -> Standing:
     robot = scene.robot
-    return Standing(scene.config, robot.team, robot.front, robot.back)
+    return Standing(scene.config, robot.team, robot.front, robot.back, robot.wheels.rhythm)
 
 
 def driven(level: float = 1.0, contradicted: tuple[tuple[int, int], ...] = ()) -> RobotScene:
@@ -66,6 +66,17 @@ def test_the_pose_is_the_last_solved_one_carried_on_by_odometry() -> None:
 @pytest.mark.parametrize(("later_s", "state"), [(1.0, PoseState.LOCALISED), (1.1, PoseState.STALE)])
 def test_it_grows_old_with_the_odometry(later_s: float, state: PoseState) -> None:
     scene = driven()
+    assert standing(scene).whereabouts(scene.utime + round(later_s * SECOND_US)).state is state
+
+
+@pytest.mark.row("D9")
+@pytest.mark.parametrize(("later_s", "state"), [(0.5, PoseState.LOCALISED), (0.6, PoseState.STALE)])
+def test_with_wheels_that_speak_20_times_a_second_it_is_old_after_half_a_second(
+    later_s: float, state: PoseState
+) -> None:
+    scene = driven()
+    for k in range(200):
+        scene.robot.wheels.rhythm.add(1, k * 50_000)
     assert standing(scene).whereabouts(scene.utime + round(later_s * SECOND_US)).state is state
 
 

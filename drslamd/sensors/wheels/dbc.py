@@ -30,9 +30,17 @@ from drslamd.sensors.samples import (
     WheelTurns,
 )
 from drslamd.sensors.tally import Tally
+from drslamd.sensors.wheels.counter_range import CounterRange, named_ends
 from drslamd.sensors.wheels.dbc_file import messages_of
 from drslamd.sensors.wheels.dbc_signal import SignalReader, Value
-from drslamd.sensors.wheels.side_pairing import Pair, Side, SidePairing, linear, wrapping
+from drslamd.sensors.wheels.side_pairing import (
+    Interpolate,
+    Pair,
+    Side,
+    SidePairing,
+    linear,
+    wrapping,
+)
 from drslamd.sensors.wheels.wheel_driver import CanDriver, Outcome, WheelRefusal, tallied
 
 if TYPE_CHECKING:
@@ -40,18 +48,31 @@ if TYPE_CHECKING:
     from cantools.database.can.signal import Signal
 
 _ID_BITS: Final = (1 << 29) - 1
+_SAME_FACTOR: Final = 1e-4
+"""Relative difference of what was rounded."""
+SLOWEST_S: Final = 0.1
+"""Between two samples, of a base whose counters are to be told apart after half a turn."""
 HEARD_US: Final = 2 * SECOND_US
 """A side that said something during this time speaks."""
 
 _SPEEDS: Final = {
-    "m/s": 1.0, "mps": 1.0, "cm/s": 0.01, "mm/s": 0.001, "km/h": 1 / 3.6, "kph": 1 / 3.6,
-    "kmh": 1 / 3.6, "mph": 0.44704, "": 1.0, "-": 1.0,
-}  # fmt: skip
+    1.0: "m/s mps m/sec meter/s metre/s meters/s unit_meterpersecond -",
+    0.01: "cm/s cm/sec",
+    0.001: "mm/s mm/sec",
+    1 / 3.6: "km/h kph kmh kmph km/hr unit_kilometerperhour",
+    0.44704: "mph mi/h unit_milesperhour",
+    0.3048: "ft/s ft/sec fps",
+    0.0254: "in/s in/sec",
+}
 _TURN_RATES: Final = {
-    "rad/s": 1.0, "mrad/s": 0.001, "deg/s": math.pi / 180, "\u00b0/s": math.pi / 180,
-    "dps": math.pi / 180, "rpm": math.pi / 30, "": 1.0, "-": 1.0,
-}  # fmt: skip
-"""Units as DBC files write them; a file that names none is taken at its number."""
+    1.0: "rad/s rad/sec rps 1/s unit_radianpersecond -",
+    0.001: "mrad/s",
+    math.pi / 180: "deg/s deg/sec degree/s degrees/s dps \u00b0/s \u00ba/s \u00b0/sec "
+    "unit_degreepersecond unit_degrepersecon",
+    math.pi / 30: "rpm",
+}
+"""Units as DBC files write them, by their factor; one that names none is taken at its number."""
+_PER_MINUTE: Final = "1/min u/min r/min rev/min min-1"
 
 
 class _Source(NamedTuple):
@@ -101,9 +122,11 @@ class DbcDriver(CanDriver):
             for side, key, signal, node in zip(Side, keys, signals, nodes, strict=True)
         ]
         self._gyro = _gyro(section, messages["gyro"]) if section.gyro else None
+        self._other_width: tuple[Side, int] = Side.FIRST, -HEARD_US
+        """Whose id came last in a frame that is not of its kind, and when."""
         self._counts = section.measures == "counts"
-        self._bits = _counter_bits(section, keys, signals) if self._counts else None
-        self._pairing = SidePairing(linear if self._bits is None else wrapping(self._bits))
+        self._range = _counter_range(section, keys, signals) if self._counts else None
+        self._pairing = SidePairing(self._between())
         self.expects = " and ".join(f"CAN id 0x{s.message.frame_id:X}" for s in self._sources)
         self.tally: Tally[WheelRefusal] = Tally()
 
@@ -116,6 +139,9 @@ class DbcDriver(CanDriver):
     def why_no_sample(self, utime: int) -> str | None:
         last = self._pairing.last_utime
         speaks = [s for s in self._sources if utime - last.get(s.side, -HEARD_US) < HEARD_US]
+        side, heard_utime = self._other_width
+        if utime - heard_utime < HEARD_US:
+            return _of_other_width(next(s for s in self._sources if s.side is side))
         if len(speaks) != 1:
             return None
         (heard,), (silent,) = speaks, [s for s in self._sources if s not in speaks]
@@ -160,28 +186,47 @@ class DbcDriver(CanDriver):
     def _is_meant(self, frame: CanFrame, source: _Source) -> bool:
         mask, message = self._section.id_mask, source.message
         node = (frame.can_id & ~mask) >> self._node_shift
-        return (
-            frame.extended == message.is_extended_frame
-            and frame.can_id & mask == message.frame_id & mask
-            and source.node in (None, node)
-        )
+        is_named = frame.can_id & mask == message.frame_id & mask and source.node in (None, node)
+        if is_named and frame.extended != message.is_extended_frame:
+            if self._other_width[1] != frame.utime:
+                self._other_width = source.side, frame.utime
+            return False
+        return is_named
 
     def _value(self, source: _Source, frame: CanFrame) -> Value | WheelRefusal | None:
         if not self._is_meant(frame, source):
             return None
-        if self._counts:
-            return source.reader.raw(frame.data)  # a float would lose the last bits of a wide one
-        return source.reader.scaled(frame.data)
+        if not self._counts:
+            return source.reader.scaled(frame.data)
+        value = source.reader.raw(frame.data)  # a float would lose the last bits of a wide one
+        if self._range is not None and isinstance(value, int):
+            return value if self._range.takes(source.side, value) else WheelRefusal.NOT_AVAILABLE
+        return value
+
+    def _between(self) -> Interpolate:
+        span = self._range
+        return linear if span is None else wrapping(lambda: span.values)
 
     def _sample(self, pair: Pair) -> WheelSample:
         utime, first, second = pair
         if self._counts:
-            if self._bits is None:
+            if self._range is None:
                 return WheelTurns(utime, first, second)
-            return WheelCounts(utime, int(first), int(second), self._bits)
+            span = self._range
+            return WheelCounts(utime, int(first), int(second), span.bits, span.unused)
         sample = Twist if self._section.measures == "twist" else WheelSpeeds
         first_unit, second_unit = (source.unit for source in self._sources)
         return sample(utime, first * first_unit, second * second_unit)
+
+
+def _of_other_width(source: _Source) -> str:
+    is_long = source.message.is_extended_frame
+    comes, said = ("11", "29") if is_long else ("29", "11")
+    return (
+        f"CAN id 0x{source.message.frame_id:X} of wheels.{source.key} comes in frames of {comes} "
+        f"bits, the DBC file has it as one of {said}: correct the number of its message there (one "
+        "of 29 bits is written as the id plus 2147483648)"
+    )
 
 
 def _signal(message: Message, path: str) -> Signal:
@@ -189,12 +234,14 @@ def _signal(message: Message, path: str) -> Signal:
     return next(signal for signal in message.signals if signal.name == name)
 
 
-def _counter_bits(section: DbcSection, keys: tuple[str, str], signals: list[Signal]) -> int | None:
-    """How wide the counters are; None for floating point, which does not wrap."""
+def _counter_range(
+    section: DbcSection, keys: tuple[str, str], signals: list[Signal]
+) -> CounterRange | None:
+    """Where the counters go around; None for floating point, which does not."""
     first, second = signals
     if first.is_float != second.is_float:
         raise ConfigError([f"wheels.{keys[0]}, {keys[1]}: one is an integer, the other is not"])
-    if second.scale not in (first.scale, -first.scale):
+    if not math.isclose(abs(first.scale), abs(second.scale), rel_tol=_SAME_FACTOR):
         fault = (
             "the DBC file gives the two sides different factors, but they need one and the same "
             "wheels.counts_per_metre; correct the file"
@@ -204,16 +251,19 @@ def _counter_bits(section: DbcSection, keys: tuple[str, str], signals: list[Sign
         return None
     narrowest = min(first.length, second.length)
     if section.counter_bits is None:
-        return narrowest
+        sample_m = section.max_speed_mps * SLOWEST_S
+        least = 2 * sample_m * (section.counts_per_metre or 1.0)
+        return CounterRange(narrowest, named_ends(signals, narrowest, least))
     if narrowest < section.counter_bits:
         key = keys[0] if first.length < section.counter_bits else keys[1]
         bits = f"{narrowest} bits, counter_bits = {section.counter_bits}"
         raise ConfigError([f'wheels.{key} = "{getattr(section, key)}": the signal has only {bits}'])
-    return section.counter_bits
+    return CounterRange(section.counter_bits, None)
 
 
 def _gyro(section: DbcSection, message: Message) -> _Source:
     signal = _signal(message, section.gyro)
+    _require_factor("gyro", section.gyro, signal)
     unit = section.gyro_unit or _unit_of(section, "gyro", signal, "gyro_unit")
     reader = SignalReader(message, signal.name)
     return _Source(Side.FIRST, "gyro", message, reader, None, unit)
@@ -225,21 +275,31 @@ def _unit(section: DbcSection, key: str, signal: Signal) -> float:
         return 1.0
     is_turn = key == "angular"
     sign = -1 if is_turn and section.reverse_angular else 1
+    _require_factor(key, getattr(section, key), signal)
     given = section.angular_unit if is_turn and section.angular_unit else section.unit
     if given is not None:
         return sign * given
     return sign * _unit_of(section, key, signal, "angular_unit" if is_turn else "unit")
 
 
+def _require_factor(key: str, path: str, signal: Signal) -> None:
+    if not signal.scale:
+        fault = "its factor in the DBC file is 0, so it says nothing; correct the file"
+        raise ConfigError([f'wheels.{key} = "{path}": {fault}'])
+
+
 def _unit_of(section: DbcSection, key: str, signal: Signal, instead: str) -> float:
     """Factor to m/s or rad/s by the name of the unit in the file; `instead` is the key to give."""
     known, si = (_SPEEDS, "m/s") if instead == "unit" else (_TURN_RATES, "rad/s")
-    name = (signal.unit or "").strip().lower()
-    if name not in known:
-        what = f"{instead}, the factor to {si}"
-        fault = f'the DBC file gives it in "{signal.unit}"; give wheels.{what}'
-        raise ConfigError([f'wheels.{key} = "{getattr(section, key)}": {fault}'])
-    return known[name]
+    name = (signal.unit or "").strip().lower() or "-"
+    for factor, names in known.items():
+        if name in names.split():
+            return factor
+    what = f"{instead}, the factor to {si}"
+    if si == "m/s" and any(name in names.split() for names in (*_TURN_RATES.values(), _PER_MINUTE)):
+        what += " (of rpm: 2 pi r / 60, of rad/s: r, of deg/s: pi r / 180, r in m: of the wheel)"
+    fault = f'the DBC file gives it in "{signal.unit}"; give wheels.{what}'
+    raise ConfigError([f'wheels.{key} = "{getattr(section, key)}": {fault}'])
 
 
 def _node_shift(section: DbcSection) -> int:

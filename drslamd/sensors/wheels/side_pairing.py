@@ -17,7 +17,7 @@ from enum import Enum
 from typing import Final, NamedTuple
 
 from drslamd.conventions import SECOND_US
-from drslamd.sensors.wheels.wrapping import wrapped_difference
+from drslamd.sensors.wheels.wrapping import difference_around
 
 MAX_APART_US: Final = SECOND_US
 """Between two values of the second side, if what lies between them is to be known. A base that
@@ -45,12 +45,12 @@ def linear(before: float, after: float, fraction: float) -> float:
     return before + (after - before) * fraction
 
 
-def wrapping(bits: int) -> Interpolate:
-    """Interpolation between readings of a counter that wraps at 2 ** bits."""
+def wrapping(values: Callable[[], int]) -> Interpolate:
+    """Interpolation between readings of a counter that goes around after so many values."""
 
     def between(before: float, after: float, fraction: float) -> float:
-        moved = wrapped_difference(int(after), int(before), bits)
-        return (int(before) + round(moved * fraction)) % (1 << bits)
+        moved = difference_around(int(after), int(before), values())
+        return (int(before) + round(moved * fraction)) % values()
 
     return between
 

@@ -44,7 +44,7 @@ from drslamd.sensors.samples import (
     WheelTurns,
 )
 from drslamd.sensors.tally import Tally
-from drslamd.sensors.wheels.wrapping import wrapped_difference
+from drslamd.sensors.wheels.wrapping import difference_around
 
 MAX_SILENCE_US: Final = SECOND_US // 2
 """Speeds older than this say nothing about the present."""
@@ -97,12 +97,12 @@ class DriveGeometry:
 
 
 class _Position(NamedTuple):
-    """Both counters; `bits` is None when they do not wrap."""
+    """Both counters; `values` is None when they do not go around."""
 
     utime: int
     left: float
     right: float
-    bits: int | None
+    values: int | None
 
 
 class _Speed(NamedTuple):
@@ -165,7 +165,7 @@ class WheelBase:
 
     def _reading(self, sample: WheelReading) -> _Reading:
         if isinstance(sample, WheelCounts):
-            return _Position(sample.utime, sample.left, sample.right, sample.bits)
+            return _Position(sample.utime, sample.left, sample.right, sample.values)
         if isinstance(sample, WheelTurns):
             return _Position(sample.utime, sample.left, sample.right, None)
         if isinstance(sample, WheelSpeeds):
@@ -205,7 +205,7 @@ class WheelBase:
 
     def _difference(self, last: _Position, now: _Position) -> _Path | Gap | ReadingRefusal:
         elapsed_us = now.utime - last.utime
-        if self._may_have_wrapped(now.bits, elapsed_us):
+        if self._may_have_wrapped(now.values, elapsed_us):
             return Gap.WRAP
         if elapsed_us > MAX_SILENCE_US and self._has_restarted(last, now):
             return Gap.RESTART
@@ -217,13 +217,13 @@ class WheelBase:
         return path
 
     def _path(self, last: _Position, now: _Position) -> _Path:
-        left = _moved(last.left, now.left, now.bits) / self._geometry.per_metre
-        right = _moved(last.right, now.right, now.bits) / self._geometry.per_metre
+        left = _moved(last.left, now.left, now.values) / self._geometry.per_metre
+        right = _moved(last.right, now.right, now.values) / self._geometry.per_metre
         return _Path(self._left_sign * left, self._right_sign * right)
 
     def _is_too_far(self, now: _Position) -> bool:
         turned_m = max(abs(now.left), abs(now.right)) / self._geometry.per_metre
-        return now.bits is None and turned_m > MAX_TURNED_M
+        return now.values is None and turned_m > MAX_TURNED_M
 
     def _is_too_fast(self, path: _Path, elapsed_us: int) -> bool:
         elapsed_s = elapsed_us / SECOND_US
@@ -233,11 +233,11 @@ class WheelBase:
             or turn > MAX_TURN_RADPS * elapsed_s
         )
 
-    def _may_have_wrapped(self, bits: int | None, elapsed_us: int) -> bool:
+    def _may_have_wrapped(self, values: int | None, elapsed_us: int) -> bool:
         """Could the base have rolled half the range of its counter?"""
-        if bits is None:
+        if values is None:
             return False
-        half_range_m = (1 << (bits - 1)) / self._geometry.per_metre
+        half_range_m = values / 2 / self._geometry.per_metre
         return self._geometry.max_speed_mps * elapsed_us / SECOND_US >= half_range_m
 
     def _has_restarted(self, last: _Position, now: _Position) -> bool:
@@ -253,8 +253,8 @@ class WheelBase:
         return not self._is_too_fast(self._path(self._suspect, now), elapsed_us)
 
 
-def _moved(last: float, now: float, bits: int | None) -> float:
-    return now - last if bits is None else wrapped_difference(int(now), int(last), bits)
+def _moved(last: float, now: float, values: int | None) -> float:
+    return now - last if values is None else difference_around(int(now), int(last), values)
 
 
 def _integrated(last: _Speed, now: _Speed) -> _Path | Gap:

@@ -27,6 +27,7 @@ from drslamd.config_wheels import (
 from drslamd.conventions import SECOND_US
 from drslamd.events import CanFrame
 from drslamd.sensors.gyro.gyro_heading import GyroHeading
+from drslamd.sensors.rhythm import Rhythm
 from drslamd.sensors.samples import GyroAngle, GyroRate, GyroSigmas, Motion, WheelSample
 from drslamd.sensors.wheels import agilex
 from drslamd.sensors.wheels.agilex import AgilexDriver
@@ -169,6 +170,7 @@ class WheelInput:
         base: the kinematics, with tallies of samples and gaps.
         gyro: what becomes of the readings of its gyro, if it sends any.
         last_motion_utime: arrival of the input that gave the last motion without ``gap``.
+        rhythm: how long that motion is one of now.
     """
 
     def __init__(
@@ -197,6 +199,7 @@ class WheelInput:
         self._not_finite_before = 0
         self._refused_before: dict[WheelRefusal, int] = {}
         self.last_motion_utime: int | None = None
+        self.rhythm = Rhythm()
 
     def feed(self, data: bytes, utime: int) -> list[Motion]:
         """Motions in `data` of the serial port, which arrived at `utime` (us).
@@ -261,6 +264,7 @@ class WheelInput:
                 motions.append(motion)
                 is_linked = is_linked or not motion.gap
         if is_linked:
+            self.rhythm.add(len(motions), utime)
             refused = self.driver.tally.refused
             self.last_motion_utime = self._trying_since = utime
             self._samples_before = self.base.tally.received

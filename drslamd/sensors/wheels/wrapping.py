@@ -1,13 +1,18 @@
-"""Counters of fixed width: how far did it go from one reading to the next?"""
+"""Counters that go around: how far did it go from one reading to the next?"""
 
 from __future__ import annotations
 
 
-def wrapped_difference(new: int, old: int, bits: int) -> int:
-    """`new - old` modulo 2 ** bits, taken from the half range around zero.
+def difference_around(new: int, old: int, values: int) -> int:
+    """`new - old` on a circle of so many values, taken from the half of it around zero.
 
-    Right whenever the true difference lies in [-2 ** (bits - 1), 2 ** (bits - 1)); signed and
-    unsigned readings may be given alike.
+    Right whenever the true difference lies in [-values / 2, values / 2); signed and unsigned
+    readings may be given alike.
     """
-    half = 1 << (bits - 1)
-    return (new - old + half) % (1 << bits) - half
+    half = values // 2
+    return (new - old + half) % values - half
+
+
+def wrapped_difference(new: int, old: int, bits: int) -> int:
+    """The same for a counter of so many bits."""
+    return difference_around(new, old, 1 << bits)

@@ -6,7 +6,7 @@ import ast
 
 import pytest
 from lab.matrix import __main__ as command
-from lab.matrix import page
+from lab.matrix import measuring, page
 from lab.matrix.rows import ROWS
 from lab.soak import results
 
@@ -27,7 +27,8 @@ def test_every_row_has_a_test() -> None:
 
 
 def test_the_page_is_what_the_markers_say() -> None:
-    made = page.page(page.named_rows(), results.read(page.RUNS))
+    found = measuring.read(measuring.FOUND)
+    made = page.page(page.named_rows(), results.read(page.RUNS), found)
     assert page.PAGE.read_text() == "\n".join(made) + "\n", "run tools/matrix"
 
 
@@ -47,3 +48,47 @@ def test_a_row_without_a_test_fails_the_command(
     everything["N60"] = ["test"]
     assert command.main(["--check"]) == 1
     assert capsys.readouterr().out.splitlines()[-1].endswith("N6, N60")
+
+
+def test_what_a_test_of_a_row_measured_is_kept(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Together with what other runs found; of several cases the worst counts."""
+    told = pytester.path / "measured.json"
+    measuring.write(told, {"tests/other.py::test": measuring.Found(["T1"], "passed", ["7 s"])})
+    monkeypatch.setenv(measuring.WHERE, str(told))
+    monkeypatch.setenv("PYTHONPATH", str(page.ROOT / "tools"))
+    pytester.makeini("[pytest]\nmarkers =\n    row(name): a row\n")
+    pytester.makepyfile(
+        """
+        import pytest
+
+        @pytest.mark.row("D1")
+        @pytest.mark.parametrize("n", [1, 2])
+        def test_one(n, record_property):
+            record_property("measured", f"{n} m")
+            assert n == 1
+
+        @pytest.mark.row("D2")
+        @pytest.mark.row("D1")
+        def test_two(): ...
+
+        @pytest.mark.row("D2")
+        def test_three(): pytest.skip("not here")
+
+        def test_four(): ...
+        """
+    )
+    pytester.runpytest_subprocess("-p", "lab.matrix.measuring")
+    found = measuring.read(told)
+    assert {name.split("::")[1]: one[1:] for name, one in found.items()} == {
+        "test": ("passed", ["7 s"]),
+        "test_one": ("failed", ["1 m", "2 m"]),
+        "test_two": ("passed", []),
+        "test_three": ("skipped", []),
+    }
+    assert page.kept("D1", found) == "1 of 2 tests passed; 1 m; 2 m"
+    assert page.kept("D2", found) == "1 of 2 tests passed, 1 could not run here"
+    assert page.kept("D3", found) == ""
+    measuring.write(told, found)
+    assert measuring.read(told) == found

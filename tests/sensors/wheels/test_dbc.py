@@ -411,6 +411,71 @@ def test_the_unit_is_what_the_file_says(unit: str, factor: float) -> None:
     assert (sample.left_mps, sample.right_mps) == pytest.approx((36 * factor, -18 * factor))
 
 
+@pytest.mark.parametrize(
+    ("unit", "factor"),
+    [("Kmph", 1 / 3.6), ("km/hr", 1 / 3.6), ("m/sec", 1.0), ("mph", 0.44704), ("ft/s", 0.3048),
+     ("in/s", 0.0254), ("Unit_MeterPerSecond", 1.0), ("Unit_KiloMeterPerHour", 1 / 3.6)],
+)  # fmt: skip
+def test_units_of_speed_have_many_spellings(unit: str, factor: float) -> None:
+    text = HEAD + TWO.replace('"tick"', f'"{unit}"')
+    driver = of_two(text, measures="wheel_speeds")
+    (sample,) = driver.on_frame(frame(528, struct.pack("<ii", 36, 36)))
+    assert isinstance(sample, WheelSpeeds)
+    assert sample.left_mps == pytest.approx(36 * factor)
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"),
+    [("deg/sec", math.pi / 180), ("\u00ba/s", math.pi / 180), ("degrees/s", math.pi / 180),
+     ("Unit_DegreePerSecond", math.pi / 180), ("rpm", math.pi / 30), ("mrad/s", 0.001)],
+)  # fmt: skip
+def test_units_of_turning_have_many_spellings(unit: str, factor: float) -> None:
+    text = HEAD + TWO.replace('"tick"', '"m/s"', 1).replace('"tick"', f'"{unit}"')
+    keys = {"measures": "twist", "linear": "Wheels.L", "angular": "Wheels.R"}
+    (sample,) = of_two(text, **keys).on_frame(frame(528, struct.pack("<ii", 1, 7)))
+    assert isinstance(sample, Twist)
+    assert sample.angular_radps == pytest.approx(7 * factor)
+
+
+@pytest.mark.parametrize("unit", ["rpm", "1/min", "rad/s", "deg/s"])
+def test_how_a_wheel_turns_is_a_speed_once_its_radius_is_known(unit: str) -> None:
+    text = HEAD + TWO.replace('"tick"', f'"{unit}"')
+    with pytest.raises(ConfigError, match=r"give wheels\.unit, .*of rpm: 2 pi r / 60"):
+        of_two(text, measures="wheel_speeds")
+    driver = of_two(text, measures="wheel_speeds", unit=2 * math.pi * 0.1 / 60)
+    (sample,) = driver.on_frame(frame(528, struct.pack("<ii", 60, 0)))
+    assert isinstance(sample, WheelSpeeds)
+    assert sample.left_mps == pytest.approx(0.2 * math.pi)
+
+
+def test_a_factor_of_0_is_one_sentence() -> None:
+    text = HEAD + TWO.replace('(1,0) [0|0] "tick"', '(0,0) [0|0] "m/s"', 1)
+    with pytest.raises(ConfigError, match=r'wheels\.left = "Wheels\.L": its factor .* is 0'):
+        of_two(text, measures="wheel_speeds")
+
+
+@pytest.mark.parametrize(("factor", "fits"), [("1.00001", True), ("1.001", False)])
+def test_factors_of_both_sides_may_be_rounded(factor: str, fits: bool) -> None:
+    text = HEAD + TWO.replace("(1,0)", f"({factor},0)", 1)
+    if fits:
+        assert of_two(text).on_frame(frame(528, struct.pack("<ii", 3, 4)))
+    else:
+        with pytest.raises(ConfigError, match="different factors"):
+            of_two(text)
+
+
+@pytest.mark.parametrize(("extended", "comes", "said"), [(True, "29", "11"), (False, "11", "29")])
+def test_an_id_of_the_other_width_is_named(extended: bool, comes: str, said: str) -> None:
+    number = 0x123 if extended else 0x123 | 1 << 31
+    driver = of_two(HEAD + TWO.replace("528", str(number)))
+    assert driver.on_frame(frame(0x123, bytes(8), extended=extended)) == []
+    sentence = driver.why_no_sample(T0)
+    assert sentence is not None
+    assert sentence.startswith(f"CAN id 0x123 of wheels.left comes in frames of {comes} bits, ")
+    assert f"as one of {said}:" in sentence
+    assert driver.why_no_sample(T0 + 2 * SECOND_US) is None
+
+
 def test_a_unit_that_is_not_known_must_be_given() -> None:
     with pytest.raises(ConfigError, match=r'gives it in "tick"; give wheels\.unit'):
         of_two(HEAD + TWO, measures="wheel_speeds")

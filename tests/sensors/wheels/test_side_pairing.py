@@ -86,7 +86,8 @@ def test_sides_of_different_rates_make_pairs_at_the_lower_one() -> None:
 
 @pytest.mark.row("D10")
 def test_counters_are_interpolated_over_their_wrap() -> None:
-    between = wrapping(16)
+    between = wrapping(lambda: 1 << 16)
     assert between(65_530, 10, 0.5) == 2
     assert between(10, 65_530, 0.75) == 65_534
-    assert wrapping(64)((1 << 63) + 1, (1 << 63) + 3, 0.5) == (1 << 63) + 2
+    assert wrapping(lambda: 1000)(990, 10, 0.5) == 0
+    assert wrapping(lambda: 1 << 64)((1 << 63) + 1, (1 << 63) + 3, 0.5) == (1 << 63) + 2

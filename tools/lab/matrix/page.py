@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+from lab.matrix.measuring import Found
 from lab.matrix.rows import ROWS
 from lab.soak.results import Row as Run
 from lab.soak.scenarios import SCENARIOS
@@ -64,19 +65,21 @@ def unknown(tests: Tests) -> list[str]:
     return [row for row in tests if row not in ROWS]
 
 
-def page(tests: Tests, runs: Sequence[Run]) -> list[str]:
+def page(tests: Tests, runs: Sequence[Run], found: Mapping[str, Found]) -> list[str]:
     """As Markdown."""
     out = [
         "# The fault matrix",
         "",
-        "Made by `tools/matrix` from the markers of the tests and from what `tools/soak` found;",
-        "`tests/lab/matrix` checks that it is up to date.",
+        "Made by `tools/matrix` from the markers of the tests, from what they measured",
+        "(`tools/matrix --measure`) and from what `tools/soak` found; `tests/lab/matrix` checks",
+        "that it is up to date.",
         "",
         "| row | what goes wrong | what holds | tests | measured |",
         "| --- | --- | --- | --- | --- |",
     ]
     for name, row in ROWS.items():
-        cells = [name, row.fault, row.line, _shown(tests.get(name, ())), measured(name, runs)]
+        what = "; ".join(filter(None, (kept(name, found), measured(name, runs))))
+        cells = [name, row.fault, row.line, _shown(tests.get(name, ())), what]
         out.append("| " + " | ".join(cells) + " |")
     out += ["", "## Played in virtual time", ""]
     out += [
@@ -92,6 +95,18 @@ def _shown(tests: Sequence[str]) -> str:
     short = [test.removeprefix("tests/") for test in tests]
     more = [f"and {len(short) - MOST_SHOWN} more"] if len(short) > MOST_SHOWN else []
     return "<br>".join([*(f"`{test}`" for test in short[:MOST_SHOWN]), *more])
+
+
+def kept(name: str, found: Mapping[str, Found]) -> str:
+    """How many tests of a row passed, and what they measured."""
+    mine = [one for one in found.values() if name in one.rows]
+    if not mine:
+        return ""
+    passed = sum(one.outcome == "passed" for one in mine)
+    absent = sum(one.outcome == "skipped" for one in mine)
+    left_out = f", {absent} could not run here" if absent else ""
+    said = [text for one in mine for text in one.said]
+    return "; ".join([f"{passed} of {len(mine)} tests passed{left_out}", *said])
 
 
 def measured(name: str, runs: Sequence[Run]) -> str:
