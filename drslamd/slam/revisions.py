@@ -36,16 +36,20 @@ MOST_ROBOTS = 12
 NEWEST = 4 * MOST_CLAIMS
 """Keyframes among which they are looked for; there are up to four a second."""
 
+ORIGIN = np.zeros(3)
 Whose = tuple[int, ...]
 """One robot, by its pose in w; or two, a < b, by a_T_b."""
 
 
 class _Claim(NamedTuple):
-    """What a solution said of the last keyframes n of some robots: poses with covariances."""
+    """What a solution said of the last keyframes n of some robots: poses (k, 3) with covariances
+    (k, 3, 3), of one robot and after it of pairs."""
 
     frame: Segment
     n: dict[int, float]
-    said: dict[Whose, tuple[Array, Array]]
+    whose: list[Whose]
+    poses: Array
+    covariances: Array
 
 
 class Revisions:
@@ -87,15 +91,7 @@ class Revisions:
         for remembered in (self._claims, self._moves):
             while remembered and remembered[0][0] < now - REMEMBERED:
                 remembered.popleft()
-        places = {
-            name: dict(zip(path.n[-NEWEST:].tolist(), path.poses[-NEWEST:], strict=True))
-            for name, path in estimate.trajectories.items()
-        }
-        moves: dict[Whose, float] = {}
-        for _, claim in self._claims:
-            for whose, move in _moved(claim, estimate.frame, places):
-                moves[whose] = max(move, moves.get(whose, 0.0))
-        self._moves.append((now, moves))
+        self._moves.append((now, _moved([claim for _, claim in self._claims], estimate)))
         self._claims.append((now, _claim(estimate, robot)))
 
 
@@ -103,37 +99,53 @@ def _claim(estimate: TeamEstimate, own: int) -> _Claim:
     solved = {name: path for name, path in estimate.trajectories.items() if len(path.n)}
     covariance = estimate.covariance(own)
     assert covariance is not None
-    said: dict[Whose, tuple[Array, Array]] = {
-        (own,): (solved[own].poses[-1].copy(), covariance.copy())
+    pairs, poses, covariances = estimate.relatives(
+        list(combinations(sorted(solved)[:MOST_ROBOTS], 2))
+    )
+    return _Claim(
+        estimate.frame,
+        {robot: float(path.n[-1]) for robot, path in solved.items()},
+        [(own,), *pairs],
+        np.concatenate([solved[own].poses[-1:], poses]),
+        np.concatenate([covariance[None], covariances]),
+    )
+
+
+def _moved(claims: list[_Claim], estimate: TeamEstimate) -> dict[Whose, float]:
+    """How far the poses of some claims have been moved at most, see `squared_moves`."""
+    places = {
+        robot: dict(zip(path.n[-NEWEST:].tolist(), path.poses[-NEWEST:], strict=True))
+        for robot, path in estimate.trajectories.items()
     }
-    for a, b in combinations(sorted(solved)[:MOST_ROBOTS], 2):
-        found = estimate.relative(a, b)
-        if found is not None:
-            said[a, b] = found
-    return _Claim(estimate.frame, {r: float(path.n[-1]) for r, path in solved.items()}, said)
+    whose: list[Whose] = []
+    before, after, claimed, covariances = [], [], [], []
+    for claim in claims:
+        found = {robot: places.get(robot, {}).get(n) for robot, n in claim.n.items()}
+        for k, name in enumerate(claim.whose):
+            # who is claimed alone is seen from where the frame begins
+            is_alone = len(name) == 1
+            one, other = (ORIGIN if is_alone else found[name[0]]), found[name[-1]]
+            if one is None or other is None or (is_alone and claim.frame != estimate.frame):
+                continue
+            whose.append(name)
+            before.append(one)
+            after.append(other)
+            claimed.append(claim.poses[k])
+            covariances.append(claim.covariances[k])
+    moves: dict[Whose, float] = {}
+    if whose:
+        later = se2.between(np.array(before), np.array(after))
+        sizes = squared_moves(np.array(claimed), np.array(covariances), later)
+        for name, size in zip(whose, sizes.tolist(), strict=True):
+            moves[name] = max(size, moves.get(name, 0.0))
+    return moves
 
 
-def _moved(
-    claim: _Claim, frame: Segment, places: dict[int, dict[float, Array]]
-) -> list[tuple[Whose, float]]:
-    """How far each pose of a claim has been moved, see `squared_move`."""
-    out = []
-    for whose, (pose, covariance) in claim.said.items():
-        found = [places.get(robot, {}).get(claim.n[robot]) for robot in whose]
-        if len(whose) == 1:
-            later = found[0] if claim.frame == frame else None
-        else:
-            a, b = found
-            later = None if a is None or b is None else se2.between(a, b)
-        if later is not None:
-            out.append((whose, squared_move(pose, covariance, later)))
-    return out
-
-
-def squared_move(claimed: Array, covariance: Array, later: Array) -> float:
-    """Squared distance of two poses (3,) in units of a covariance (3, 3), per degree of freedom."""
+def squared_moves(claimed: Array, covariances: Array, later: Array) -> Array:
+    """(k,) squared distances of poses (k, 3) to others in units of covariances (k, 3, 3), per
+    degree of freedom."""
     apart = later - claimed
-    apart[2] = se2.wrap(apart[2])
+    apart[:, 2] = se2.wrap(apart[:, 2])
     # who stands where the frame begins is certain, but no pose is finer than a step of odometry
-    known = covariance + RESOLUTION**2 * np.eye(3)
-    return float(apart @ np.linalg.solve(known, apart)) / 3
+    known = covariances + RESOLUTION**2 * np.eye(3)
+    return np.asarray((apart * np.linalg.solve(known, apart[..., None])[..., 0]).sum(axis=1) / 3)

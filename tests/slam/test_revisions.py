@@ -16,7 +16,7 @@ from drslamd.slam.revisions import (
     MOST_ROBOTS,
     REMEMBERED,
     Revisions,
-    squared_move,
+    squared_moves,
 )
 
 SIGMA = 0.1
@@ -78,9 +78,8 @@ def test_who_stands_where_the_frame_begins_is_certain_and_not_the_end_of_the_dae
 
 def test_angles_are_compared_around_the_circle() -> None:
     covariance = np.diag([1.0, 1.0, 0.01])
-    found = squared_move(
-        np.array([0.0, 0.0, math.pi - 0.1]), covariance, np.array([0.0, 0.0, 0.1 - math.pi])
-    )
+    claimed, later = [[0.0, 0.0, math.pi - 0.1]], [[0.0, 0.0, 0.1 - math.pi]]
+    (found,) = squared_moves(np.array(claimed), covariance[None], np.array(later))
     assert found == pytest.approx(0.2**2 / 0.01 / 3)
 
 

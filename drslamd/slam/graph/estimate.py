@@ -168,18 +168,34 @@ class TeamEstimate:
 
     def relative(self, a: int, b: int) -> tuple[Array, Array] | None:
         """a_T_b (3,) of the last poses of two robots, and its covariance (3, 3) in frame a."""
-        joint = self.joint_of(a, b)
-        if joint is None:
-            return None
-        w_T_a, w_T_b = (self.everybody[robot].poses[-1] for robot in (a, b))
+        _, poses, covariances = self.relatives([(a, b)])
+        return (poses[0], covariances[0]) if len(poses) else None
+
+    def relatives(self, pairs: list[tuple[int, int]]) -> tuple[list[tuple[int, int]], Array, Array]:
+        """The same of many: those of the pairs of which something is claimed, a_T_b (k, 3) and
+        covariances (k, 3, 3)."""
+        everybody = self.everybody
+        claimed = list(everybody)[: len(self.joint) // 3]
+        place = {robot: 3 * k for k, robot in enumerate(claimed)}
+        told = [(a, b) for a, b in pairs if a in place and b in place]
+        if not told:
+            return told, np.zeros((0, 3)), np.zeros((0, 3, 3))
+        last = {robot: everybody[robot].poses[-1] for pair in told for robot in pair}
+        w_T_a, w_T_b = (np.array([last[pair[end]] for pair in told]) for end in (0, 1))
         a_T_b = se2.between(w_T_a, w_T_b)
-        a_T_b[2] = se2.wrap(a_T_b[2])
-        turn = np.eye(3)
-        turn[:2, :2] = se2.rotate(-w_T_a[2], np.eye(2)).T
-        by_a = -turn
-        by_a[0, 2], by_a[1, 2] = a_T_b[1], -a_T_b[0]
-        j = np.hstack([by_a, turn])
-        return a_T_b, self.bold(a, b) * (j @ joint @ j.T)
+        a_T_b[:, 2] = se2.wrap(a_T_b[:, 2])
+        first = np.array([[place[a], place[b]] for a, b in told])
+        at = (first[:, :, None] + np.arange(3)).reshape(-1, 6)
+        joint = self.joint[at[:, :, None], at[:, None, :]]
+        cos, sin = np.cos(w_T_a[:, 2]), np.sin(w_T_a[:, 2])
+        j = np.zeros((len(told), 3, 6))
+        j[:, 0, 3] = j[:, 1, 4] = cos
+        j[:, 0, 4], j[:, 1, 3] = sin, -sin
+        j[:, :2, :2] = -j[:, :2, 3:5]
+        j[:, 0, 2], j[:, 1, 2] = a_T_b[:, 1], -a_T_b[:, 0]
+        j[:, 2, 2], j[:, 2, 5] = -1, 1
+        bold = np.array([self.bold(a, b) for a, b in told])
+        return told, a_T_b, bold[:, None, None] * (j @ joint @ np.swapaxes(j, 1, 2))
 
     def bold(self, a: int, b: int) -> float:
         """Times the covariance of a pair, see `boldness`."""

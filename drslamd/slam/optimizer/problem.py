@@ -159,6 +159,16 @@ class RangeFactors:
             carried=self.carried.chosen(which),
         )
 
+    def near_range_shape(self, model: RangeModel) -> Array:
+        """(m,) of `RangeModel.near_range_shape`."""
+        if model not in self._shapes:
+            self._shapes[model] = model.near_range_shape(self.measured)
+        return self._shapes[model]
+
+    @cached_property
+    def _shapes(self) -> dict[RangeModel, Array]:
+        return {}
+
     @property
     def is_carried(self) -> NDArray[np.bool_]:
         """(m,)"""
@@ -306,5 +316,5 @@ def range_errors(
     sight = place[ranges.j] + arm_j - place[ranges.i] - arm_i
     error, direction = range_model.residuals(sight, ranges.measured)  # eq. (1)
     error += calibration.bias[ranges.pair]
-    error += calibration.near_bias * model.near_range_shape(ranges.measured)
+    error += calibration.near_bias * ranges.near_range_shape(model)
     return RangeErrors(error, direction, arm_i, arm_j)

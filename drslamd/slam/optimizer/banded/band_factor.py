@@ -8,9 +8,9 @@ from typing import Protocol
 import numpy as np
 
 from drslamd.slam import headway
+from drslamd.slam.optimizer.banded.assembly import System
 from drslamd.slam.optimizer.banded.lapack import cholesky_banded, triangular_banded
 from drslamd.slam.optimizer.banded.layout import NOWHERE
-from drslamd.slam.optimizer.banded.normal_equations import System
 from drslamd.slam.se2 import Array, Index
 
 ROOM = 64
@@ -24,6 +24,9 @@ class Solver(Protocol):
 
     def solved(self, right: Array) -> Array | None:
         """For right-hand sides (n + b,) or (n + b, c); None where there is no solution."""
+
+    def squared(self, right: Array) -> Array | None:
+        """(c, c) B' H^-1 B of columns B (n + b, c) and the system H; None likewise."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,7 @@ class BandFactor:
         Args:
             damping: what is added to the diagonal, relative to it.
         """
-        band, corner = system.band.copy(), system.corner.copy()
+        band, corner = system.band.copy(order="F"), system.corner.copy()
         band[0] *= 1 + damping
         corner[np.diag_indices(len(corner))] *= 1 + damping
         try:
@@ -72,21 +75,22 @@ class BandFactor:
         inner = _through(self.lower, middle - self.halfway @ outer, transposed=True)
         return np.concatenate([inner, outer]).reshape(right.shape)
 
-    def joint_covariance(self, unknowns: Index) -> Array | None:
-        """(k, k) block of the inverse for some unknowns (k,); None where there is none."""
+    def squared(self, right: Array) -> Array | None:
+        """See `Solver.squared`: half of the way to the solution is enough."""
         n = len(self.halfway)
-        columns = np.arange(len(unknowns))
-        inside = unknowns < n
-        unit = np.zeros((n, len(unknowns)))
-        unit[unknowns[inside], columns[inside]] = 1
-        own = _through(self.lower, unit)
-        bound = -self.halfway.T @ own
-        bound[unknowns[~inside] - n, columns[~inside]] += 1
+        own = _through(self.lower, right[:n])
+        bound = right[n:] - self.halfway.T @ own
         try:
-            joint = own.T @ own + bound.T @ np.linalg.solve(self.schur, bound)
+            return np.asarray(own.T @ own + bound.T @ np.linalg.solve(self.schur, bound))
         except np.linalg.LinAlgError:
             return None
-        return joint if np.isfinite(joint).all() else None
+
+    def joint_covariance(self, unknowns: Index) -> Array | None:
+        """(k, k) block of the inverse for some unknowns (k,); None where there is none."""
+        unit = np.zeros((len(self.halfway) + len(self.schur), len(unknowns)), order="F")
+        unit[unknowns, np.arange(len(unknowns))] = 1
+        joint = self.squared(unit)
+        return joint if joint is not None and np.isfinite(joint).all() else None
 
     def covariance_blocks(self, unknowns: Index) -> Array | None:
         """(m, c, c) blocks of the inverse, for m factors that depend on unknowns (m, c) each.
@@ -119,7 +123,7 @@ def _through(lower: Array, columns: Array, transposed: bool = False) -> Array:
     for first in range(0, max(columns.shape[1], 1), AT_ONCE):
         headway.mark()
         done.append(triangular_banded(lower, columns[:, first : first + AT_ONCE], transposed))
-    return np.concatenate(done, axis=1)
+    return done[0] if len(done) == 1 else np.concatenate(done, axis=1)
 
 
 def _squared(columns: Array) -> Array:

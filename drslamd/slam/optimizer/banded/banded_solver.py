@@ -52,7 +52,8 @@ def solve(
     """
     equations, known = Equations(problem), len(problem.freed)
     start = start or Calibration.zero(problem.pairs, len(problem.priors.scale))
-    nominal = descend(equations, start, most, tolerance)
+    # who was solved before is most often where he was, but for a second of driving
+    nominal = descend(equations, start, most, tolerance, is_near=problem.fitted is not None)
     explained = explain(equations, nominal, most, tolerance)
     equations, point = explained.equations, explained.point
     problem = equations.problem

@@ -44,11 +44,11 @@ def odometry_at(problem: Problem, point: Point) -> Linearised:
 def odometry_jacobian(problem: Problem, poses: Array) -> Array:
     """(m, 3, 9): derivative of the errors by both poses, scale, yaw rate and turn."""
     factors = problem.odometry
-    jacobian = np.zeros((len(factors), 3, 9))
-    jacobian[:, :, :6] = pose_jacobian(poses, factors)
-    jacobian[:, :2, 6] = factors.measured[:, :2]
-    jacobian[:, :, 7], jacobian[:, :, 8] = factors.by_yaw, -factors.by_turn
-    return jacobian
+    jacobian = np.zeros((9, 3, len(factors)))
+    _add_poses(jacobian, poses, factors)
+    jacobian[6, :2] = factors.measured[:, :2].T
+    jacobian[7], jacobian[8] = factors.by_yaw.T, -factors.by_turn.T
+    return np.asarray(jacobian.transpose(2, 1, 0))
 
 
 def closures_at(problem: Problem, poses: Array) -> Linearised:
@@ -58,14 +58,17 @@ def closures_at(problem: Problem, poses: Array) -> Linearised:
     return Linearised(pose_jacobian(poses, factors), factors.information, _pulled(factors, error))
 
 
-def ranges_at(problem: Problem, point: Point, least: float = LEAST_CURVATURE) -> Linearised:
+def ranges_at(
+    problem: Problem, point: Point, least: float = LEAST_CURVATURE, antennas: bool = True
+) -> Linearised:
     """By both poses, bias, near-range bias and both antennas; cost is c^2 log(1 + (e / c)^2).
 
     Args:
         least: see `LEAST_CURVATURE`.
+        antennas: are their columns asked for? Else they are zero.
     """
     factors = problem.ranges
-    error, jacobian = point.sight.error, _range_jacobian(problem, point)
+    error, jacobian = point.sight.error, _range_jacobian(problem, point, antennas)
     squared = (error / (point.threshold[factors.pair] * factors.sigma)) ** 2
     weight = 1 / (1 + squared) / factors.sigma**2
     # the second derivative makes the steps of an iteration shrink fast
@@ -73,33 +76,38 @@ def ranges_at(problem: Problem, point: Point, least: float = LEAST_CURVATURE) ->
     return Linearised(jacobian, bent[:, None, None], (weight * error)[:, None])
 
 
-def weighed_ranges(problem: Problem, point: Point, claims: Array) -> Linearised:
+def weighed_ranges(
+    problem: Problem, point: Point, claims: Array, antennas: bool = True
+) -> Linearised:
     """The same without the curvature, and with as much information as ranges really have.
 
     Args:
         claims: (pairs,) how many times the sent sigma ranges are as wrong by.
     """
     factors = problem.ranges
-    error, jacobian = point.sight.error, _range_jacobian(problem, point)
+    error, jacobian = point.sight.error, _range_jacobian(problem, point, antennas)
     squared = (error / (point.threshold[factors.pair] * factors.sigma)) ** 2
     weight = 1 / (1 + squared) / (claims[factors.pair] * factors.sigma) ** 2
     return Linearised(jacobian, weight[:, None, None], (weight * error)[:, None])
 
 
-def _range_jacobian(problem: Problem, point: Point) -> Array:
+def _range_jacobian(problem: Problem, point: Point, antennas: bool) -> Array:
     """(m, 1, 12) derivatives of errors."""
-    factors, model = problem.ranges, problem.model
-    _, u, arm_i, arm_j = point.sight
-    jacobian = np.ones((len(factors), 1, 12))
-    jacobian[:, 0, 0], jacobian[:, 0, 1] = -u.real, -u.imag
-    jacobian[:, 0, 2] = u.real * arm_i.imag - u.imag * arm_i.real
-    jacobian[:, 0, 3], jacobian[:, 0, 4] = u.real, u.imag
-    jacobian[:, 0, 5] = u.imag * arm_j.real - u.real * arm_j.imag
-    jacobian[:, 0, 7] = model.near_range_shape(factors.measured)
-    heading = point.poses[np.stack([factors.i, factors.j], axis=-1), 2] + factors.turned
-    seen = u[:, None] * np.exp(-1j * heading) * [-1, 1]
-    jacobian[:, 0, 8::2], jacobian[:, 0, 9::2] = seen.real, seen.imag
-    return jacobian
+    factors, (_, u, arm_i, arm_j) = problem.ranges, point.sight
+    jacobian = np.ones((12, 1, len(factors)))
+    jacobian[0, 0], jacobian[1, 0] = -u.real, -u.imag
+    jacobian[2, 0] = u.real * arm_i.imag - u.imag * arm_i.real
+    jacobian[3, 0], jacobian[4, 0] = u.real, u.imag
+    jacobian[5, 0] = u.imag * arm_j.real - u.real * arm_j.imag
+    jacobian[7, 0] = factors.near_range_shape(problem.model)
+    if not antennas:
+        jacobian[8:] = 0.0
+        return np.asarray(jacobian.transpose(2, 1, 0))
+    for column, end, pose in ((8, 0, factors.i), (10, 1, factors.j)):
+        seen = u * np.exp(-1j * (point.poses[pose, 2] + factors.turned[:, end]))
+        seen = seen if end else -seen
+        jacobian[column, 0], jacobian[column + 1, 0] = seen.real, seen.imag
+    return np.asarray(jacobian.transpose(2, 1, 0))
 
 
 def carried_part(problem: Problem, point: Point, ranges: Linearised) -> Linearised:
@@ -120,17 +128,20 @@ def carried_part(problem: Problem, point: Point, ranges: Linearised) -> Linearis
 
 def pose_jacobian(poses: Array, factors: BetweenFactors) -> Array:
     """(m, 3, 6): derivative of `pose_errors` by both poses of each factor."""
-    theta = poses[factors.i, 2]
-    cos, sin = np.cos(theta), np.sin(theta)
-    d = poses[factors.j, :2] - poses[factors.i, :2]
-    j = np.zeros((len(factors), 3, 6))
-    j[:, 0, 0] = j[:, 1, 1] = -cos
-    j[:, 0, 1], j[:, 1, 0] = -sin, sin
-    j[:, 0, 2] = -sin * d[:, 0] + cos * d[:, 1]
-    j[:, 1, 2] = -cos * d[:, 0] - sin * d[:, 1]
-    j[:, :2, 3:5] = -j[:, :2, :2]
-    j[:, 2, 2], j[:, 2, 5] = -1, 1
-    return j
+    jacobian = np.zeros((6, 3, len(factors)))
+    _add_poses(jacobian, poses, factors)
+    return np.asarray(jacobian.transpose(2, 1, 0))
+
+
+def _add_poses(out: Array, poses: Array, factors: BetweenFactors) -> None:
+    """The same in the first of columns that are zero, (c, 3, m)."""
+    i, j = poses[factors.i].T, poses[factors.j].T
+    cos, sin, x, y = np.cos(i[2]), np.sin(i[2]), j[0] - i[0], j[1] - i[1]
+    out[0, 0] = out[1, 1] = -cos
+    out[1, 0], out[0, 1] = -sin, sin
+    out[2, 0], out[2, 1] = cos * y - sin * x, -cos * x - sin * y
+    out[3:5, :2] = -out[:2, :2]
+    out[2, 2], out[5, 2] = -1, 1
 
 
 def _pulled(factors: BetweenFactors, errors: Array) -> Array:

@@ -12,6 +12,7 @@ nothing. Therefore outliers are counted too, and the run of them that lasts unti
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,8 @@ DOUBT = 1.0
 """Degrees of freedom that hold a ratio at 1: a robot has but two or three that ranges can check."""
 PROBES = 6
 """Rows of random signs that estimate g of a whole robot to some percent."""
+AT_ONCE = 1024
+"""Links for which signs are drawn at once."""
 OUTLIER_SIGMAS = 2.5
 """Of what a range was sent with: beyond it, it is an outlier."""
 RUN = 4
@@ -105,7 +108,8 @@ def guessed_misfit(equations: Equations, point: Point, factor: Solver) -> Misfit
     problem, layout = equations.problem, equations.layout
     jacobian = linearised.odometry_jacobian(problem, point.poses)
     squares, information = squares_of(problem, point), problem.odometry.information
-    signs = np.random.default_rng(0).choice([-1.0, 1.0], (len(jacobian), 3, PROBES))
+    signs = _signs(-(-len(jacobian) // AT_ONCE), PROBES)[: len(jacobian)]
+    jacobian = np.ascontiguousarray(jacobian)
     whitened = np.swapaxes(np.linalg.cholesky(information), 1, 2) @ jacobian
     unknowns = layout.odometry_unknowns(problem.odometry)
     whitened = np.where((unknowns == NOWHERE)[:, None], 0.0, whitened)
@@ -118,6 +122,14 @@ def guessed_misfit(equations: Equations, point: Point, factor: Solver) -> Misfit
         return Misfit(squares, np.zeros(len(squares)))
     seen: Array = signs * (whitened @ spread[unknowns])
     return Misfit(squares, 3 - seen.sum(axis=(1, 2)) / PROBES)
+
+
+@lru_cache(maxsize=2)
+def _signs(blocks: int, probes: int) -> Array:
+    """(AT_ONCE blocks, 3, probes) 1 or -1, the first of which do not depend on how many follow."""
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], (blocks * AT_ONCE, 3, probes))
+    signs.flags.writeable = False
+    return signs
 
 
 def squares_of(problem: Problem, point: Point) -> Array:
@@ -158,42 +170,69 @@ class Run:
 
 def contradicted(problem: Problem, point: Point) -> NDArray[np.bool_]:
     """(pairs,) whose ranges of late do not fit the solution: an unbroken run of them, or many."""
-    found = np.zeros(problem.pairs, dtype=bool)
-    wrong = outliers(problem, point)
-    pair = problem.ranges.pair
-    n = problem.n[problem.ranges.i]
-    for k in range(problem.pairs):
-        mine = pair == k
-        lately = mine & (n > n[mine].max(initial=0) - LATELY)
-        count = np.count_nonzero(lately)
-        found[k] = count >= FEWEST_LATELY and wrong[lately].sum() >= MANY_WRONG * count
+    found = lately_wrong(problem, point)
     robots = np.unique(problem.robot)
     ends = problem.robot[np.stack([problem.ranges.i, problem.ranges.j])]
     for run in runs(problem, point):
         between = np.isin(ends, robots[[run.i, run.j]]).all(axis=0)
-        found[pair[between]] = True
+        found[problem.ranges.pair[between]] = True
     return found
+
+
+def lately_wrong(problem: Problem, point: Point) -> NDArray[np.bool_]:
+    """(pairs,) of whose ranges of late many do not fit."""
+    pair, n = problem.ranges.pair, problem.n[problem.ranges.i]
+    newest = np.zeros(problem.pairs)
+    np.maximum.at(newest, pair, n)
+    lately = n > newest[pair] - LATELY
+    count = np.bincount(pair[lately], minlength=problem.pairs)
+    wrong = np.bincount(pair[lately & outliers(problem, point)], minlength=problem.pairs)
+    return np.asarray((count >= FEWEST_LATELY) & (wrong >= MANY_WRONG * count))
 
 
 def runs(problem: Problem, point: Point) -> list[Run]:
     """Of all pairs that have one."""
     ranges = problem.ranges
+    named = with_runs(problem, point).tolist()
+    if not named:
+        return []
     order = np.argsort(np.maximum(ranges.i, ranges.j), kind="stable")
     wrong = outliers(problem, point)
     sigmas = np.abs(point.sight.error) / ranges.sigma
     robots = np.unique(problem.robot)
     found = []
-    for pair in range(problem.pairs):
+    for pair in named:
         mine = order[ranges.pair[order] == pair][::-1]
         count = _run_length(wrong[mine]) or _scattered(sigmas[mine])
-        if not count:
-            continue
         first = mine[count - 1]
         ends = np.array([ranges.i[first], ranges.j[first]])
         ends = ends[np.argsort(problem.robot[ends])]
         (i, j), (n_i, n_j) = np.searchsorted(robots, problem.robot[ends]), problem.n[ends]
         found.append(Run(int(i), int(j), int(n_i), int(n_j), count))
     return found
+
+
+def with_runs(problem: Problem, point: Point) -> Index:
+    """The pairs that have a run of outliers, in their order: all of them seen at once, because
+    most often there is none."""
+    ranges = problem.ranges
+    # in the order of pairs and time
+    order = np.lexsort((np.maximum(ranges.i, ranges.j), ranges.pair))
+    count = np.bincount(ranges.pair, minlength=problem.pairs)
+    ends = np.cumsum(count)
+    found = np.zeros(problem.pairs, dtype=bool)
+    many = np.flatnonzero(count >= RUN)
+    found[many] = outliers(problem, point)[_last(order, ends[many], RUN)].all(axis=1)
+    many = np.flatnonzero(count >= LAST)
+    sigmas = np.abs(point.sight.error) / ranges.sigma
+    last = np.minimum(sigmas[_last(order, ends[many], LAST)], CLIPPED)
+    found[many] |= np.mean(last**2, axis=1) > MOST_SCATTER
+    return np.flatnonzero(found)
+
+
+def _last(order: Index, ends: Index, count: int) -> Index:
+    """(k, count) the newest ranges of k pairs that end there."""
+    return np.asarray(order[ends[:, None] - 1 - np.arange(count)])
 
 
 def _run_length(wrong: NDArray[np.bool_]) -> int:

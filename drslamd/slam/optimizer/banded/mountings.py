@@ -10,10 +10,12 @@ take a lot off the cost (Rao's score test):
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from drslamd.slam.optimizer.banded import linearised
+from drslamd.slam.optimizer.banded.assembly import by_columns, by_weight
 from drslamd.slam.optimizer.banded.band_factor import BandFactor, Solver
 from drslamd.slam.optimizer.banded.layout import NOWHERE
 from drslamd.slam.optimizer.banded.linearised import Linearised
@@ -75,11 +77,12 @@ def scores(equations: Equations, point: Point, factor: Solver) -> Scores:
         factor: of the system at that point.
     """
     problem = equations.problem
-    left = variances(equations, point, factor)
+    parts = _parts(equations, point)
+    left = _variances(equations, parts, factor)
     if left is None:
         robots = len(problem.priors.scale)
         return Scores(np.zeros(robots), np.zeros(robots))
-    return scored(problem, pulls(equations, point), left)
+    return scored(problem, _pulls(equations, parts), left)
 
 
 def scored(problem: Problem, pull: Array, left: Array) -> Scores:
@@ -104,50 +107,90 @@ def scored(problem: Problem, pull: Array, left: Array) -> Scores:
 
 def variances(equations: Equations, point: Point, factor: Solver) -> Array | None:
     """(3 R, 3 R) V of the turns of R robots, then of their antennas; None where it is unknown."""
-    layout, robots = equations.layout, len(equations.problem.priors.scale)
-    columns = 3 * robots
-    coupling, own = np.zeros((layout.band + layout.border, columns)), np.zeros((columns, columns))
-    for factors, unknowns, which in _parts(equations, point):
-        mine = factors.jacobian[:, :, FIRST : FIRST + which.shape[1]]
-        weighed = np.swapaxes(mine, 1, 2) @ factors.information
-        is_unknown = (unknowns != NOWHERE)[:, None, :]
-        shared = np.where(is_unknown, weighed @ factors.jacobian, 0.0)
-        at = np.where(is_unknown, unknowns[:, None, :], 0) * columns + which[:, :, None]
-        coupling += np.bincount(at.ravel(), shared.ravel(), coupling.size).reshape(coupling.shape)
-        both = which[:, :, None] * columns + which[:, None, :]
-        own += np.bincount(both.ravel(), (weighed @ mine).ravel(), own.size).reshape(own.shape)
-    solved = factor.solved(coupling)
-    if solved is None:
-        return None
-    return np.asarray(own - coupling.T @ solved + WITHOUT_DATA**-2 * np.eye(columns))
+    return _variances(equations, _parts(equations, point), factor)
 
 
 def pulls(equations: Equations, point: Point) -> Array:
     """(3 R,) f, likewise."""
-    pull = np.zeros(3 * len(equations.problem.priors.scale))
-    for factors, _, which in _parts(equations, point):
-        mine = factors.jacobian[:, :, FIRST : FIRST + which.shape[1]]
-        each = (factors.pull[:, None, :] @ mine)[:, 0]
-        pull += np.bincount(which.ravel(), each.ravel(), len(pull))
-    return pull
+    return _pulls(equations, _parts(equations, point))
 
 
-def _parts(equations: Equations, point: Point) -> tuple[tuple[Linearised, Index, Index], ...]:
-    """Factors, their unknowns, and the columns (m, k) of their mountings."""
+class _Part(NamedTuple):
+    """One set of m factors.
+
+    Attributes:
+        jacobian: (c, d, m), see `assembly.by_columns`.
+        unknowns: (c, m) on which they depend.
+        which: (k, m) the columns of V that belong to their mountings.
+    """
+
+    factors: Linearised
+    jacobian: Array
+    unknowns: Index
+    which: Index
+
+    @staticmethod
+    def of(factors: Linearised, unknowns: Index, which: Index) -> _Part:
+        return _Part(factors, by_columns(factors.jacobian), unknowns.T, which.T)
+
+    @property
+    def mine(self) -> Array:
+        """(k, d, m) columns of the mountings."""
+        return self.jacobian[FIRST : FIRST + len(self.which)]
+
+
+def _parts(equations: Equations, point: Point) -> list[_Part]:
     problem, layout = equations.problem, equations.layout
     robots = len(problem.priors.scale)
     ranges = linearised.weighed_ranges(problem, point, np.ones(problem.pairs))
     odometry = linearised.odometry_at(problem, point)
     # by robot: turns are columns 0 .. R - 1, antennas the 2 R behind them
     antennas = (robots + 2 * problem.ranges.robots[:, :, None] + np.arange(2)).reshape(-1, 4)
+    turns = _Part.of(
+        odometry, layout.odometry_unknowns(problem.odometry), problem.odometry.robot[:, None]
+    )
+    if not len(problem.ranges.carried.rows):
+        return [turns, _Part.of(ranges, layout.range_unknowns(problem.ranges), antennas)]
     is_carried = problem.ranges.is_carried
     plain = layout.range_unknowns(problem.ranges.chosen(~is_carried))
     carried = linearised.carried_part(problem, point, ranges)
-    return (
-        (odometry, layout.odometry_unknowns(problem.odometry), problem.odometry.robot[:, None]),
-        (ranges.chosen(~is_carried), plain, antennas[~is_carried]),
-        (carried, layout.carried_unknowns(problem.ranges), antennas[is_carried]),
-    )
+    return [
+        turns,
+        _Part.of(ranges.chosen(~is_carried), plain, antennas[~is_carried]),
+        _Part.of(carried, layout.carried_unknowns(problem.ranges), antennas[is_carried]),
+    ]
+
+
+def _variances(equations: Equations, parts: list[_Part], factor: Solver) -> Array | None:
+    layout, columns = equations.layout, 3 * len(equations.problem.priors.scale)
+    size = layout.band + layout.border
+    shared, at, own, both = [], [], [], []
+    for part in parts:
+        weighed = by_weight(part.mine, part.factors.information)
+        some = np.flatnonzero((part.unknowns != NOWHERE).any(axis=1))
+        # what is no unknown goes beyond them
+        unknowns = np.where(part.unknowns == NOWHERE, size, part.unknowns)[some]
+        by = part.jacobian[some]
+        shared += [np.einsum("dm,cdm->cm", each, by).ravel() for each in weighed]
+        at.append((unknowns * columns + part.which[:, None]).ravel())
+        own += [np.einsum("dm,kdm->km", each, part.mine).ravel() for each in weighed]
+        both.append((part.which[:, None] * columns + part.which).ravel())
+    sums = np.bincount(np.concatenate(at), np.concatenate(shared), (size + 1) * columns)
+    coupling = sums.reshape(-1, columns)[:size]
+    known = factor.squared(coupling)
+    if known is None:
+        return None
+    squares = np.bincount(np.concatenate(both), np.concatenate(own), columns**2)
+    alone = squares.reshape(columns, columns) + WITHOUT_DATA**-2 * np.eye(columns)
+    return np.asarray(alone - known)
+
+
+def _pulls(equations: Equations, parts: list[_Part]) -> Array:
+    pull = np.zeros(3 * len(equations.problem.priors.scale))
+    for part in parts:
+        each = np.einsum("md,kdm->km", part.factors.pull, part.mine)
+        pull += np.bincount(part.which.ravel(), each.ravel(), len(pull))
+    return pull
 
 
 def let_go(doubted: Doubted, found: Scores) -> Doubted:

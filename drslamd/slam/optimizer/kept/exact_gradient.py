@@ -49,7 +49,7 @@ def exact_gradient(equations: Equations, point: Point) -> Array:
         turn += np.bincount(part.j, part.turn_j, len(at))
     gradient[layout.poses] = np.column_stack([at.real, at.imag, turn])
     gradient[layout.bias] = np.bincount(problem.ranges.pair, ranges, problem.pairs)
-    gradient[layout.near_bias] = ranges @ problem.model.near_range_shape(problem.ranges.measured)
+    gradient[layout.near_bias] = ranges @ problem.ranges.near_range_shape(problem.model)
     scale, yaw = _of_odometry(problem, point, pull, ranges)
     gradient[layout.scale], gradient[layout.yaw] = scale, yaw
     doubted = problem.doubted

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drslamd.slam.optimizer.banded.assembly import System
 from drslamd.slam.optimizer.banded.lapack import cholesky_solved
 from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout, border_poses
-from drslamd.slam.optimizer.banded.normal_equations import Equations, System
+from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
 from drslamd.slam.optimizer.kept.elimination import SINGLE, Elimination, Rest, eliminated
@@ -252,3 +253,7 @@ class Current:
         out = np.empty_like(columns)
         out[inside], out[self.numbers] = inner, top
         return out.reshape(right.shape)
+
+    def squared(self, right: Array) -> Array:
+        """See `Solver.squared`."""
+        return np.asarray(right.T @ self.solved(right))

@@ -15,6 +15,7 @@ from drslamd.slam import se2
 from drslamd.slam.calibration.range_scatter import LEAST_SCATTER
 from drslamd.slam.optimizer.banded import banded_solver, claims, mountings
 from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem
+from drslamd.slam.optimizer.banded.misfit import lately_wrong
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import raised
 from drslamd.slam.optimizer.banded.point import Point
@@ -194,7 +195,7 @@ def _said(
         odometry_level=np.ones(len(level)),
         feared_level=level,
         late_level=level,
-        contradicted=quick_check.lately_wrong(problem, point),
+        contradicted=lately_wrong(problem, point),
         doubted=claims.still_doubted(problem.doubted, point.calibration, spread),
         freed=problem.freed,
     )

@@ -10,9 +10,9 @@ from slam_scenes import Array
 
 from drslamd.slam import headway
 from drslamd.slam.optimizer.banded import band_factor
+from drslamd.slam.optimizer.banded.assembly import System
 from drslamd.slam.optimizer.banded.band_factor import ROOM, BandFactor, selected_inverse
 from drslamd.slam.optimizer.banded.layout import NOWHERE
-from drslamd.slam.optimizer.banded.normal_equations import System
 
 
 def a_system(poses: int, reach: int, border: int, seed: int = 0) -> System:

@@ -13,8 +13,14 @@ from slam_problems import held_at, stuck, team_problem
 from slam_scenes import Array
 
 from drslamd.slam.optimizer.banded import newton_descent
-from drslamd.slam.optimizer.banded.newton_descent import descend
-from drslamd.slam.optimizer.banded.normal_equations import Equations, System
+from drslamd.slam.optimizer.banded.assembly import System
+from drslamd.slam.optimizer.banded.band_factor import BandFactor
+from drslamd.slam.optimizer.banded.newton_descent import (
+    FIRST_DAMPING,
+    LITTLE_DAMPING,
+    descend,
+)
+from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.bias_prior import WHOLE
 from drslamd.slam.optimizer.problem import Problem
@@ -98,6 +104,61 @@ def test_near_the_end_the_matrix_is_kept_while_steps_shrink_fast() -> None:
     assert equations.matrices + equations.gradients == point.steps
     assert equations.gradients >= 2
     assert equations.matrices <= 5
+
+
+def driven_on(away_m: float) -> tuple[Problem, Calibration, Point]:
+    """The solution of a team, a start beside it, and what the last keyframes are away from it."""
+    problem, _ = team_problem(3, robots=3, count=60, scale=(0.02, -0.01, 0.01))
+    right = from_start(problem)
+    began = right.poses.copy()
+    began[-3:, 0] += away_m
+    # a way that bends a little, as solutions of two seconds do
+    began[:, 1] += 0.002 * np.sin(np.linspace(0, 3, len(began)))
+    return replace(problem, initial=began, gauge=0), right.calibration, right
+
+
+def test_who_is_near_comes_to_the_end_with_fewer_matrices_because_nothing_holds_it_back() -> None:
+    problem, known, _ = driven_on(0.01)
+    found = []
+    for is_near in (False, True):
+        equations = Counted(problem)
+        found.append((descend(equations, known, MOST, is_near=is_near), equations.matrices))
+    (slow, many), (fast, few) = found
+    assert slow.converged
+    assert fast.converged
+    assert few < many
+    assert fast.steps < slow.steps
+    assert np.abs(slow.poses - fast.poses).max() < 1e-6
+
+
+def test_who_is_not_as_near_as_was_thought_goes_as_from_anywhere() -> None:
+    problem, known, _ = driven_on(0.5)
+    cautious = descend(Equations(problem), known, MOST)
+    found = descend(Equations(problem), known, MOST, is_near=True)
+    assert found.steps == cautious.steps + 1
+    assert np.array_equal(found.poses, cautious.poses)
+
+
+@pytest.mark.parametrize("fault", ["no factor", "no better"])
+def test_a_first_step_in_vain_is_made_anew_with_the_usual_damping(
+    fault: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem, known, _ = driven_on(0.01)
+    tried = []
+    of, is_better = BandFactor.of, newton_descent._is_better
+
+    def factor(system: System, damping: float = 0.0) -> BandFactor | None:
+        tried.append(damping)
+        return None if fault == "no factor" and len(tried) == 1 else of(system, damping)
+
+    def better(*args: Any) -> bool:
+        return is_better(*args) and not (fault == "no better" and len(tried) == 1)
+
+    monkeypatch.setattr(BandFactor, "of", staticmethod(factor))
+    monkeypatch.setattr(newton_descent, "_is_better", better)
+    found = descend(Equations(problem), known, MOST, is_near=True)
+    assert found.converged
+    assert tried[:2] == [LITTLE_DAMPING, FIRST_DAMPING]
 
 
 @pytest.mark.parametrize(("near", "faster", "kept"), [(0.0, 0.25, 0), (math.inf, 1e-9, 1)])

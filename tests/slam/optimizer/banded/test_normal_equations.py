@@ -30,7 +30,7 @@ from slam_scenes import Array
 
 from drslamd.slam.optimizer.banded.banded_solver import solve
 from drslamd.slam.optimizer.banded.layout import BandLayout
-from drslamd.slam.optimizer.banded.normal_equations import Equations, System
+from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE, WEIGHT, WHOLE
 from drslamd.slam.optimizer.mounting_prior import ANTENNA, TRACK
 from drslamd.slam.optimizer.problem import Doubted, Problem
@@ -270,34 +270,3 @@ def test_without_ranges_and_closures_there_are_equations_too() -> None:
     assert equations.cost(point, none) == pytest.approx(float(residuals @ residuals))
     system, _ = equations.at(point)
     assert system.corner.shape == (6, 6)
-
-
-def test_priors_are_added_where_their_unknowns_stand() -> None:
-    system = System(np.zeros((3, 6)), np.zeros((6, 4)), np.zeros((4, 4)))
-    system.add_prior(np.array([2, 7]), np.array([5.0, 3.0]))
-    assert system.band[0].tolist() == [0, 0, 5, 0, 0, 0]
-    assert np.diag(system.corner).tolist() == [0, 3, 0, 0]
-    assert not system.band[1:].any()
-    assert not system.border.any()
-
-
-def test_groups_of_unknowns_of_the_border_are_held_each_by_its_own_matrix() -> None:
-    system = System(np.zeros((3, 3)), np.zeros((3, 5)), np.ones((5, 5)))
-    blocks = np.array([[[4.0, 1.0], [1.0, 3.0]], [[5.0, 2.0], [2.0, 6.0]]])
-    system.add_blocks(np.array([[3, 7], [4, 5]]), blocks)
-    expected = np.ones((5, 5))
-    expected[np.ix_([0, 4], [0, 4])] += blocks[0]
-    expected[np.ix_([1, 2], [1, 2])] += blocks[1]
-    assert np.array_equal(system.corner, expected)
-    assert not system.band.any()
-
-
-def test_unknowns_are_held_beside_one_other() -> None:
-    """x' K x of differences, with K of two unknowns and the other one behind them."""
-    system = System(np.zeros((3, 3)), np.zeros((3, 4)), np.zeros((4, 4)))
-    stiffness = np.array([[4.0, 1.0], [1.0, 3.0]])
-    system.add_difference(np.array([3, 5]), np.array([6]), stiffness)
-    for values in np.random.default_rng(9).normal(size=(5, 4)):
-        apart = values[[0, 2]] - values[3]
-        expected = float(apart @ stiffness @ apart)
-        assert float(values @ system.corner @ values) == pytest.approx(expected)

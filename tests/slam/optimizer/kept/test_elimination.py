@@ -7,7 +7,7 @@ import pytest
 from dense_problems import matrix_of
 from slam_scenes import Array
 
-from drslamd.slam.optimizer.banded.normal_equations import System
+from drslamd.slam.optimizer.banded.assembly import System
 from drslamd.slam.optimizer.kept.elimination import Elimination, Rest, eliminated
 
 

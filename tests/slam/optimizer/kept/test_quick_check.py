@@ -45,7 +45,7 @@ CASES = [
 def test_runs_are_seen_where_there_are_any(sigmas: dict[int, float], expected: bool) -> None:
     problem = a_problem(carried=False)
     point = with_errors(problem, shaken(problem), sigmas)
-    assert quick_check.has_runs(problem, point) is expected
+    assert bool(len(misfit.with_runs(problem, point))) is expected
     assert bool(misfit.runs(problem, point)) is expected
 
 
@@ -58,8 +58,8 @@ def test_pairs_of_which_many_ranges_are_wrong_are_named(share: float) -> None:
     # the newest ones fit, so that there is no run
     error[mine[: int(share * len(mine))]] = 1.0
     point = replace(point, sight=point.sight._replace(error=error))
-    assert not quick_check.has_runs(problem, point)
-    found = quick_check.lately_wrong(problem, point)
+    assert not len(misfit.with_runs(problem, point))
+    found = misfit.lately_wrong(problem, point)
     assert found.tolist() == misfit.contradicted(problem, point).tolist()
 
 

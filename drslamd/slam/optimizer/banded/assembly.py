@@ -1,0 +1,175 @@
+"""A system of band and border, and how factors are added up to one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout
+from drslamd.slam.optimizer.banded.linearised import Linearised
+from drslamd.slam.se2 import Array, Index
+
+SPARSE = 32
+"""Where a matrix has so many times more entries than are added to it, they are added one by one."""
+
+
+@dataclass
+class System:
+    """A symmetric matrix: lower band (w, n), border (n, b) and corner (b, b)."""
+
+    band: Array
+    border: Array
+    corner: Array
+
+    @staticmethod
+    def empty(layout: BandLayout) -> System:
+        return System.of_entries(layout, np.zeros(entries_of(layout)))
+
+    @staticmethod
+    def of_entries(layout: BandLayout, entries: Array) -> System:
+        """Of all entries one after the other, column by column, as LAPACK has them: those of the
+        band, then border and corner as one (n + b, b)."""
+        n, b = layout.band, layout.border
+        of_band = layout.width * n
+        wide = entries[of_band:].reshape(b, n + b).T
+        return System(entries[:of_band].reshape(n, layout.width).T, wide[:n], wide[n:])
+
+    def add_prior(self, unknowns: Index, stiffness: Array | float) -> None:
+        """Add independent priors by the information with which they hold unknowns (k,)."""
+        n = len(self.border)
+        inside = unknowns < n
+        if not inside.any():
+            self.corner[unknowns - n, unknowns - n] += stiffness
+            return
+        stiffness = np.broadcast_to(stiffness, unknowns.shape)
+        self.band[0, unknowns[inside]] += stiffness[inside]
+        outside = unknowns[~inside] - n
+        self.corner[outside, outside] += stiffness[~inside]
+
+    def add_blocks(self, unknowns: Index, stiffness: Array) -> None:
+        """Hold m groups of unknowns (m, d) of the border with information (m, d, d)."""
+        at = unknowns - len(self.border)
+        self.corner[at[:, :, None], at[:, None, :]] += stiffness
+
+    def add_difference(self, unknowns: Index, one: Index, stiffness: Array) -> None:
+        """Hold unknowns (k,) of the border beside one other (1,) with information (k, k)."""
+        n = len(self.border)
+        many, single = unknowns - n, one - n
+        self.corner[many[:, None], many] += stiffness
+        sums = stiffness.sum(axis=0)
+        self.corner[many, single] -= sums
+        self.corner[single, many] -= sums
+        self.corner[single, single] += sums.sum()
+
+
+def entries_of(layout: BandLayout) -> int:
+    """How many numbers a system has."""
+    return layout.width * layout.band + (layout.band + layout.border) * layout.border
+
+
+class Assembly:
+    """Where the blocks of some sets of factors go in the system; the same in every iteration.
+
+    Blocks are symmetric, so each two columns of a Jacobian are multiplied once. All sets are summed
+    at once: numpy takes as long for the few factors of a small team as for those of a large one.
+    """
+
+    def __init__(self, layout: BandLayout, sets: Sequence[Index]) -> None:
+        """
+        Args:
+            sets: (m, c) on which unknowns each factor of a set depends.
+        """
+        self._layout = layout
+        self._columns: list[slice | Index] = []
+        self._unknowns: list[Index] = []
+        for unknowns in sets:
+            # most often no mounting is an unknown
+            some = np.flatnonzero((unknowns != NOWHERE).any(axis=0))
+            is_first = len(some) == 0 or some[-1] == len(some) - 1
+            columns = slice(len(some)) if is_first else some
+            self._columns.append(columns)
+            self._unknowns.append(np.ascontiguousarray(unknowns.T[columns]))
+
+    @cached_property
+    def _places(self) -> tuple[Index, Index]:
+        """Where the products of columns go, those of each set (t, m), in the entries of a system or
+        beyond them; and which of them go to the other side of the corner as well, behind them."""
+        n, width = self._layout.band, self._layout.width
+        high = n + self._layout.border
+        beyond = entries_of(self._layout)
+        at, apart, mirrored, count = [], [], [], 0
+        for unknowns in self._unknowns:
+            one, other = (unknowns[of] for of in np.tril_indices(len(unknowns)))
+            row, column = np.maximum(one, other).ravel(), np.minimum(one, other).ravel()
+            in_band, in_border = column * (width - 1) + row, (row - n) * high + column
+            place = np.where(row < n, in_band, width * n + in_border)
+            place[column == NOWHERE] = beyond
+            twice = np.flatnonzero((column >= n) & (row != column))
+            at.append(place)
+            apart.append(count + twice)
+            mirrored.append(width * n + (column[twice] - n) * high + row[twice])
+            count += len(place)
+        return np.concatenate([*at, *mirrored]), np.concatenate(apart)
+
+    @cached_property
+    def _entries(self) -> Index:
+        """Where the right-hand sides go, likewise."""
+        unknowns = np.concatenate([each.ravel() for each in self._unknowns])
+        unknowns[unknowns == NOWHERE] = self._layout.band + self._layout.border
+        return unknowns
+
+    def matrix(self, sets: Sequence[Linearised]) -> System:
+        """J' W J."""
+        at, apart = self._places
+        products, end = np.empty(len(at)), 0
+        for columns, factors in zip(self._columns, sets, strict=True):
+            jacobian = by_columns(factors.jacobian, columns)
+            weighed = by_weight(jacobian, factors.information)
+            for k, column in enumerate(jacobian):
+                begin, end = end, end + (k + 1) * jacobian.shape[2]
+                out = products[begin:end].reshape(k + 1, -1)
+                if len(column) == 1:
+                    np.multiply(column, weighed[: k + 1, 0], out=out)
+                else:
+                    np.einsum("dm,tdm->tm", column, weighed[: k + 1], out=out)
+        products[end:] = products[apart]
+        return System.of_entries(self._layout, _sums(at, products, entries_of(self._layout)))
+
+    def gradient(self, sets: Sequence[Linearised]) -> Array:
+        """(n + b,) J' f."""
+        each = []
+        for columns, factors in zip(self._columns, sets, strict=True):
+            pull = np.ascontiguousarray(factors.pull.T)
+            jacobian = by_columns(factors.jacobian, columns)
+            each.append(np.einsum("dm,cdm->cm", pull, jacobian).ravel())
+        return _sums(self._entries, np.concatenate(each), self._layout.band + self._layout.border)
+
+
+def by_columns(jacobian: Array, columns: slice | Index = slice(None)) -> Array:
+    """(c, d, m) some columns of Jacobians (m, d, c'), each number of all factors side by side."""
+    return np.ascontiguousarray(jacobian.transpose(2, 1, 0)[columns])
+
+
+def by_weight(jacobian: Array, information: Array) -> Array:
+    """(c, d, m) W J.
+
+    Args:
+        jacobian: (c, d, m) of m factors; information: (m, d, d) W, symmetric.
+    """
+    weight = np.ascontiguousarray(information.transpose(1, 2, 0))
+    weighed = jacobian[:, :1] * weight[0]
+    for k in range(1, len(weight)):
+        weighed += jacobian[:, k, None] * weight[k]
+    return np.asarray(weighed)
+
+
+def _sums(at: Index, values: Array, count: int) -> Array:
+    """(count,) sums of what goes to each place; what goes beyond them is left out."""
+    if len(at) >= count // SPARSE:
+        return np.bincount(at, values, count + 1)[:count]
+    sums = np.zeros(count + 1)
+    np.add.at(sums, at, values)
+    return sums[:count]
