@@ -110,6 +110,16 @@ def doubt(found: Doubt | None) -> str | None:
     )
 
 
+def odometry(is_worse: bool) -> str | None:
+    """One sentence on the own wheels, where poses are told with what they have brought."""
+    if not is_worse:
+        return None
+    return (
+        "odometry is some times as wrong as configured, and poses are less sure by as much; wheels "
+        "slip now and then, of this robot or of all, or [odometry] promises too much"
+    )
+
+
 def _times(level: float) -> str:
     """In few words, so that a sentence stays the same while it means the same."""
     return "over ten times" if level > 10 else "some times"

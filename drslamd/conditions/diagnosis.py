@@ -81,6 +81,7 @@ def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
     yield "pose", _why_not_localised(robot, where, utime)
     doubt = where.doubt
     yield "doubt", contradictions.doubt(doubt)
+    yield "odometry", contradictions.odometry(_is_worse(robot)) if not doubt else None
     yield "partners", contradictions.partners(_doubted_partners(robot) if not doubt else ())
     yield "mounting", _mountings(robot)
     site = robot.standing.site()
@@ -132,6 +133,12 @@ def _load(robot: Stages, utime: int) -> str | None:
 def _doubted_partners(robot: Stages) -> Iterable[int]:
     front = robot.front
     return doubted_partners(front.own.robot, robot.back.estimate, front.watch.doubted)
+
+
+def _is_worse(robot: Stages) -> bool:
+    """Was our odometry much worse than configured, without a reason to doubt where we are?"""
+    estimate = robot.back.estimate
+    return estimate is not None and estimate.has_worse_odometry(robot.front.own.robot)
 
 
 def _mountings(robot: Stages) -> str | None:

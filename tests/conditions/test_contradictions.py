@@ -131,6 +131,15 @@ def test_odometry_is_told_by_few_words_that_stay_the_same(level: float, times: s
     assert "slip" in sentence
 
 
+def test_odometry_that_is_worse_is_told_with_what_it_costs_and_what_to_do() -> None:
+    assert contradictions.odometry(is_worse=False) is None
+    sentence = contradictions.odometry(is_worse=True)
+    assert sentence is not None
+    assert "poses are less sure" in sentence
+    assert "wheels slip" in sentence
+    assert "doubt" not in sentence
+
+
 def test_of_one_witness_both_robots_may_be_at_fault_and_of_two_only_the_own() -> None:
     one = contradictions.doubt(Doubt(0, Reason.RANGES, (4,)))
     two = contradictions.doubt(Doubt(0, Reason.RANGES, (4, 7)))

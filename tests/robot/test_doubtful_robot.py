@@ -9,6 +9,7 @@ import pytest
 from pair_scenes import asked_at
 from robot_scenes import RobotScene, notes, sends, solves, status_in
 
+from drslamd.conditions.diagnosis import conditions
 from drslamd.events import JobDone
 from drslamd.gossip import messages
 from drslamd.gossip.message_types import Pose, PoseState
@@ -64,6 +65,26 @@ def test_the_reason_is_said_with_what_to_do_and_partners_only_where_the_own_pose
     (doubt,) = (note for note in said if note.event.startswith("doubt"))
     assert "slip" in str(doubt.fields)
     assert not any(note.event.startswith("partners") for note in said)
+
+
+@pytest.mark.parametrize(
+    ("feared", "late", "keys"),
+    [
+        (MUCH_WORSE - 0.1, 1.0, []),
+        (MUCH_WORSE, 1.0, ["odometry"]),
+        # said once
+        (MUCH_WORSE, MUCH_WORSE, ["doubt"]),
+    ],
+)
+def test_odometry_that_was_worse_all_along_is_told_though_nobody_is_in_doubt(
+    feared: float, late: float, keys: list[str]
+) -> None:
+    scene = localised(late)
+    estimate = scene.robot.back.estimate
+    assert estimate is not None
+    scene.robot.back.on_solution(replace(estimate, odometry_level={0: feared}))
+    said = {key for key, sentence in conditions(scene.robot, scene.utime) if sentence}
+    assert sorted(said & {"odometry", "doubt"}) == keys
 
 
 def test_who_is_contradicted_by_all_its_partners_names_them() -> None:

@@ -205,6 +205,10 @@ class TeamEstimate:
         """Was odometry of a robot much worse than configured in the last seconds?"""
         return self.late_level.get(robot, 1.0) >= MUCH_WORSE
 
+    def has_worse_odometry(self, robot: int) -> bool:
+        """Must so much be feared of it now?"""
+        return self.odometry_level.get(robot, 1.0) >= MUCH_WORSE
+
     def correction(self, robot: int) -> Correction:
         """Of a robot's odometry."""
         parts = (self.scale, self.yaw, self.turn)

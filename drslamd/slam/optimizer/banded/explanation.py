@@ -1,9 +1,10 @@
 """Is the model one of what was measured, and if not, what is?
 
 A solution as configured is asked three questions: does odometry fit, do ranges fit now, does some
-track or antenna ask to be another one? Most often all is well. Else wheels that stood or spun are
-tried (`lapses`), then mountings (`mountings`), which explain a fault for good, and then odometry
-that was worse for a while (`odometry_levels`).
+track or antenna ask to be another one? Most often all is well. Else, if no mounting asks, odometry
+that was worse all along is tried (`common_level`), then wheels that stood or spun (`lapses`), then
+mountings (`mountings`), which explain a fault for good, and then odometry that was worse for a
+while (`odometry_levels`).
 """
 
 from __future__ import annotations
@@ -12,8 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drslamd.slam.optimizer.banded import mountings, odometry_levels
+from drslamd.slam.optimizer.banded import common_level, mountings, odometry_levels
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
+from drslamd.slam.optimizer.banded.common_level import ASKS, TAILS, pooled
 from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.lapses.known_lapses import settled
 from drslamd.slam.optimizer.banded.misfit import (
@@ -25,7 +27,7 @@ from drslamd.slam.optimizer.banded.misfit import (
 )
 from drslamd.slam.optimizer.banded.mountings import Scores
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.banded.odometry_levels import FEW_OUTLIERS, STANDS_OUT
+from drslamd.slam.optimizer.banded.odometry_levels import FEW_OUTLIERS, STANDS_OUT, TARGET
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.se2 import Array
 
@@ -59,7 +61,7 @@ class _Check:
     """What a solution says of its model.
 
     Attributes:
-        ratio: (robots,) s / g of odometry; 1 as modelled.
+        ratio: (robots,) s / g of odometry; 1 as modelled. pooled: of all together.
         runs: of outliers, that last until now.
         scores: of mountings.
     """
@@ -67,6 +69,7 @@ class _Check:
     ratio: Array
     runs: list[Run]
     scores: Scores
+    pooled: float = 1.0
 
     def is_passed(self) -> bool:
         return not self.runs and bool((self.ratio <= STANDS_OUT).all())
@@ -81,6 +84,10 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
     equations, nominal = settled(equations, nominal, most, tolerance)
     check = _checked(equations, nominal)
     is_fine = check.is_passed() and not check.scores.ask()
+    if not check.scores.ask():
+        common = _in_common(equations, nominal, check, most, tolerance)
+        if common is not None:
+            return common
     if not is_fine or not _fits(equations, nominal):
         lapse = _by_lapse(equations, nominal, most, tolerance)
         if lapse is not None:
@@ -96,6 +103,10 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
             return _as_is(mounted, better, again.ratio)
         if is_worth and gain > MUCH and check.scores.ask_alone():
             bases.insert(0, (mounted, better, again))
+        for base, point, said in bases:
+            common = _in_common(base, point, said, most, tolerance)
+            if common is not None:
+                return common
         if check.is_passed() and not check.scores.ask_alone():
             return _as_is(equations, nominal, check.ratio)
     for base, point, said in bases:
@@ -118,6 +129,24 @@ def _by_lapse(
     return _as_is(found.equations, found.point, check.ratio) if check.is_passed() else None
 
 
+def _in_common(
+    equations: Equations, nominal: Point, check: _Check, most: int, tolerance: float
+) -> Explanation | None:
+    """Odometry was worse than configured, of all robots alike or of one, if that explains all."""
+    if check.pooled <= ASKS:
+        return None
+    found = common_level.common_level(equations, nominal, most, tolerance)
+    if found is None or (found.ratio > TARGET).any() or not _fits(equations, found.point):
+        return None
+    if runs(equations.problem, found.point):
+        return None
+    feared = 1.0 + TAILS * (found.variance - 1.0)
+    # what is the same for all is in the covariances, and no reason to doubt anybody
+    lately = feared if found.is_alone else np.ones(len(feared))
+    seen = np.sqrt(found.variance)
+    return Explanation(equations, found.point, None, seen, feared, lately)
+
+
 def _fits(equations: Equations, point: Point) -> bool:
     """Are few ranges outliers?"""
     return bool(outlier_share(equations.problem, point).max(initial=0) < FEW_OUTLIERS)
@@ -135,10 +164,12 @@ def _checked(equations: Equations, point: Point) -> _Check:
     factor = BandFactor.of(equations.weighed(point))
     if factor is None:
         return _Check(np.ones(robots), [], Scores(np.zeros(robots), np.zeros(robots)))
-    ratio = guessed_misfit(equations, point, factor).ratio(robot, robots)
+    guessed = guessed_misfit(equations, point, factor)
+    ratio, together = guessed.ratio(robot, robots), pooled(problem, guessed)
     if (ratio > SUSPICIOUS).any():
         ratio = misfit(equations, point, factor).ratio(robot, robots)
-    return _Check(ratio, runs(problem, point), mountings.scores(equations, point, factor))
+    scores = mountings.scores(equations, point, factor)
+    return _Check(ratio, runs(problem, point), scores, together)
 
 
 def _gain(before: Equations, at: Point, after: Equations, better: Point) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 
 from drslamd.slam.optimizer.banded import mountings
 from drslamd.slam.optimizer.banded.band_factor import Solver
+from drslamd.slam.optimizer.banded.common_level import ASKS
 from drslamd.slam.optimizer.banded.explanation import SUSPICIOUS
 from drslamd.slam.optimizer.banded.misfit import (
     guessed_misfit,
@@ -51,12 +52,13 @@ class Freedom:
         sums = np.bincount(odometry.robot, checked, robots)
         return Freedom(sums, np.bincount(odometry.robot, minlength=robots).astype(float))
 
-    def ratio(self, problem: Problem, point: Point) -> Array:
-        """(robots,) s / g now."""
+    def ratio(self, problem: Problem, point: Point) -> tuple[Array, float]:
+        """(robots,) s / g now, and that of all together."""
         robot, robots = problem.odometry.robot, len(self.links)
         squares = np.bincount(robot, squares_of(problem, point), robots)
         links = np.bincount(robot, minlength=robots)
-        return ratio_of(squares, self.checked * links / np.maximum(self.links, 1.0))
+        checked = self.checked * links / np.maximum(self.links, 1.0)
+        return ratio_of(squares, checked), float(ratio_of(squares.sum(), checked.sum()))
 
 
 def misfit_as_modelled(
@@ -72,5 +74,5 @@ def misfit_as_modelled(
     pull = mounting_pulls(problem, point)
     if mountings.scored(problem, pull, variances).ask():
         return None
-    ratio = checked.ratio(problem, point)
-    return ratio if (ratio <= SUSPICIOUS).all() else None
+    ratio, pooled = checked.ratio(problem, point)
+    return ratio if (ratio <= SUSPICIOUS).all() and pooled <= ASKS else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,8 +20,9 @@ from slam_problems import (
 )
 from slam_scenes import Array
 
-from drslamd.slam.optimizer.banded import explanation, mountings, odometry_levels
+from drslamd.slam.optimizer.banded import common_level, explanation, mountings, odometry_levels
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
+from drslamd.slam.optimizer.banded.common_level import TAILS, CommonLevel
 from drslamd.slam.optimizer.banded.explanation import MUCH, Explanation, explain
 from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.misfit import (
@@ -34,7 +36,7 @@ from drslamd.slam.optimizer.banded.misfit import (
 from drslamd.slam.optimizer.banded.mountings import TOGETHER, WORTH, Scores
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.banded.odometry_levels import Levels
+from drslamd.slam.optimizer.banded.odometry_levels import TARGET, Levels, raised
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
@@ -94,7 +96,7 @@ def test_where_all_is_as_configured_nothing_changes(seed: int) -> None:
 
 def test_odometry_that_is_somewhat_worse_is_feared_to_be_as_much_worse_as_it_looks() -> None:
     """The poses are those of the nominal solution; only what is claimed of them grows."""
-    problem = held_at(*team_problem(3, robots=ROBOTS, count=COUNT, link_error=1.6))
+    problem = held_at(*team_problem(3, robots=ROBOTS, count=COUNT, link_error=1.15))
     point = nominal(problem)
     found = explained(problem, point)
     ratio = ratio_of(problem, point, is_guessed=True)
@@ -103,6 +105,63 @@ def test_odometry_that_is_somewhat_worse_is_feared_to_be_as_much_worse_as_it_loo
     assert (found.level == 1).all()
     assert found.feared == pytest.approx(np.maximum(ratio, 1)[problem.odometry.robot])
     assert np.array_equal(found.lately, found.feared)
+
+
+def all_are_worse() -> Problem:
+    return held_at(*team_problem(3, robots=ROBOTS, count=COUNT, link_error=2.5))
+
+
+def test_odometry_that_is_worse_for_all_alike_is_believed_less_and_nobody_doubted() -> None:
+    problem = all_are_worse()
+    point = nominal(problem)
+    found = explained(problem, point)
+    variance = float(found.level[0]) ** 2
+    assert 4 < variance < 9
+    assert (found.level == found.level[0]).all()
+    assert found.feared == pytest.approx(np.full(len(found.level), 1 + TAILS * (variance - 1)))
+    assert (found.lately == 1).all()
+    assert found.other is None
+    believed = Equations(raised(problem, found.level**2, point))
+    again = descend(believed, point.calibration, 60)
+    assert found.point.poses == pytest.approx(again.poses, abs=1e-5)
+
+
+def test_of_one_that_is_worse_alone_so_much_is_feared_of_late_too() -> None:
+    problem, _ = a_team(2)
+    links = links_of(problem, 2, 0, COUNT)
+    noise = np.random.default_rng(5).normal(0, [0.03, 0.03, 0.024], (len(links), 3))
+    found = explained(mismeasured(problem, links, problem.odometry.measured[links] + noise))
+    robot = problem.odometry.robot
+    assert (found.level[robot == 2] > 1.5).all()
+    assert (found.level[robot != 2] == 1).all()
+    assert np.array_equal(found.lately, found.feared)
+
+
+@pytest.mark.parametrize(("ratio", "is_taken"), [(TARGET, True), (TARGET + 0.01, False)])
+def test_what_leaves_one_robot_standing_out_is_not_common(
+    ratio: float, is_taken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = all_are_worse()
+    really = common_level.common_level
+
+    def one_stands_out(*arguments: Any) -> CommonLevel | None:
+        found = really(*arguments)
+        return found and replace(found, ratio=np.array([1.0, ratio, 1.0, 1.0]))
+
+    monkeypatch.setattr(common_level, "common_level", one_stands_out)
+    level = explained(problem).level
+    assert bool((level == level[0]).all() and level[0] > 1) is is_taken
+
+
+@pytest.mark.parametrize(("asks", "is_asked"), [(0.99, True), (1.01, False)])
+def test_it_is_looked_into_where_all_together_are_worse(
+    asks: float, is_asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = all_are_worse()
+    check = explanation._checked(Equations(problem), nominal(problem))
+    monkeypatch.setattr(explanation, "ASKS", asks * check.pooled)
+    monkeypatch.setattr(explanation, "STANDS_OUT", 99.0)
+    assert bool(explained(problem).level.max() > 1) is is_asked
 
 
 def test_a_scale_that_is_far_off_is_learned_and_no_fault() -> None:

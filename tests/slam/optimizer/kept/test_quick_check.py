@@ -10,6 +10,7 @@ from kept_scenes import a_problem, shaken
 
 from drslamd.slam.optimizer.banded import misfit, mountings
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
+from drslamd.slam.optimizer.banded.common_level import ASKS
 from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
@@ -84,6 +85,27 @@ def test_a_misfit_is_told_where_all_is_as_modelled_and_not_where_it_is_not() -> 
     assert quick_check.misfit_as_modelled(problem, worse, checked, left) is None
 
 
+@pytest.mark.parametrize(("off", "is_modelled"), [(0.001, False), (-0.001, True)])
+def test_robots_that_are_worse_only_together_are_looked_at_closer(
+    off: float, is_modelled: bool
+) -> None:
+    problem = a_problem()
+    equations = Equations(problem)
+    point = descend(equations, Calibration.zero(problem.pairs, 3), 40)
+    factor = BandFactor.of(equations.weighed(point))
+    assert factor is not None
+    left = mountings.variances(equations, point, factor)
+    assert left is not None
+    squares = misfit.squares_of(problem, point)
+    robot = problem.odometry.robot
+    links = np.bincount(robot, minlength=3).astype(float)
+    s = np.bincount(robot, squares, 3)
+    # each has a third of what makes both sides alike, and nobody stands out
+    checked = quick_check.Freedom(s * ((s.sum() + 1) / (ASKS + off) - 1) / s.sum(), links)
+    found = quick_check.misfit_as_modelled(problem, point, checked, left)
+    assert (found is not None) is is_modelled
+
+
 def test_what_could_be_checked_grows_with_the_way() -> None:
     """Twice as many links as then: twice the freedom, and what fitted fits."""
     problem = a_problem()
@@ -93,4 +115,6 @@ def test_what_could_be_checked_grows_with_the_way() -> None:
     then = quick_check.Freedom(np.array([7.0, 20.0, 0.0]), links / [1, 2, 1])
     s = [squares[robot == k].sum() for k in range(3)]
     expected = [(s[0] + 1) / (7 + 1), (s[1] + 1) / (40 + 1), s[2] + 1]
-    assert then.ratio(problem, point) == pytest.approx(expected)
+    ratio, pooled = then.ratio(problem, point)
+    assert ratio == pytest.approx(expected)
+    assert pooled == pytest.approx((sum(s) + 1) / (7 + 40 + 1))
