@@ -42,7 +42,7 @@ class Leg:
         """Of a robot of a solution, from its last solved pose."""
         level = estimate.odometry_level.get(robot, 1.0)
         start = estimate.trajectories[robot].poses[-1]
-        return Leg(start, noise, level, estimate.correction(robot))
+        return Leg(start, estimate.noise_left(robot, noise), level, estimate.correction(robot))
 
     def go(self, before: Sequence[float], after: Sequence[float], s: float) -> None:
         """One step of odometry, between two poses (3,) o_T_i of it that are `s` seconds apart."""

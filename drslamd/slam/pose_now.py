@@ -37,11 +37,11 @@ def pose_now(
         wide = known + np.diag([aside**2, aside**2, 0.0])
         return PoseNow(now * GRID_US, solved.poses[-1].copy(), wide)
     pose = se2.compose(solved.poses[-1], step[-1])
-    level = estimate.odometry_level.get(robot, 1.0)
+    level, left = estimate.odometry_level.get(robot, 1.0), estimate.noise_left(robot, noise)
     return PoseNow(
         now * GRID_US,
         np.append(pose[:2], se2.wrap(pose[2])),
-        carried(known, float(solved.poses[-1, 2]), step, noise, level, last),
+        carried(known, float(solved.poses[-1, 2]), step, left, level, last),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from drslamd.conventions import Chain, Segment
 from drslamd.near.leg import Leg
 from drslamd.near.relative import relatives
 from drslamd.slam import se2
-from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
+from drslamd.slam.graph.estimate import Learned, TeamEstimate, Trajectory
 
 POSES = {4: np.array([1.0, 2.0, 0.5]), 9: np.array([-3.0, 4.0, -2.5]), 2: np.array([0.5, 0, 3.0])}
 ROOT = np.random.default_rng(1).normal(0, 0.05, (9, 9))
@@ -75,6 +76,15 @@ def test_what_both_are_wrong_in_alike_is_no_error_of_one_seen_from_the_other() -
     own, peer = Leg.of(team, 4, NOISE), Leg.of(team, 9, NOISE)
     _, covariance = relatives(team, 4, own, {9: peer}).seen_from(own.end, own.added)
     assert np.abs(covariance).max() < 1e-12
+
+
+def test_a_leg_is_as_unsure_of_its_length_as_what_was_learned_of_the_scale() -> None:
+    wide, narrow = replace(NOISE, scale=0.2), replace(NOISE, scale=0.05)
+    known = replace(TEAM, scale={4: Learned(0.0, math.sqrt(0.05**2 - 0.01**2))})
+    found, expected = Leg.of(known, 4, wide), Leg.of(TEAM, 4, narrow)
+    for leg in (found, expected):
+        leg.along(WAYS[4])
+    assert np.allclose(found.added, expected.added)
 
 
 def test_nobody_is_seen_where_nobody_is_known() -> None:

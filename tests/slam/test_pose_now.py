@@ -173,6 +173,13 @@ def test_odometry_that_is_believed_less_adds_so_much_more() -> None:
     assert np.array_equal(others.covariance, usual.covariance)
 
 
+def test_a_scale_that_was_learned_adds_what_is_left_of_it() -> None:
+    team = replace(estimate(), scale={4: Learned(0.0, 1e-9)})
+    wide = replace(NOISE, scale=0.2)
+    assert np.allclose(known(wide, team).covariance, known(replace(NOISE, scale=0.01)).covariance)
+    assert known(wide).covariance[0, 0] > known(wide, team).covariance[0, 0] + 0.01
+
+
 def test_a_point_that_begins_to_drive_may_be_anywhere_on_a_circle() -> None:
     """It is said to be where it stood, as uncertain as it is far from there."""
     stood = known(team=replace(estimate(), points=frozenset([4])))

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from drslamd.slam import se2
-from drslamd.slam.graph.estimate import Learned, TeamEstimate
+from drslamd.slam.graph.estimate import LEAST_SCALE, Learned, TeamEstimate
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.mounting import LEARNED, Repair
 from drslamd.slam.odometry.noise import OdometryNoise
@@ -34,8 +34,6 @@ from drslamd.slam.se2 import Array
 
 ODD_YAW = math.radians(0.6)
 """rad/m. Wheels of unlike size; what is usual is noise of a long way."""
-LEAST_SCALE = 0.01
-"""Floors and loads change wheels by so much."""
 
 
 class EndCalibration(NamedTuple):

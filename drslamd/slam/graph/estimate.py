@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from drslamd.conventions import Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.odometry.correction import Correction
+from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.se2 import Array, Index
 
 
@@ -50,6 +52,10 @@ class Lifted:
 
 MUCH_WORSE = 3.0
 """Times the configured sigma of odometry: as modelled it is below 2."""
+
+
+LEAST_SCALE = 0.01
+"""Floors and loads change wheels by so much, whatever was learned."""
 
 
 class Learned(NamedTuple):
@@ -213,6 +219,11 @@ class TeamEstimate:
         """Of a robot's odometry."""
         parts = (self.scale, self.yaw, self.turn)
         return Correction(*(part.get(robot, Learned()).value for part in parts))
+
+    def noise_left(self, robot: int, noise: OdometryNoise) -> OdometryNoise:
+        """What is left of the noise of a robot's odometry where its scale was learned."""
+        sigma = self.scale.get(robot, Learned()).sigma
+        return replace(noise, scale=min(noise.scale, math.hypot(sigma, LEAST_SCALE)))
 
     def rows_of(self, number: int) -> Index:
         """(3,) where x, y, theta of the last pose of anybody are in `joint`.

@@ -11,14 +11,13 @@ from slam_scenes import NOISE, Array, curved_window, inverted, product, same_pos
 
 from drslamd.conventions import Segment
 from drslamd.slam.calibration.window_calibration import (
-    LEAST_SCALE,
     ODD_YAW,
     EndCalibration,
     PairCalibration,
     calibrated_window,
     remaining,
 )
-from drslamd.slam.graph.estimate import Learned, TeamEstimate
+from drslamd.slam.graph.estimate import LEAST_SCALE, Learned, TeamEstimate
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.range_model import LINKTRACK, RangeNoise
 from drslamd.slam.relative_pose.estimate import PairNoise

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from slam_scenes import inverted, product, same_pose
+from slam_scenes import NOISE, inverted, product, same_pose
 
 from drslamd.conventions import Chain, Segment
-from drslamd.slam.graph.estimate import Learned, TeamEstimate, Trajectory
+from drslamd.slam.graph.estimate import LEAST_SCALE, Learned, TeamEstimate, Trajectory
 from drslamd.slam.odometry.correction import Correction
 
 
@@ -31,6 +31,20 @@ def test_each_robot_has_its_block_in_the_order_of_the_trajectories() -> None:
         assert found is not None
         first = 30 * number
         assert found.tolist() == [[first + 9 * row + k for k in range(3)] for row in range(3)]
+
+
+@pytest.mark.parametrize(
+    ("learned", "left"),
+    [({}, 0.1), ({4: 0.03}, math.hypot(0.03, LEAST_SCALE)), ({4: 0.2}, 0.1), ({9: 0.03}, 0.1)],
+)
+def test_a_scale_that_was_learned_is_wrong_no_longer(
+    learned: dict[int, float], left: float
+) -> None:
+    scale = {robot: Learned(0.05, sigma) for robot, sigma in learned.items()}
+    team, noise = replace(estimate_of([4, 9], 2), scale=scale), replace(NOISE, scale=0.1)
+    found = team.noise_left(4, noise)
+    assert found.scale == pytest.approx(left)
+    assert found == replace(noise, scale=found.scale)
 
 
 def test_of_robots_beyond_those_that_are_claimed_and_of_strangers_nothing_is_known() -> None:

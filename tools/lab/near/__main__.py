@@ -1,11 +1,13 @@
 """How honest, how fresh and how dear the pose to steer by is.
 
-usage: python -m lab.near [--seeds N] [--seconds S] [--robots N ...] [--recording FILE ...]
+usage: python -m lab.near [--seeds N] [--first N] [--world NAME ...] [--seconds S] [--robots N ...]
+                          [--recording FILE ...]
 
 Three figures: squared errors of poses relative to peers over what was claimed, in the paper's
-experiment and in recordings; the age of poses at whoever reads the local socket, while module 3 of
-a team so large computes without a pause; the share of a core that telling takes. The last two need
-a quiet machine; `--robots` without a number leaves them out, `--seeds 0` the first.
+experiment, in worlds of short drives (`lab.trust.worlds`) and in recordings; the age of poses at
+whoever reads the local socket, while module 3 of a team so large computes without a pause; the
+share of a core that telling takes. The last two need a quiet machine; `--robots` without a number
+leaves them out, `--seeds 0` the first.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -22,18 +24,28 @@ from lab.near import age, pairs
 from lab.progress import Progress
 from lab.recordings import readers
 from lab.recordings.recording import Recording
+from lab.recordings.world import simulate
 from lab.reproduce import experiment
 from lab.reproduce.tally import Tally
+from lab.trust.worlds import CONFIGURED, RECORDED
 
 LEAST, MOST = 0.8, 1.25
 MOST_AGE_MS, MOST_SHARE = 5.0, 0.01
 HZ = 50
+WORLDS: dict[str, Callable[[int], Recording]] = {
+    "reproduce": lambda seed: experiment.trial(seed).recording,
+    "configured": lambda seed: simulate(CONFIGURED, seed),
+    "recorded": lambda seed: simulate(RECORDED, seed),
+}
+"""What a seed is played of."""
 
 
 def main() -> int:
     """Print every figure beside its goal; 1 when one is missed."""
     parser = argparse.ArgumentParser(prog="lab.near", description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--first", type=int, default=1, help="seed")
+    parser.add_argument("--world", nargs="*", default=["reproduce"], choices=tuple(WORLDS))
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--robots", type=int, nargs="*", default=[3, 50])
     parser.add_argument("--recording", type=Path, nargs="*", default=[], metavar="FILE")
@@ -46,10 +58,10 @@ def main() -> int:
         missed += _row(f"{robots} robots, age of the pose, p99", p99, "ms", MOST_AGE_MS)
         share = HZ * cost_us / 1e6
         missed += _row(f"{robots} robots, telling, share of a core", share, "", MOST_SHARE)
-    if options.seeds:
-        seeds = range(1, options.seeds + 1)
-        played = ((seed, experiment.trial(seed).recording) for seed in seeds)
-        missed += _honesty("tools/reproduce", played, len(seeds))
+    seeds = range(options.first, options.first + options.seeds)
+    for name in options.world if options.seeds else ():
+        played = ((seed, WORLDS[name](seed)) for seed in seeds)
+        missed += _honesty(name, played, len(seeds))
     for path in options.recording:
         recording = pairs.on_axles(readers.read(path))
         missed += _honesty(recording.name, [(1, recording)], 1)

@@ -19,6 +19,7 @@ from drslamd.slam.optimizer.banded.common_level import ASKS, TAILS, pooled
 from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.lapses.known_lapses import settled
 from drslamd.slam.optimizer.banded.misfit import (
+    LEAST_FEARED,
     Run,
     guessed_misfit,
     misfit,
@@ -154,7 +155,7 @@ def _fits(equations: Equations, point: Point) -> bool:
 
 def _as_is(equations: Equations, point: Point, ratio: Array) -> Explanation:
     robot = equations.problem.odometry.robot
-    feared = np.maximum(ratio, 1.0)[robot]
+    feared = np.maximum(ratio, LEAST_FEARED)[robot]
     return Explanation(equations, point, None, np.ones(len(robot)), feared, feared)
 
 

@@ -15,7 +15,7 @@ from drslamd.slam import se2
 from drslamd.slam.calibration.range_scatter import LEAST_SCATTER
 from drslamd.slam.optimizer.banded import banded_solver, claims, mountings
 from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem
-from drslamd.slam.optimizer.banded.misfit import lately_wrong
+from drslamd.slam.optimizer.banded.misfit import LEAST_FEARED, lately_wrong
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import raised
 from drslamd.slam.optimizer.banded.point import Point
@@ -81,8 +81,8 @@ class Kept:
     Attributes:
         downwards: of the system that leads to the solution; claimed: of what may be claimed there.
         sure: when that was made.
-        variances: of the mountings, see `mountings.variances`; checked: of odometry; both of when
-            `downwards` was made.
+        variances: of the mountings, see `mountings.variances`, of when `downwards` was made.
+        checked: of odometry, made anew as the way grows.
     """
 
     downwards: KeptFactor
@@ -125,12 +125,14 @@ def _solved(
     variances = kept.variances if kept else mountings.variances(equations, point, current)
     if variances is None:
         return None
-    checked = kept.checked if kept else Freedom.of(equations, point, current)
+    is_fresh = kept is not None and kept.checked.is_fresh(problem)
+    checked = kept.checked if kept and is_fresh else Freedom.of(equations, point, current)
     ratio = quick_check.misfit_as_modelled(problem, point, checked, variances)
     if ratio is None:
         return None
     scatter = claims.scatter_of(problem, point)
-    sure = Sureness.of(team, scatter, np.maximum(ratio, 1.0))
+    counted = claims.claimed_scatter(problem, point)
+    sure = Sureness.of(team, counted, np.maximum(ratio, LEAST_FEARED))
     believed = sure.believed(problem, point)
     known = kept.claimed if kept and not sure.has_moved(kept.sure) else None
     claimed = _matrix(known, believed, pairs, with_blocks=False)

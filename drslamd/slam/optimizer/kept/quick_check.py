@@ -26,13 +26,17 @@ from drslamd.slam.optimizer.kept.exact_gradient import mounting_pulls
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array
 
+GROWN = 1.1
+"""Times as many links as when a freedom was computed."""
+
 
 @dataclass(frozen=True)
 class Freedom:
     """What the other measurements could check of each robot's odometry, some seconds ago.
 
-    It grows with the way, as the links do. To compute it takes as long as several steps, and a
-    sigma goes with the fourth root of it.
+    It grows with the way, as the links do or faster: the more ranges there are, the more each link
+    is checked. To compute it takes as long as several steps, so it is done again when there are a
+    tenth more links.
 
     Attributes:
         checked: (robots,) g, see `misfit`; links: (robots,) of so many.
@@ -51,6 +55,11 @@ class Freedom:
         checked = guessed_misfit(equations, point, matrix).checked
         sums = np.bincount(odometry.robot, checked, robots)
         return Freedom(sums, np.bincount(odometry.robot, minlength=robots).astype(float))
+
+    def is_fresh(self, problem: Problem) -> bool:
+        """Have the robots not driven much further since?"""
+        links = np.bincount(problem.odometry.robot, minlength=len(self.links))
+        return bool((links <= GROWN * self.links).all())
 
     def ratio(self, problem: Problem, point: Point) -> tuple[Array, float]:
         """(robots,) s / g now, and that of all together."""

@@ -67,6 +67,12 @@ def test_a_team_that_drives_on_is_solved_from_what_was_kept_and_stays_right() ->
     seconds = list(driven(MetTeam(4, 70, 40), 24))
     assert all(second.is_right() for second in seconds)
     assert sum(second.began_anew for second in seconds[4:]) <= 2
+    # what could be checked of odometry is not that of long ago
+    for second in seconds:
+        assert isinstance(second.found.kept, kept_solver.Kept)
+        then = second.found.kept.checked.links
+        now = [len(path.n) - 1 for path in second.found.trajectories.values()]
+        assert (now <= quick_check.GROWN * then).all()
 
 
 @pytest.mark.slow

@@ -118,3 +118,13 @@ def test_what_could_be_checked_grows_with_the_way() -> None:
     ratio, pooled = then.ratio(problem, point)
     assert ratio == pytest.approx(expected)
     assert pooled == pytest.approx((sum(s) + 1) / (7 + 40 + 1))
+
+
+@pytest.mark.parametrize(("times", "is_fresh"), [(1.09, True), (1.11, False)])
+def test_what_could_be_checked_is_fresh_until_one_robot_has_a_tenth_more_links(
+    times: float, is_fresh: bool
+) -> None:
+    problem = a_problem()
+    links = np.bincount(problem.odometry.robot, minlength=3).astype(float)
+    then = quick_check.Freedom(np.ones(3), links / [1.0, times, 1.0])
+    assert then.is_fresh(problem) is is_fresh
