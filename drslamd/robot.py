@@ -63,7 +63,6 @@ from drslamd.slam.front_end import FrontEnd
 from drslamd.slam.graph.estimate import PoseNow
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.public_poses import PublicPoses
-from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.relocation.last_place import LastPlace
 from drslamd.slam.settings import closure_method
 from drslamd.slam.tuning import DEFAULTS, Tuning
@@ -117,6 +116,7 @@ class Robot:
         self.slept: Slept | None = None
         self.jobs = Jobs()
         self.neighbourhood = Neighbourhood(self.own, self.team, self.front)
+        self.neighbours = self.neighbourhood.at
         self.modules = Modules(self.front, self.back, self.team, self.jobs, self.neighbours)
         self.timers = Timers(self._periods())
         self.memory = Memory(self.own, self.team.seal, self.calibration, place)
@@ -229,15 +229,12 @@ class Robot:
         self.neighbourhood.look_again()  # the clocks of peers were compared with ours
         status += self.broadcast.hypotheses(neighbours, utime)
         # solutions come with news; that a pose grew old or doubtful is said without any
-        is_odd = where.is_old or where.doubt
-        return [*status, *(self.broadcast.pose(where, utime) if is_odd else [])]
+        if where.is_old or where.doubt:
+            status += self.broadcast.pose(where, utime)
+        return status
 
     def _send_odometry(self, utime: int) -> list[Effect]:
         return self.broadcast.odometry(self.neighbours(utime), utime)
-
-    def neighbours(self, utime: int) -> list[PeerInRange]:
-        """Living peers within UWB range of us, as either side measures it."""
-        return self.neighbourhood.at(utime)
 
     # our log
 
