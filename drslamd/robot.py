@@ -43,6 +43,7 @@ from drslamd.events import (
     Write,
 )
 from drslamd.gossip.bounds import is_sayable
+from drslamd.gossip.membership.neighbourhood import Neighbourhood
 from drslamd.gossip.message_types import OdometryBatch
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.seal import Seal
@@ -51,7 +52,6 @@ from drslamd.jobs import OPTIMIZER, RELATIVE_POSE, Jobs
 from drslamd.memory import Memory
 from drslamd.modules import Modules
 from drslamd.near.surroundings import Surroundings
-from drslamd.neighbourhood import Neighbourhood
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
 from drslamd.sensors.samples import Motion
 from drslamd.sensors.wheels.wheel_input import WheelInput
@@ -115,7 +115,7 @@ class Robot:
         self.network: NetworkState | None = None
         self.slept: Slept | None = None
         self.jobs = Jobs()
-        self.neighbourhood = Neighbourhood(self.own, self.team, self.front)
+        self.neighbourhood = Neighbourhood(self.own, self.team.living, self.front.ranged)
         self.neighbours = self.neighbourhood.at
         self.modules = Modules(self.front, self.back, self.team, self.jobs, self.neighbours)
         self.timers = Timers(self._periods())
@@ -161,9 +161,7 @@ class Robot:
     def handle(self, event: Event) -> list[Effect]:
         """Take one event; what follows from it."""
         effects, outbox = self._handlers[type(event)](event), self.outbox
-        if not effects:
-            return effects
-        if self.memory.is_listening(event.utime):
+        if not effects or self.memory.is_listening(event.utime):
             return [e for e in effects if not isinstance(e, Send)]
         return [e for e in effects if not isinstance(e, Send) or outbox.passes(e, event.utime)]
 

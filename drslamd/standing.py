@@ -132,7 +132,7 @@ class Standing:
             if joined:
                 yield Asked(JOINING, joined, front.joiner.on_found)
         own = self._own_end()
-        if own is None or not is_free(POINTS, utime):
+        if own is None or not front.points.is_due(utime) or not is_free(POINTS, utime):
             return
         targets = point_targets(
             front.ranges.fresh(utime), neighbours, carrier, back.graph, back.estimate, utime

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 from drslamd.conventions import MILLISECOND_US, SECOND_US
 from drslamd.events import Effect
@@ -22,6 +23,15 @@ Action = Callable[[int], list[Effect]]
 """Gets the time, us, and says what follows."""
 
 
+@dataclass
+class _Round:
+    """An action, its period and when it is due, us; None before the first look."""
+
+    action: Action
+    period: int
+    due: int | None = None
+
+
 class Timers:
     """Actions that come round.
 
@@ -34,19 +44,18 @@ class Timers:
         Args:
             periods: us, in the order in which actions of one moment are taken.
         """
-        self._periods = periods
-        self._due: dict[Action, int] = {}
+        self._rounds = [_Round(action, period) for action, period in periods.items()]
         self.next = 0
 
     def take_due(self, utime: int) -> list[Action]:
         """The actions whose time has come; each is then due again after its period."""
         taken = []
-        for action, period in self._periods.items():
-            due = self._due.setdefault(action, utime)
+        for each in self._rounds:
+            due = utime if each.due is None else each.due
             if utime >= due:
                 # after a stall the timer starts afresh instead of catching up in a burst
-                is_late = utime - due > period
-                self._due[action] = utime + period if is_late else due + period
-                taken.append(action)
-        self.next = min(self._due.values())
+                due = (utime if utime - due > each.period else due) + each.period
+                taken.append(each.action)
+            each.due = due
+        self.next = min(each.due for each in self._rounds if each.due is not None)
         return taken

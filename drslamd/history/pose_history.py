@@ -19,17 +19,16 @@ class PoseHistory:
     """A ring of rows."""
 
     def __init__(self) -> None:
-        self._ring = np.zeros((0, len(COLUMNS)))
+        self._ring = np.zeros((MOST, len(COLUMNS)))
         self._count = 0
 
     def add(self, row: list[float]) -> None:
         """One that was published, as `COLUMNS` name its numbers."""
-        if len(self._ring) < MOST:
-            self._ring = np.vstack([self._ring, row])
-        else:
-            self._ring[self._count % MOST] = row
+        self._ring[self._count % MOST] = row
         self._count += 1
 
     def rows(self) -> Array:
         """(k, 12) in the order in which they came."""
-        return np.roll(self._ring, -(self._count % MOST) if self._count > MOST else 0, axis=0)
+        if self._count <= MOST:
+            return np.array(self._ring[: self._count])
+        return np.roll(self._ring, -(self._count % MOST), axis=0)

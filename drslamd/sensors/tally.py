@@ -24,7 +24,7 @@ class Tally(Generic[Reason]):
 
     @property
     def received(self) -> int:
-        return self.accepted + self.ignored + self.refused.total()
+        return self.accepted + self.ignored + sum(self.refused.values())
 
     def refuse(self, reason: Reason, count: int = 1) -> None:
         self.refused[reason] += count

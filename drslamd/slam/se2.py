@@ -103,7 +103,7 @@ def unpacked(upper: Sequence[float] | Array) -> Array:
 def turned(covariance: Array, theta: Array | float) -> Array:
     """Covariance (..., 3, 3) of (x, y, theta), its axes turned by theta (...)."""
     cos, sin = np.cos(theta), np.sin(theta)
-    zero, one = np.zeros_like(cos), np.ones_like(cos)
-    rows = [[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]]
-    r = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    r = np.zeros((*np.shape(theta), 3, 3))
+    r[..., 0, 0] = r[..., 1, 1] = cos
+    r[..., 0, 1], r[..., 1, 0], r[..., 2, 2] = -sin, sin, 1.0
     return np.asarray(r @ covariance @ np.swapaxes(r, -1, -2))

@@ -59,9 +59,10 @@ ONE_MODULE_M: Final = 3.0
 """Distances to one id in one frame differ by noise and reflections; by more, they are to two."""
 _TAG: Final = 2
 _ANCHOR: Final = 1
-_SHORT_IDS: Final = frozenset({Kind.NODE_FRAME2, Kind.NODE_FRAME3})
+_SHORT_IDS: Final = (Kind.NODE_FRAME2, Kind.NODE_FRAME3)
+"""(Of so few each frame finds its own without a hash.)"""
 _measured: Final = itemgetter("distance_m", "fp_rssi_db", "rx_rssi_db")
-_RANGING: Final = _SHORT_IDS | {Kind.NODE_FRAME5}
+_RANGING: Final = (*_SHORT_IDS, Kind.NODE_FRAME5)
 _REFUSED_KINDS: Final = {
     Kind.ANCHOR_FRAME0: Refusal.LP_MODE,
     Kind.TAG_FRAME0: Refusal.LP_MODE,
@@ -173,10 +174,10 @@ class LinkTrackInput:
         if isinstance(frame, Refusal):
             mark = data[:2].hex(" ").upper()
             return self._refuse(frame, NEWER_KINDS.get(mark, mark), utime)
-        if frame.kind in _REFUSED_KINDS:
-            return self._refuse(_REFUSED_KINDS[frame.kind], frame.kind.name, utime)
         if frame.kind in _RANGING:
             return self._on_ranging(data, frame, utime)
+        if frame.kind in _REFUSED_KINDS:
+            return self._refuse(_REFUSED_KINDS[frame.kind], frame.kind.name, utime)
         if frame.kind is Kind.ERROR_FRAME0:
             self.module_faults = HEALTH_BITS & frame.values["error_bits"]
             self._watch.on_fault(self.module_faults, utime)
@@ -191,8 +192,9 @@ class LinkTrackInput:
             return self._refuse(Refusal.WRONG_ID, shown_id(values["id"]), utime)
         if not MIN_VOLTAGE_V <= values["voltage_v"] <= MAX_VOLTAGE_V:
             return self._refuse(Refusal.VOLTAGE, f"{values['voltage_v']:.1f} V", utime)
-        lead_ms = _lead_ms(frame) if self._lead_is_steady else None
-        head = continuity.head_of(data, frame, lead_ms, utime)
+        lead_ms = _lead_ms(frame)
+        steady_ms = lead_ms if self._lead_is_steady else None
+        head = continuity.head_of(data, frame, steady_ms, utime)
         believed = self._heads.goes_on(head)
         if believed is None:
             return self._refuse(Refusal.STEP, "", utime)
@@ -204,7 +206,7 @@ class LinkTrackInput:
         self.frames.accepted += 1
         self.last_good_utime = utime
         self.voltage_v = values["voltage_v"]
-        self._follow_system_time(frame)
+        self._follow_system_time(lead_ms)
         self._watch.on_good_frame(utime)
         self._look_for_oddities(frame, utime)
         return self._samples(frame, measured)
@@ -232,13 +234,13 @@ class LinkTrackInput:
         self._watch.on_refused(reason, detail, utime)
         return []
 
-    def _follow_system_time(self, frame: Frame) -> None:
+    def _follow_system_time(self, lead_ms: int | None) -> None:
         """system_time leads local_time by a constant until one of the two starts anew."""
-        before, self._lead_ms = self._lead_ms, _lead_ms(frame)
+        before, self._lead_ms = self._lead_ms, lead_ms
         self._lead_is_steady = (
             before is not None
-            and self._lead_ms is not None
-            and abs(wrapped_difference(self._lead_ms, before, TIME_BITS)) <= continuity.LEAD_STEP_MS
+            and lead_ms is not None
+            and abs(wrapped_difference(lead_ms, before, TIME_BITS)) <= continuity.LEAD_STEP_MS
         )
 
     def _samples(self, frame: Frame, measured: int) -> list[RangeSample]:

@@ -222,8 +222,9 @@ class WheelBase:
         return _Path(self._left_sign * left, self._right_sign * right)
 
     def _is_too_far(self, now: _Position) -> bool:
-        turned_m = max(abs(now.left), abs(now.right)) / self._geometry.per_metre
-        return now.values is None and turned_m > MAX_TURNED_M
+        if now.values is not None:
+            return False
+        return max(abs(now.left), abs(now.right)) / self._geometry.per_metre > MAX_TURNED_M
 
     def _is_too_fast(self, path: _Path, elapsed_us: int) -> bool:
         elapsed_s = elapsed_us / SECOND_US

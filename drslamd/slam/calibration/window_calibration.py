@@ -80,9 +80,10 @@ class EndCalibration(NamedTuple):
         Args:
             before: how many of them lie before the reference time.
         """
-        whole = np.insert(poses, before, np.zeros(3), axis=0)
+        whole = np.concatenate([poses[:before], np.zeros((1, 3)), poses[before:]])
         better = Correction(self.scale.value, self.yaw, self.turn).path(whole)
-        return np.delete(se2.between(better[before], better), before, axis=0)
+        seen = se2.between(better[before], better)
+        return np.concatenate([seen[:before], seen[before + 1 :]])
 
 
 class PairCalibration(NamedTuple):

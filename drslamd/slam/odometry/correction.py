@@ -31,7 +31,8 @@ class Correction(NamedTuple):
         bend = self.turn * theta - self.yaw * np.hypot(x, y)
         # what turned too little also went too straight: half of it acts over the step
         xy = se2.rotate(bend / 2, (1 - self.scale) * step[:, :2])
-        heading = poses[0, 2] + np.append(0.0, np.cumsum(theta + bend))
-        way = np.cumsum(se2.rotate(heading[:-1], xy), axis=0)
-        place = np.concatenate([poses[:1, :2], poses[0, :2] + way])
-        return np.column_stack([place, heading])
+        out = np.empty((len(poses), 3))
+        out[0] = poses[0]
+        out[1:, 2] = poses[0, 2] + np.cumsum(theta + bend)
+        out[1:, :2] = poses[0, :2] + np.cumsum(se2.rotate(out[:-1, 2], xy), axis=0)
+        return out

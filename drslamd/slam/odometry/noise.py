@@ -23,7 +23,9 @@ way: a few operations on long rows instead of many small matrices.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -127,14 +129,15 @@ def step_sums(way: Array, middle: Array, seconds: Array | None = None) -> Array:
     """
     x, y = middle[..., 0], middle[..., 1]
     length = np.hypot(way[..., 0], way[..., 1])
-    terms = np.stack([np.ones_like(x), y, -x, y * y, -x * y, x * x], axis=-1)
     out = np.zeros((*length.shape, SUMS))
     out[..., PATH] = length
-    if seconds is None:
-        out[..., WHEELS] = terms * length[..., None]
-    else:
-        out[..., WHEELS] = terms * np.where(seconds > 0, 0.0, length)[..., None]
-        out[..., GYRO] = terms * seconds[..., None]
+    terms = (1.0, y, -x, y * y, -x * y, x * x)
+    by_wheels = length if seconds is None else np.where(seconds > 0, 0.0, length)
+    for column, term in enumerate(terms, WHEELS.start):
+        out[..., column] = term * by_wheels
+    if seconds is not None:
+        for column, term in enumerate(terms, GYRO.start):
+            out[..., column] = term * seconds
     return out
 
 
@@ -147,19 +150,31 @@ def twist_covariance(noise: OdometryNoise, way: Array, sums: Array) -> Array:
         way: (2, m) difference of the places at both ends, m.
         sums: (13, m) difference of `growth` there.
     """
-    forward = forwards(sums)
-    covariance = random_covariance(noise, forward)
-    wx, wy = noise.scale * way
-    rates = [noise.yaw_rad_per_m * forward[[1, 2, 0]]]
+    return np.array(_twist_rows(noise, way, forwards(sums)))
+
+
+def _twist_rows(
+    noise: OdometryNoise, way: Sequence[Any] | Array, forward: Sequence[Any] | Array
+) -> list[Any]:
+    """The six rows of `twist_covariance`, of sums that lead forwards; of one way, numbers."""
+    rows = _random_rows(noise, forward)
+    wx, wy = noise.scale * way[0], noise.scale * way[1]
+    rates = [_turning(noise.yaw_rad_per_m, forward, WHEELS)]
     if noise.gyro is not None:
-        rates.append(noise.gyro.yaw_rad_per_s * forward[GYRO][[1, 2, 0]])
-    covariance[0] += wx * wx + sum(by * by for by, _, _ in rates)
-    covariance[1] += wx * wy + sum(by * bx for by, bx, _ in rates)
-    covariance[2] += sum(by * bs for by, _, bs in rates)
-    covariance[3] += wy * wy + sum(bx * bx for _, bx, _ in rates)
-    covariance[4] += sum(bx * bs for _, bx, bs in rates)
-    covariance[5] += sum(bs * bs for _, _, bs in rates)
-    return covariance
+        rates.append(_turning(noise.gyro.yaw_rad_per_s, forward, GYRO))
+    rows[0] += wx * wx + sum(by * by for by, _, _ in rates)
+    rows[1] += wx * wy + sum(by * bx for by, bx, _ in rates)
+    rows[2] += sum(by * bs for by, _, bs in rates)
+    rows[3] += wy * wy + sum(bx * bx for _, bx, _ in rates)
+    rows[4] += sum(bx * bs for _, bx, bs in rates)
+    rows[5] += sum(bs * bs for _, _, bs in rates)
+    return rows
+
+
+def _turning(rate: float, sums: Sequence[Any] | Array, which: slice) -> tuple[Any, Any, Any]:
+    """How a constant yaw rate moves places by x and y, and what it turns."""
+    first = which.start
+    return rate * sums[first + 1], rate * sums[first + 2], rate * sums[first]
 
 
 def forwards(sums: Array) -> Array:
@@ -169,19 +184,23 @@ def forwards(sums: Array) -> Array:
 
 def random_covariance(noise: OdometryNoise, sums: Array) -> Array:
     """(6, m): the part of `twist_covariance` that is not constant for a robot, of sums (13, m)."""
+    return np.array(_random_rows(noise, sums))
+
+
+def _random_rows(noise: OdometryNoise, sums: Sequence[Any] | Array) -> list[Any]:
+    """The six rows of `random_covariance`; of one way, numbers."""
     s, y, x_neg, yy, xy_neg, xx = sums[WHEELS]
     turn, shift = noise.yaw_rad_per_sqrt_m**2, noise.translation_per_sqrt_m**2
     drawn = shift * sums[PATH]
-    out = np.empty((6, *sums.shape[1:]))
-    out[0] = turn * yy + drawn
-    out[1] = turn * xy_neg
-    out[2] = turn * y
-    out[3] = turn * xx + drawn
-    out[4] = turn * x_neg
-    out[5] = turn * s
-    if noise.gyro is not None:
-        out += noise.gyro.yaw_rad_per_sqrt_s**2 * sums[GYRO][[3, 4, 1, 5, 2, 0]]
-    return out
+    rows = [turn * yy + drawn, turn * xy_neg, turn * y, turn * xx + drawn, turn * x_neg, turn * s]
+    if noise.gyro is None:
+        return rows
+    random = noise.gyro.yaw_rad_per_sqrt_s**2
+    s, y, x_neg, yy, xy_neg, xx = sums[GYRO]
+    return [
+        row + random * by_time
+        for row, by_time in zip(rows, (yy, xy_neg, y, xx, x_neg, s), strict=True)
+    ]
 
 
 def covariance_between(
@@ -196,6 +215,13 @@ def covariance_between(
         i, k: indices (broadcast together).
     """
     way, difference = poses[k, :2] - poses[i, :2], sums[k] - sums[i]
+    if way.ndim == 1:
+        # of one way: plain numbers are faster than arrays of one
+        sum_of_one = difference.tolist()
+        if sum_of_one[PATH] + sum_of_one[GYRO.start] < 0:
+            sum_of_one = [-value for value in sum_of_one]
+        xx, xy, xt, yy, yt, tt = _twist_rows(noise, way.tolist(), sum_of_one)
+        return np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
     return _matrices(
         twist_covariance(noise, np.moveaxis(way, -1, 0), np.moveaxis(difference, -1, 0))
     )

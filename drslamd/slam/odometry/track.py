@@ -8,6 +8,7 @@ across the hole is not known.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -66,11 +67,19 @@ class Track:
 
     def at_time(self, n: Array) -> Array:
         """o_T_a at fractional samples n (k,), linear between neighbours, (k, 3)."""
-        n = np.clip(n, self.n0, self.end - 1)
+        n = np.minimum(np.maximum(n, self.n0), self.end - 1)
         left = np.floor(n).astype(int)
         right = np.minimum(left + 1, self.end - 1)
         before, after = self._poses[left - self.n0], self._poses[right - self.n0]
         return np.asarray((before + (after - before) * (n - left)[:, None]) * RESOLUTION)
+
+    def at_moment(self, n: float) -> Array:
+        """The same at one fractional sample, (3,)."""
+        n = min(max(n, self.n0), self.end - 1)
+        left = math.floor(n)
+        right = min(left + 1, self.end - 1)
+        before, after = self._poses[left - self.n0], self._poses[right - self.n0]
+        return np.asarray((before + (after - before) * (n - left)) * RESOLUTION)
 
     def append(self, n: int, steps: Array | Sequence[float]) -> None:
         """Add sample n; what lies between it and the last one is a hole.

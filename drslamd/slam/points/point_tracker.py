@@ -208,7 +208,7 @@ class PointTracker:
         if not len(found.utime):
             return
         when = int(median(found.utime.tolist()))
-        at, place = anchor(own, when), own.poses(when)[0, :2]
+        at, place = anchor(own, when), own.pose(when)[:2]
         is_still = self._place is not None and np.hypot(*(place - self._place)) < STILL_M
         if at is None or is_still or when <= self._sampled:
             return
@@ -272,7 +272,7 @@ class PointTracker:
         if not len(seen.utime) or not own.track.covers(n, own.track.end - 1):
             return None
         when = median(seen.utime.tolist())
-        step = se2.between(own.track.at(n), own.poses(when)[0])
+        step = se2.between(own.track.at(n), own.pose(when))
         antenna = se2.transform(se2.compose(solved.poses[-1], step), own.data.model.antenna)
         sight = there.poses[-1, :2] - antenna
         distance = max(float(np.hypot(*sight)), 1e-3)

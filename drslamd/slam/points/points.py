@@ -53,6 +53,10 @@ class Points:
         self._left: dict[int, ClosureMeasurement] = {}
         """What is told of modules that are not followed any more, by UWB id."""
 
+    def is_due(self, utime: int) -> bool:
+        """Is it time to look again?"""
+        return utime - self._looked >= EVERY_US
+
     def look(
         self,
         targets: Mapping[int, Target],
@@ -68,7 +72,7 @@ class Points:
         Args:
             targets: what is heard and may stand, by UWB id; carrier: which robot carries a module.
         """
-        if utime - self._looked < EVERY_US:
+        if not self.is_due(utime):
             return None
         self._looked = utime
         self._withdraw_robots(carrier, graph, utime)

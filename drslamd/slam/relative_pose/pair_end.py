@@ -6,6 +6,7 @@ way from the window's end to the nearest keyframe of each robot is odometry on b
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.odometry.track import Track
 from drslamd.slam.relative_pose.window import NO_GYRO
 from drslamd.slam.robot_model import RobotModel
-from drslamd.slam.se2 import Array
+from drslamd.slam.se2 import Array, Index
 
 NEAR_US = 1_500_000
 """A keyframe stands for times so near; farther, only while its robot stands still."""
@@ -49,6 +50,10 @@ class PairEnd:
     def poses(self, utime: Array | float) -> Array:
         """(k, 3) odometry poses at times (k,) of our clock."""
         return self.track.at_time(self.grid(utime))
+
+    def pose(self, utime: float) -> Array:
+        """(3,) odometry pose at one time of our clock."""
+        return self.track.at_moment((utime + self.ahead_us) / GRID_US)
 
     def gyro_span(self, utime: int) -> tuple[float, float]:
         """Seconds after `utime` of our clock from when and until when a gyro gave the heading."""
@@ -87,16 +92,27 @@ def anchor(end: PairEnd, utime: int) -> Anchor | None:
     keyframes = end.data.keyframes
     if not len(keyframes):
         return None
-    n = float(end.grid(utime)[0])
-    at = int(np.argmin(np.abs(keyframes.n - n)))
+    n = (utime + end.ahead_us) / GRID_US
+    at = _nearest(keyframes.n, n)
     number = int(keyframes.n[at])
-    step = se2.between(keyframes.poses[at], end.poses(utime)[0])
+    step = se2.between(keyframes.poses[at], end.pose(utime))
+    x, y, turn = step.tolist()
     is_near = abs(number - n) * GRID_US <= NEAR_US
-    is_still = np.hypot(step[0], step[1]) < STILL_M and abs(step[2]) < STILL_RAD
-    is_unbroken = number >= end.track.segment_start and np.isfinite(step).all()
-    if not is_unbroken or not (is_near or is_still) or np.hypot(step[0], step[1]) > MAX_LEVER_M:
+    is_still = math.hypot(x, y) < STILL_M and abs(turn) < STILL_RAD
+    is_finite = math.isfinite(x) and math.isfinite(y) and math.isfinite(turn)
+    is_unbroken = number >= end.track.segment_start and is_finite
+    if not is_unbroken or not (is_near or is_still) or math.hypot(x, y) > MAX_LEVER_M:
         return None
     return Anchor(number, int(keyframes.segment[at]), step)
+
+
+def _nearest(ascending: Index, n: float) -> int:
+    """Where the nearest of some numbers is, the earlier one of two."""
+    after = int(np.searchsorted(ascending, n))
+    if after in (0, len(ascending)):
+        return max(after - 1, 0)
+    is_before = n - float(ascending[after - 1]) <= float(ascending[after]) - n
+    return after - 1 if is_before else after
 
 
 def at_keyframes(a_T_b: Array, covariance: Array, a: Anchor, b: Anchor) -> tuple[Array, Array]:

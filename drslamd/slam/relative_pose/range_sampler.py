@@ -53,7 +53,7 @@ class RangeSampler:
             return None
         when = int(median(found.utime.tolist()))
         anchor_a, anchor_b = anchor(a, when), anchor(b, when)
-        place = np.concatenate([a.poses(when)[0, :2], b.poses(when)[0, :2]])
+        place = np.concatenate([a.pose(when)[:2], b.pose(when)[:2]])
         is_still = self._place is not None and np.abs(place - self._place).max() < STILL_M
         is_early = is_still and not is_doubted and last - self._utime < STANDING_US
         if anchor_a is None or anchor_b is None or is_early:

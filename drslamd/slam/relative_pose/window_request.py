@@ -75,8 +75,8 @@ def request(
     window = Window(
         t=t,
         ranges=distances,
-        a_poses=se2.between(a.poses(at), a.poses(when)),
-        b_poses=se2.between(b.poses(at), b.poses(when)),
+        a_poses=se2.between(a.pose(at), a.poses(when)),
+        b_poses=se2.between(b.pose(at), b.poses(when)),
         a_antenna=a.data.model.antenna,
         b_antenna=b.data.model.antenna,
         a_gyro=a.gyro_span(at),

@@ -18,6 +18,7 @@ from drslamd.conventions import MAX_ROBOT_ID, Chain
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import PoseNow, TeamEstimate
 from drslamd.slam.peer_in_range import PeerInRange
+from drslamd.slam.se2 import Array
 
 MOST_PEERS = 4
 """One is enough, as long as it goes on."""
@@ -72,14 +73,23 @@ def last_place(
     Args:
         now: our pose in the frame of the solution.
     """
-    seen = [row for peer in neighbours if (row := _seen_from(estimate, now, peer)) is not None]
+    variance = _largest(now.covariance)
+    rows = (_seen_from(estimate, now, variance, peer) for peer in neighbours)
+    seen = [row for row in rows if row is not None]
     seen.sort(key=lambda row: row.sigma_m)
     if not seen or not 0 < speed_mps <= MOST_SPEED_MPS:
         return None
     return LastPlace(speed_mps, tuple(seen[:MOST_PEERS]))
 
 
-def _seen_from(estimate: TeamEstimate, now: PoseNow, peer: PeerInRange) -> SeenFrom | None:
+def _largest(covariance: Array) -> float:
+    """Variance of a place along the way that is known worst."""
+    return float(np.linalg.eigvalsh(covariance[:2, :2])[-1])
+
+
+def _seen_from(
+    estimate: TeamEstimate, now: PoseNow, own_variance: float, peer: PeerInRange
+) -> SeenFrom | None:
     robot = peer.chain.robot
     solved, theirs = estimate.trajectories.get(robot), estimate.covariance(robot)
     if solved is None or solved.chain != peer.chain or not len(solved.n) or theirs is None:
@@ -87,7 +97,7 @@ def _seen_from(estimate: TeamEstimate, now: PoseNow, peer: PeerInRange) -> SeenF
     if robot in estimate.points or peer.ahead_us is None:
         return None
     x, y = se2.transform(se2.inverse(solved.poses[-1]), now.pose[:2]).tolist()
-    variance = sum(float(np.linalg.eigvalsh(c[:2, :2])[-1]) for c in (now.covariance, theirs))
+    variance = own_variance + _largest(theirs)
     sigma = float(np.sqrt(variance + (x * x + y * y) * float(theirs[2, 2])))
     if not sigma <= MOST_SIGMA_M or not max(abs(x), abs(y)) <= MOST_AWAY_M:
         return None

@@ -140,6 +140,10 @@ class Member:
     """What becomes of the bytes that its devices print."""
     running: bool = True
     tick_at: int = -1
+    wanted: tuple[int, Clock] | None = None
+    """When its robot wants to be woken, on its clock ..."""
+    wanted_at: int = 0
+    """... and in the world, us."""
     asleep_until: int = 0
     """Its computer is suspended until then, us."""
     stalled_until: int = 0
@@ -265,7 +269,10 @@ class Simulator:
 
     def _tick(self, member: Member) -> None:
         """Wake the robot when it wants to be woken."""
-        due = max(member.clock.world(member.robot.next_tick), self.now, member.asleep_until)
+        wanted = member.robot.next_tick, member.clock
+        if wanted != member.wanted:
+            member.wanted, member.wanted_at = wanted, member.clock.world(wanted[0])
+        due = max(member.wanted_at, self.now, member.asleep_until)
         if self.now < member.tick_at <= due:
             return
         member.tick_at = due

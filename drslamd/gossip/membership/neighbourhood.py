@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
 from drslamd.conventions import Chain
-from drslamd.gossip.team import Team
-from drslamd.slam.front_end import FrontEnd
+from drslamd.gossip.peer import Peer
 from drslamd.slam.peer_in_range import PeerInRange
 
 
 class Neighbourhood:
     """Of one robot."""
 
-    def __init__(self, own: Chain, team: Team, front: FrontEnd) -> None:
-        self._own, self._team, self._front = own, team, front
+    def __init__(
+        self,
+        own: Chain,
+        living: Callable[[int], Mapping[int, Peer]],
+        ranged: Callable[[int], list[int]],
+    ) -> None:
+        """
+        Args:
+            living: peers at a time, us, by robot; ranged: UWB ids to which ranges came in of late.
+        """
+        self._own, self._living, self._ranged = own, living, ranged
         self._found: dict[int, list[PeerInRange]] | None = None
         """By time, us; None while what is found must not be kept."""
 
@@ -42,6 +50,6 @@ class Neighbourhood:
             self._found.clear()
 
     def _look(self, utime: int) -> list[PeerInRange]:
-        mine = set(self._front.ranged(utime))
-        peers = (peer.neighbour(self._own, utime) for peer in self._team.living(utime).values())
+        mine = set(self._ranged(utime))
+        peers = (peer.neighbour(self._own, utime) for peer in self._living(utime).values())
         return [peer for peer in peers if peer.ranges_to_us or peer.uwb_id in mine]
