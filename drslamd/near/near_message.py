@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from io import BytesIO
 from typing import Any, cast
 
@@ -129,21 +130,36 @@ NEAR_CHANNELS = {near_channel(robot): robot for robot in range(MAX_ROBOT_ID + 1)
 
 def encode(header: Header, near: Near) -> bytes:
     """LCM bytes with an empty tag."""
-    peers, out = near.peers, cast(Any, lcmtypes.near_t())
-    out.header.version, out.header.origin = header.version, header.origin
-    out.header.epoch, out.header.counter = header.epoch, header.counter
-    out.header.utime, out.header.tag = header.utime, bytes(TAG_BYTES)
-    out.state, out.frame, out.frame_epoch = near.state, near.frame, near.frame_epoch
-    out.near_utime, out.resets = near.utime, near.resets
-    out.utc_minus_clock, out.utc_uncertainty = near.utc_minus_clock_us, near.utc_uncertainty_us
-    out.odom, out.correction, out.covariance = near.odom, near.correction, near.covariance
-    out.speed, out.turn_rate = near.speed_mps, near.turn_radps
-    out.n, out.peers, out.states = len(peers), peers.robots, peers.states
-    out.utimes, out.uncertainties = peers.utimes, peers.uncertainties
-    out.x, out.y, out.theta = peers.a_T_b.T.tolist()
-    out.speeds, out.turn_rates = peers.speeds, peers.turn_rates
-    out.covariances = peers.covariance.T.tolist()
-    return bytes(out.encode())
+    peers = near.peers
+    return _packing(len(peers)).pack(
+        FINGERPRINT,
+        *(header.version, header.origin, header.epoch, header.counter, header.utime),
+        *(near.state, near.frame, near.frame_epoch),
+        *(near.utime, near.utc_minus_clock_us, near.utc_uncertainty_us),
+        *near.odom,
+        *(near.speed_mps, near.turn_radps),
+        *near.correction,
+        *near.covariance,
+        *(near.resets, len(peers)),
+        *peers.robots,
+        *peers.states,
+        *peers.utimes,
+        *peers.uncertainties,
+        *peers.a_T_b.T.ravel().tolist(),
+        *peers.speeds,
+        *peers.turn_rates,
+        *peers.covariance.T.ravel().tolist(),
+    )
+
+
+@lru_cache(maxsize=MAX_ROBOT_ID + 1)
+def _packing(n: int) -> struct.Struct:
+    """All numbers of a `near_t` with n peers in a row: told fifty times a second, it is packed at
+    once and not, as generated code does, one field after the other."""
+    header = f"8s bhqiq {TAG_BYTES}x"
+    own = "bhqqqq 3d ff 3d 6f ih"
+    peers = f"{n}h {n}b {n}q {n}i {3 * n}f {n}f {n}f {6 * n}f"
+    return struct.Struct(f">{header} {own} {peers}")
 
 
 def decode(payload: bytes) -> Near | str:

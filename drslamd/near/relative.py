@@ -16,15 +16,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from drslamd.near.leg import Leg
-from drslamd.near.packed import Packed, moved, turned
+from drslamd.near.packed import Packed, added_up, moved, turned
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.se2 import Array
 
+FEW = 8
+"""Peers, of whom plain numbers are faster than rows of an array."""
 UPPER = np.triu_indices(3)
 """Of a matrix of three by three, in the order of packed covariances."""
 
@@ -41,6 +44,11 @@ class Relatives:
     poses: Array
     known: Array
 
+    @cached_property
+    def _numbers(self) -> list[tuple[list[float], list[float]]]:
+        """Pose and packed covariance of each peer."""
+        return list(zip(self.poses.tolist(), self.known.T.tolist(), strict=True))
+
     def seen_from(self, pose: Sequence[float], added: Packed) -> tuple[Array, Array]:
         """(m, 3) a_T_b, and (6, m) its covariance in the axes of a.
 
@@ -48,6 +56,8 @@ class Relatives:
             pose: w_T_a.
             added: what our leg adds to its covariance, packed.
         """
+        if len(self.poses) <= FEW:
+            return self._few_seen_from(pose, added)
         x, y, theta = pose
         dx, dy = self.poses[:, 0] - x, self.poses[:, 1] - y
         cos, sin = math.cos(theta), math.sin(theta)
@@ -58,6 +68,25 @@ class Relatives:
         for row, here in enumerate(moved(added, dx, dy)):
             covariance[row] = self.known[row] + here
         return seen, np.array(turned(covariance, cos, sin))
+
+    def _few_seen_from(self, pose: Sequence[float], added: Packed) -> tuple[Array, Array]:
+        """The same one by one, in plain numbers."""
+        x, y, theta = pose
+        cos, sin = math.cos(theta), math.sin(theta)
+        seen, covariances = [], []
+        for (b_x, b_y, b_theta), known in self._numbers:
+            dx, dy = b_x - x, b_y - y
+            turn = _wrapped(b_theta - theta)
+            seen.append((cos * dx + sin * dy, cos * dy - sin * dx, turn))
+            covariances.append(turned(added_up(known, moved(added, dx, dy)), cos, sin))
+        of_each: Array = np.array(covariances).reshape(-1, 6)
+        return np.array(seen).reshape(-1, 3), np.ascontiguousarray(of_each.T)
+
+
+def _wrapped(angle: float) -> float:
+    """`se2.wrap` of one number."""
+    wrapped = math.pi - (math.pi - angle) % (2 * math.pi)
+    return wrapped if wrapped > -math.pi else math.pi
 
 
 def relatives(estimate: TeamEstimate, own: int, leg: Leg, legs: dict[int, Leg]) -> Relatives:

@@ -82,6 +82,8 @@ class Surroundings:
         self._peers = PeersAround(own.robot, back, team)
         self._where, self._where_at = NOWHERE, 0
         self._resets, self._is_lost = 0, False
+        self._boldness = 1.0
+        """See `Revisions`; it moves with solutions."""
 
     def on_motion(self, motion: Motion) -> None:
         """Our odometry went on, and dead reckoning has it already."""
@@ -130,7 +132,7 @@ class Surroundings:
         known = estimate.covariance(self.own.robot) if estimate is not None else None
         if estimate is None or leg is None or known is None or where.pose is None:
             return Near(self.utime, odom, speed, turn, *wall, resets=self._resets)
-        bold, gap = self._back.revisions.boldness, self._front.watch.gap_m**2
+        bold, gap = self._boldness, self._front.watch.gap_m**2
         added = added_up(times(bold, leg.added), (gap, 0.0, 0.0, gap, 0.0, 0.0))
         covariance = added_up(times(bold, moved(se2.packed(known), *leg.lever)), added)
         return Near(
@@ -158,6 +160,8 @@ class Surroundings:
     def _renew(self, utime: int) -> None:
         estimate = self._back.estimate
         is_new = estimate is not self._estimate
+        if is_new:
+            self._boldness = self._back.revisions.boldness
         if is_new or self._leg is None:
             leg = self._own_leg(estimate)
             if leg is not None and estimate is not None:

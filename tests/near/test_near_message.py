@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from near_scenes import NEAR, PEERS
 
+from drslamd import lcmtypes
 from drslamd.gossip import lc02, messages
 from drslamd.gossip.seal import VERSION, Header
 from drslamd.near import near_message
@@ -93,3 +94,13 @@ def test_bytes_that_are_none_of_ours_are_one_phrase() -> None:
 def test_robots_do_not_listen_to_it() -> None:
     assert near_channel(3) == "DRSLAM_NEAR_003"
     assert messages.kind_of_channel(near_channel(3)) is None
+
+
+@pytest.mark.parametrize("peers", [0, 1, 30])
+def test_the_bytes_are_those_that_lcm_itself_makes(peers: int) -> None:
+    """Who is told fifty times a second packs them at once; LCM goes field by field."""
+    told = replace(NEAR, peers=crowd(peers) if peers else NOBODY)
+    payload = near_message.encode(HEADER, told)
+    decoded = lcmtypes.near_t.decode(payload)
+    assert decoded.n == len(told.peers)
+    assert decoded.encode() == payload

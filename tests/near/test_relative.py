@@ -10,7 +10,7 @@ from slam_scenes import NOISE, wander
 
 from drslamd.conventions import Chain, Segment
 from drslamd.near.leg import Leg
-from drslamd.near.relative import relatives
+from drslamd.near.relative import FEW, relatives
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import Learned, TeamEstimate, Trajectory
 
@@ -92,3 +92,16 @@ def test_nobody_is_seen_where_nobody_is_known() -> None:
     poses, covariance = relatives(TEAM, 4, own, {}).seen_from(own.end, own.added)
     assert poses.shape == (0, 3)
     assert covariance.shape == (6, 0)
+
+
+def test_few_peers_are_seen_as_many_are() -> None:
+    """One by one in plain numbers, or all in rows of an array."""
+    own, leg = leg_of(4), leg_of(9)
+    few = relatives(TEAM, 4, own, {9: leg})
+    many = replace(few, poses=np.tile(few.poses, (FEW + 1, 1)), known=np.tile(few.known, FEW + 1))
+    for pose in (own.end, (1.0, -2.0, 30.0), (0.0, 0.0, -30.0)):
+        one, sure = few.seen_from(pose, own.added)
+        each, sures = many.seen_from(pose, own.added)
+        assert (each == one).all()
+        assert np.allclose(sures, sure, rtol=1e-12, atol=0)
+        assert abs(one[0, 2]) <= np.pi
