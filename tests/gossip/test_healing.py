@@ -7,19 +7,24 @@ from __future__ import annotations
 
 import pytest
 from lab.healing import Conversation, heal, joined, parted, restarted
+from places import Recorded
 
 from drslamd.slam.graph.chapters import SPAN
 
 
+@pytest.mark.row("N6")
 @pytest.mark.parametrize(
     ("fault", "seconds"), [(parted(1, 2), 15), (joined(1), 15), (restarted(1), 15)]
 )
-def test_a_small_team_heals_soon_and_quietly(fault: object, seconds: int) -> None:
+def test_a_small_team_heals_soon_and_quietly(
+    fault: object, seconds: int, record_property: Recorded
+) -> None:
     found = heal(Conversation(4, seed=2), fault, 60)  # type: ignore[arg-type]
     assert found.seconds is not None
     assert found.seconds <= seconds
     assert found.peak < 2.05
     assert found.graphs == 1
+    record_property("measured", f"healed in {found.seconds} s, busiest second {found.peak:.2f} x")
 
 
 def test_a_newcomer_gets_chapters_and_not_the_whole_log() -> None:

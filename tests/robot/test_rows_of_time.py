@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from lab.play.simulator import Clock, Member
+from places import Recorded
 from teams import EASY, VirtualTeam
 
 from drslamd.conventions import GRID_US, SECOND_US
@@ -138,7 +139,7 @@ def test_after_a_stall_nothing_is_said_in_a_burst_and_odometry_goes_on(seconds: 
 
 @pytest.mark.slow
 @pytest.mark.row("T4")
-def test_clocks_that_disagree_change_no_result() -> None:
+def test_clocks_that_disagree_change_no_result(record_property: Recorded) -> None:
     found = []
     for offsets in ((0, 0, 0), (0, 1000, 500)):
         team = VirtualTeam(replace(EASY, seconds=50.0), on=())
@@ -154,3 +155,4 @@ def test_clocks_that_disagree_change_no_result() -> None:
         t = np.linspace(both[0].t[0] + 1, both[0].t[-1] - 1, 50)
         a, b = (np.array([np.interp(t, p.t, p.poses[:, k]) for k in (0, 1)]) for p in both)
         assert np.abs(a - b).max() < 1e-3
+        record_property("measured", f"{1e3 * np.abs(a - b).max():.2g} mm apart")

@@ -241,7 +241,7 @@ def _counter_range(
     first, second = signals
     if first.is_float != second.is_float:
         raise ConfigError([f"wheels.{keys[0]}, {keys[1]}: one is an integer, the other is not"])
-    if not math.isclose(abs(first.scale), abs(second.scale), rel_tol=_SAME_FACTOR):
+    if not _is_same_factor(first, second):
         fault = (
             "the DBC file gives the two sides different factors, but they need one and the same "
             "wheels.counts_per_metre; correct the file"
@@ -259,6 +259,16 @@ def _counter_range(
         bits = f"{narrowest} bits, counter_bits = {section.counter_bits}"
         raise ConfigError([f'wheels.{key} = "{getattr(section, key)}": the signal has only {bits}'])
     return CounterRange(section.counter_bits, None)
+
+
+def _is_same_factor(first: Signal, second: Signal) -> bool:
+    """Up to its sign, and to how it was rounded."""
+    if first.scale in (second.scale, -second.scale):
+        return True
+    try:
+        return math.isclose(abs(first.scale), abs(second.scale), rel_tol=_SAME_FACTOR)
+    except OverflowError:  # a whole number that no float can hold
+        return False
 
 
 def _gyro(section: DbcSection, message: Message) -> _Source:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from acquainted import introduce
 from message_builders import SECOND, a_seal, an_entry, kinds, sealed
+from places import Recorded
 
 from drslamd.conventions import Chain
 from drslamd.events import ChannelMessage
@@ -16,7 +17,9 @@ REASON = "more than the share of one robot"
 
 
 @pytest.mark.row("N8")
-def test_of_a_member_at_a_hundred_times_its_share_the_others_notice_nothing() -> None:
+def test_of_a_member_at_a_hundred_times_its_share_the_others_notice_nothing(
+    record_property: Recorded,
+) -> None:
     team = introduce(Team(a_seal(1)), Chain(3, 1), Chain(4, 1), utime=T0)
     loud, honest, pose = a_seal(3), a_seal(4), kinds()["POSE"]
     size = len(sealed(a_seal(3), pose)[1])
@@ -30,6 +33,9 @@ def test_of_a_member_at_a_hundred_times_its_share_the_others_notice_nothing() ->
         assert team.receive(ChannelMessage(utime, *sealed(honest, pose, utime))) is not None
     assert heard == pytest.approx((AT_ONCE_S + 3) * each_s, rel=0.01)
     assert team.refused[REASON] == 15 * each_s - heard
+    record_property(
+        "measured", f"of {15 * each_s} messages of one member {heard} are heard, of the others all"
+    )
     said = dict(team.conditions(T0 + 3 * SECOND))["team.flood"]
     assert said is not None
     assert said.startswith("robot 3 says more")

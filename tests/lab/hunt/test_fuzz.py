@@ -8,9 +8,10 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lab.hunt import flips, fuzz, liar, volume
+from lab.hunt import flips, forger, fuzz, liar, volume
 from lab.hunt.lies import Liar
 from lab.hunt.targets import TARGETS, seeds
+from places import Recorded
 
 from drslamd.events import ChannelMessage
 from drslamd.gossip.codecs import CODECS
@@ -48,27 +49,32 @@ def test_a_target_takes_anything(name: str) -> None:
 
 
 @pytest.mark.row("N7")
-def test_malformed_datagrams_are_not_believed() -> None:
+def test_malformed_datagrams_are_not_believed(record_property: Recorded) -> None:
     poured = volume.datagrams(8_000, told=quiet)
     assert poured.accepted == 0
     assert "8e+03 malformed datagrams: 0 accepted" in poured.line()
+    record_property("measured", poured.line())
 
 
 @pytest.mark.row("D2")
-def test_few_frames_with_two_damaged_bits_give_a_wrong_range() -> None:
+def test_few_frames_with_two_damaged_bits_give_a_wrong_range(record_property: Recorded) -> None:
     """The checksum alone lets one in fifteen pass."""
     found = flips.double_flips(3_000, told=quiet)
     assert found.many == 3_000
     assert found.wrong <= 25
     assert found.harmful <= 10
     assert found.lost < 5
+    record_property(
+        "measured", f"{found.wrong} wrong ranges of {found.many} frames with two bits turned over"
+    )
 
 
 @pytest.mark.row("D1")
-def test_noise_on_the_lines_is_not_believed() -> None:
+def test_noise_on_the_lines_is_not_believed(record_property: Recorded) -> None:
     poured = volume.serial_bytes(2_000_000, told=quiet)
     assert poured.accepted == 0
     assert poured.grew_kb < 20_000
+    record_property("measured", poured.line())
 
 
 def test_lies_are_well_formed() -> None:
@@ -90,10 +96,23 @@ def test_lies_are_well_formed() -> None:
 
 @pytest.mark.slow
 @pytest.mark.row("S9")
-def test_a_member_that_lies_costs_the_others_a_fifth_at_most() -> None:
+def test_a_member_that_lies_costs_the_others_a_fifth_at_most(record_property: Recorded) -> None:
     lied = liar.compared(600, scene=replace(liar.SCENE, seconds=48.0))
     assert lied.accepted > 550
     assert lied.is_kept, lied.line()
+    record_property("measured", f"ATE of the others {lied.ratio:.2f} x")
+
+
+@pytest.mark.slow
+@pytest.mark.row("S9")
+def test_a_member_that_puts_another_beside_where_it_is_costs_the_others_a_fifth_at_most(
+    record_property: Recorded,
+) -> None:
+    """By 3 m, in all its ranges and closures with that one, which agree."""
+    found = forger.compared(3.0, replace(liar.SCENE, seconds=60.0))
+    assert found.many > 50
+    assert found.is_kept, found
+    record_property("measured", f"consistently: {found.ratio:.2f} x")
 
 
 def test_an_unknown_target_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

@@ -22,6 +22,7 @@ from frames import (
     with_length,
 )
 from lab.play.emulators import as_heard_at
+from places import Recorded
 
 from drslamd.sensors.linktrack.linktrack_frames import ModuleFault
 from drslamd.sensors.linktrack.linktrack_input import LinkTrackInput
@@ -83,7 +84,9 @@ def test_bytes_without_frames_lead_to_the_baud_rate_within_5_seconds(
 @pytest.mark.parametrize(
     "baud", [9_600, 57_600, 115_200, 230_400, 460_800, 1_000_000, 2_000_000, 3_000_000]
 )
-def test_at_any_wrong_rate_port_and_rate_are_named_and_nothing_is_believed(baud: int) -> None:
+def test_at_any_wrong_rate_port_and_rate_are_named_and_nothing_is_believed(
+    baud: int, record_property: Recorded
+) -> None:
     uwb = LinkTrackInput(5, 120.0, f"/dev/ttyUSB0 at {baud} baud")
     began, samples = time.process_time(), 0
     heard = [as_heard_at(frame, 921_600, baud) for frame in ranging_stream(50)]
@@ -96,6 +99,7 @@ def test_at_any_wrong_rate_port_and_rate_are_named_and_nothing_is_believed(baud:
     assert "is uwb.baud right" in said
     assert samples == 0
     assert took < 0.05 * 6
+    record_property("measured", f"{baud} baud: {100 * took / 6:.1f} % of a core")
 
 
 def test_after_a_pause_the_five_seconds_start_anew() -> None:

@@ -20,6 +20,7 @@ from dense_problems import (
     thresholds,
     unpacked,
 )
+from places import Recorded
 from slam_problems import (
     BIAS,
     held_at,
@@ -308,7 +309,7 @@ def test_where_nobody_can_say_who_is_wrong_poses_stay_and_their_covariances_grow
 
 
 @pytest.mark.row("M8")
-def test_bias_scale_and_yaw_rate_are_found() -> None:
+def test_bias_scale_and_yaw_rate_are_found(record_property: Recorded) -> None:
     problem, truth = team_problem(
         8,
         robots=3,
@@ -323,6 +324,10 @@ def test_bias_scale_and_yaw_rate_are_found() -> None:
     solution = solve(problem)
     assert solution.converged
     assert solution.calibration.bias == pytest.approx([0.25, -0.2, 0.4], abs=0.03)
+    record_property(
+        "measured",
+        f"off by {np.abs(np.array(solution.calibration.bias) - [0.25, -0.2, 0.4]).max():.3f} m",
+    )
     assert solution.calibration.scale == pytest.approx([0.03, -0.02, 0.05], abs=0.006)
     assert solution.calibration.yaw == pytest.approx([0.01, -0.008, 0.0], abs=0.002)
     assert np.hypot(*(solution.poses - truth)[:, :2].T).max() < 0.3
