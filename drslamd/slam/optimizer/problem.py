@@ -175,13 +175,15 @@ class RangeFactors:
 
     def near_range_shape(self, model: RangeModel) -> Array:
         """(m,) of `RangeModel.near_range_shape`."""
-        if model not in self._shapes:
-            self._shapes[model] = model.near_range_shape(self.measured)
-        return self._shapes[model]
+        known = self._shape
+        if not known or known[0][0] is not model:
+            known[:] = [(model, model.near_range_shape(self.measured))]
+        return known[0][1]
 
     @cached_property
-    def _shapes(self) -> dict[RangeModel, Array]:
-        return {}
+    def _shape(self) -> list[tuple[RangeModel, Array]]:
+        """Of the model that was asked for last, which never changes."""
+        return []
 
     @property
     def is_carried(self) -> NDArray[np.bool_]:
@@ -300,7 +302,9 @@ def pose_errors(poses: Array, factors: BetweenFactors, measured: Array) -> Array
     """(m, 3) predicted minus measured relative poses, in frame i."""
     i, j = poses[factors.i].T, poses[factors.j].T
     cos, sin, x, y = np.cos(i[2]), np.sin(i[2]), j[0] - i[0], j[1] - i[1]
-    error = np.stack([cos * x + sin * y, cos * y - sin * x, j[2] - i[2]])
+    error = np.empty((3, len(factors)))
+    error[0], error[1] = cos * x + sin * y, cos * y - sin * x
+    error[2] = j[2] - i[2]
     error -= measured.T
     error[2] = se2.wrap(error[2])
     return np.asarray(error.T)
