@@ -19,6 +19,8 @@ much of an error is left a second later is found for the team as well (`lasting`
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from drslamd.conventions import GRID_HZ
@@ -31,6 +33,8 @@ ROUNDS = 5
 """Of weighing; each brings the ratio nearer to its end by a factor of three."""
 GAUSSIAN = 1.5
 """What the weights take off the variance of a normal distribution, for a cut at 2.5 sigmas."""
+NO_RANGE = 1e200
+"""Squared error, in sigmas, of what counts for nothing."""
 LEAST_SCATTER = 0.3
 """No module is more than three times better than what must be allowed for."""
 NEXT = GRID_HZ * 3 // 2
@@ -113,27 +117,59 @@ def _sums(
     return total, np.bincount(pair[plain], minlength=pairs)
 
 
-def inlier_scatter(
-    errors: Array, sigmas: Array, pair: Index, *, pairs: int, sigmas_cut: float
-) -> Array:
+@dataclass(frozen=True)
+class SideBySide:
+    """Where n ranges are when those of each pair stand in one row: sums over rows take a tenth of
+    the time of sums over names.
+
+    Attributes:
+        place: (n,) in rows of so many (`most`) places; pairs: so many rows.
+    """
+
+    place: Index
+    most: int
+    pairs: int
+
+    @staticmethod
+    def of(pair: Index, pairs: int) -> SideBySide:
+        """
+        Args:
+            pair: (n,) which pair measured each.
+        """
+        count = np.bincount(pair, minlength=pairs)
+        most = int(count.max(initial=0))
+        begins = np.arange(pairs) * most - (np.cumsum(count) - count)
+        place = np.empty(len(pair), dtype=np.int64)
+        order = np.argsort(pair, kind="stable")
+        place[order] = np.repeat(begins, count) + np.arange(len(pair))
+        return SideBySide(place, most, pairs)
+
+    def rows(self, values: Array, nothing: float) -> Array:
+        """(pairs, most) values (n,), and something where there is none."""
+        out = np.full(self.pairs * self.most, nothing)
+        out[self.place] = values
+        return out.reshape(self.pairs, self.most)
+
+
+def inlier_scatter(errors: Array, sigmas: Array, by_pair: SideBySide, sigmas_cut: float) -> Array:
     """(pairs,) the same of ranges that are no outliers, over the sigma that each was sent with.
 
     Weights fall with the square of Cauchy's, so bursts leave no trace; never more than 1, because
     what is configured must be allowed for.
 
     Args:
+        by_pair: which pair measured each.
         sigmas_cut: where Cauchy's weight is a half.
     """
-    squares = (errors / sigmas) ** 2
-    scatter = np.ones(pairs)
+    squares = by_pair.rows((errors / sigmas) ** 2, NO_RANGE)
+    weights = np.empty_like(squares)
+    scatter = np.ones(by_pair.pairs)
     for _ in range(ROUNDS):
-        weights = squares * ((sigmas_cut * scatter) ** -2)[pair]
-        weights += 1
-        np.divide(1, weights, out=weights)
+        half = ((sigmas_cut * scatter) ** 2)[:, None]
+        np.add(squares, half, out=weights)
+        np.divide(half, weights, out=weights)
         weights *= weights
-        count = np.bincount(pair, weights, pairs)
-        weights *= squares
-        total = GAUSSIAN * np.bincount(pair, weights, pairs)
-        scatter = np.sqrt((PRIOR_RANGES + total) / (PRIOR_RANGES + count))
+        total = GAUSSIAN * np.einsum("pk,pk->p", weights, squares)
+        scatter = np.sqrt((PRIOR_RANGES + total) / (PRIOR_RANGES + weights.sum(axis=1)))
         scatter = np.minimum(np.maximum(scatter, LEAST_SCATTER), 1.0)
     return scatter

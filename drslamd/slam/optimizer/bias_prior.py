@@ -22,6 +22,7 @@ these distributions (`sigmas`), and not on the curvatures of their costs.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -136,12 +137,7 @@ class BiasPrior:
     @property
     def team_variance(self) -> float:
         """What all pairs may have in common, m^2, before anything is measured."""
-        # with team = width sinh(u) the density of Cauchy's cost is even in u
-        u = np.linspace(0.0, np.arcsinh(REACH * self.sigma / self.team), POINTS)
-        squares = (self.team * np.sinh(u)) ** 2
-        tails = np.exp(-squares / (2 * self.sigma**2))
-        tails[0] /= 2
-        return float(tails @ squares / tails.sum())
+        return _variance_with_tails(self.team, self.sigma)
 
     def _scale(self, own: Array) -> float:
         return self.dof * self.spread**2 + float(own @ own)
@@ -155,3 +151,14 @@ def cauchy_curvature(width: Array | float, values: Array, least: float = LEAST_C
     squares = (values / width) ** 2
     ratio = np.maximum((1 - squares) / (1 + squares), least)
     return np.asarray(ratio / (1 + squares) / np.square(width))
+
+
+@lru_cache(maxsize=8)
+def _variance_with_tails(width: float, sigma: float) -> float:
+    """Of Cauchy's cost of that half width with Gauss's tails of that sigma."""
+    # with values = width sinh(u) the density of Cauchy's cost is even in u
+    u = np.linspace(0.0, np.arcsinh(REACH * sigma / width), POINTS)
+    squares = (width * np.sinh(u)) ** 2
+    tails = np.exp(-squares / (2 * sigma**2))
+    tails[0] /= 2
+    return float(tails @ squares / tails.sum())

@@ -23,7 +23,7 @@ from drslamd.slam.graph.team_frame import NO_CORRECTIONS, Group
 from drslamd.slam.graph.thinning.chain_view import ChainView
 from drslamd.slam.graph.thinning.pair_view import PairView
 from drslamd.slam.odometry.correction import Correction
-from drslamd.slam.odometry.noise import by_yaw_rate, link_covariance
+from drslamd.slam.odometry.noise import OdometryNoise, by_yaw_rate, link_covariance
 from drslamd.slam.optimizer.problem import (
     BetweenFactors,
     CarriedEnds,
@@ -153,17 +153,25 @@ def gauge_place(graph: PoseGraph, group: Group, places: Numbering) -> int:
 
 def odometry(graph: PoseGraph, numbers: Numbering, robots: list[int]) -> OdometryFactors:
     """Odometry between neighbouring keyframes of each segment, its scale and yaw rate left in."""
-    parts: list[tuple[Array, ...]] = []
-    for index, robot in enumerate(robots):
-        chain, place = graph.view.chains[robot], numbers.place[robot]
-        edges = chain_links(chain, calibrated=True)
-        i, j = place[edges.i], place[edges.j]
-        by_yaw = by_yaw_rate(chain.links.sums, edges.measured[:, :2], chain.model.noise)
-        used = (i >= 0) & (j >= 0)
-        of = np.full(len(i), index)
-        rows = (i, j, edges.measured, edges.covariance, of, by_yaw, chain.links.by_turn)
-        parts.append(tuple(row[used] for row in rows))
-    return OdometryFactors(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    chains = [graph.view.chains[robot] for robot in robots]
+    links = [chain.links for chain in chains]
+    places = [numbers.place[robot] for robot in robots]
+    i = np.concatenate([place[each.i] for place, each in zip(places, links, strict=True)])
+    j = np.concatenate([place[each.i + 1] for place, each in zip(places, links, strict=True)])
+    of = np.repeat(np.arange(len(robots)), [len(each.i) for each in links])
+    used = (i >= 0) & (j >= 0)
+    i, j, of = i[used], j[used], of[used]
+    measured, sums, by_turn = (
+        np.concatenate(columns)[used]
+        for columns in zip(*((e.measured, e.sums, e.by_turn) for e in links), strict=True)
+    )
+    covariance, by_yaw = np.empty((len(of), 3, 3)), np.empty((len(of), 3))
+    # (most often all robots have the same wheels)
+    for noise in dict.fromkeys(chain.model.noise for chain in chains):
+        rows = np.flatnonzero(np.array([chain.model.noise == noise for chain in chains])[of])
+        covariance[rows] = _link_covariance(noise.random_part(), measured[rows], sums[rows])
+        by_yaw[rows] = by_yaw_rate(sums[rows], measured[rows, :2], noise)
+    return OdometryFactors(i, j, measured, covariance, of, by_yaw, by_turn)
 
 
 def chain_links(chain: ChainView, calibrated: bool) -> BetweenFactors:
@@ -176,13 +184,22 @@ def chain_links(chain: ChainView, calibrated: bool) -> BetweenFactors:
     links, noise = chain.links, chain.model.noise
     if calibrated:
         noise = noise.random_part()
-    # a left twist at pose i moves the end of the link by its turn times the lever
-    lever = np.tile(np.eye(3), (len(links.i), 1, 1))
-    lever[:, 0, 2], lever[:, 1, 2] = -links.measured[:, 1], links.measured[:, 0]
-    twist = link_covariance(noise, links.measured, links.sums)
-    floor = np.diag([LINK_FLOOR_M**2, LINK_FLOOR_M**2, LINK_FLOOR_RAD**2])
-    covariance = lever @ twist @ np.swapaxes(lever, 1, 2) + floor
+    covariance = _link_covariance(noise, links.measured, links.sums)
     return BetweenFactors(links.i, links.i + 1, links.measured, covariance)
+
+
+def _link_covariance(noise: OdometryNoise, measured: Array, sums: Array) -> Array:
+    """(m, 3, 3) of the ends of links (m, 3), no better than the floor.
+
+    Args:
+        sums: (m, 13) see `ChainLinks`.
+    """
+    # a left twist at their beginning moves them by its turn times the lever
+    lever = np.tile(np.eye(3), (len(measured), 1, 1))
+    lever[:, 0, 2], lever[:, 1, 2] = -measured[:, 1], measured[:, 0]
+    twist = link_covariance(noise, measured, sums)
+    floor = np.diag([LINK_FLOOR_M**2, LINK_FLOOR_M**2, LINK_FLOOR_RAD**2])
+    return np.asarray(lever @ twist @ np.swapaxes(lever, 1, 2) + floor)
 
 
 def closures(graph: PoseGraph, numbers: Numbering) -> BetweenFactors:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.slam import range_model, se2
+from drslamd.slam.calibration.range_scatter import SideBySide
 from drslamd.slam.optimizer.sensor_priors import Calibration, Priors
 from drslamd.slam.range_model import LINKTRACK, RangeModel
 from drslamd.slam.se2 import Array, Index
@@ -63,9 +64,22 @@ class BetweenFactors:
         inverse = np.linalg.inv(self.covariance / scale + RIDGE * np.eye(3)) / scale
         return np.asarray((inverse + np.swapaxes(inverse, 1, 2)) / 2)
 
+    @cached_property
+    def _entries(self) -> Array:
+        """(3, 3, m) the same, each entry of all factors side by side."""
+        return np.ascontiguousarray(self.information.transpose(1, 2, 0))
+
+    def weighed(self, errors: Array) -> Array:
+        """(m, 3) W e of errors (m, 3)."""
+        return np.asarray(np.einsum("dem,em->dm", self._entries, errors.T).T)
+
+    def squares(self, errors: Array) -> Array:
+        """(m,) e' W e of errors (m, 3)."""
+        return np.asarray(np.einsum("md,md->m", errors, self.weighed(errors)))
+
     def cost(self, errors: Array) -> float:
         """Of errors (m, 3)."""
-        return float(np.vdot(errors, (self.information @ errors[..., None])[..., 0]))
+        return float(self.squares(errors).sum())
 
 
 @dataclass(frozen=True)
@@ -161,13 +175,15 @@ class RangeFactors:
 
     def near_range_shape(self, model: RangeModel) -> Array:
         """(m,) of `RangeModel.near_range_shape`."""
-        if model not in self._shapes:
-            self._shapes[model] = model.near_range_shape(self.measured)
-        return self._shapes[model]
+        known = self._shape
+        if not known or known[0][0] is not model:
+            known[:] = [(model, model.near_range_shape(self.measured))]
+        return known[0][1]
 
     @cached_property
-    def _shapes(self) -> dict[RangeModel, Array]:
-        return {}
+    def _shape(self) -> list[tuple[RangeModel, Array]]:
+        """Of the model that was asked for last, which never changes."""
+        return []
 
     @property
     def is_carried(self) -> NDArray[np.bool_]:
@@ -270,23 +286,40 @@ class Problem:
     freed: tuple[Freed, ...] = ()
     fitted: Array | None = None
 
+    @cached_property
+    def ends(self) -> Index:
+        """(2, all) both poses of odometry, closures and ranges, in this order."""
+        factors = (self.odometry, self.closures, self.ranges)
+        return np.concatenate([[f.i, f.j] for f in factors], axis=1)
+
+    @cached_property
+    def by_pair(self) -> SideBySide:
+        """Its ranges."""
+        return SideBySide.of(self.ranges.pair, self.pairs)
+
 
 def pose_errors(poses: Array, factors: BetweenFactors, measured: Array) -> Array:
     """(m, 3) predicted minus measured relative poses, in frame i."""
-    error = se2.between(poses[factors.i], poses[factors.j]) - measured
-    error[:, 2] = se2.wrap(error[:, 2])
-    return error
+    i, j = poses[factors.i].T, poses[factors.j].T
+    cos, sin, x, y = np.cos(i[2]), np.sin(i[2]), j[0] - i[0], j[1] - i[1]
+    error = np.empty((3, len(factors)))
+    error[0], error[1] = cos * x + sin * y, cos * y - sin * x
+    error[2] = j[2] - i[2]
+    error -= measured.T
+    error[2] = se2.wrap(error[2])
+    return np.asarray(error.T)
 
 
 def corrected(odometry: OdometryFactors, calibration: Calibration) -> Array:
     """(m, 3) odometry with scale, yaw rate and turn taken out."""
     scale, yaw, turn = (
-        constant[odometry.robot, None]
+        constant[odometry.robot]
         for constant in (calibration.scale, calibration.yaw, calibration.turn)
     )
-    out = odometry.measured - yaw * odometry.by_yaw + turn * odometry.by_turn
-    out[:, :2] -= scale * odometry.measured[:, :2]
-    return np.asarray(out)
+    measured = odometry.measured.T
+    out = measured - yaw * odometry.by_yaw.T + turn * odometry.by_turn.T
+    out[:2] -= scale * measured[:2]
+    return np.asarray(out.T)
 
 
 class RangeErrors(NamedTuple):

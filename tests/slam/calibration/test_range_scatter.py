@@ -14,6 +14,7 @@ from drslamd.slam.calibration.range_scatter import (
     LEAST_SCATTER,
     PLAIN,
     PRIOR_RANGES,
+    SideBySide,
     inlier_scatter,
     lasting,
     scatter_ratios,
@@ -141,7 +142,7 @@ def test_module_3_finds_how_much_the_ranges_of_each_pair_scatter(true: float) ->
 
 
 def inlier_ratios(errors: Array, sigmas: Array, pair: Index, pairs: int) -> Array:
-    return inlier_scatter(errors, sigmas, pair, pairs=pairs, sigmas_cut=2.5)
+    return inlier_scatter(errors, sigmas, SideBySide.of(pair, pairs), sigmas_cut=2.5)
 
 
 @pytest.mark.parametrize("true", [0.4, 0.6, 0.9])
@@ -211,3 +212,15 @@ def test_another_round_of_weighing_would_change_little(monkeypatch: pytest.Monke
     once = inlier_ratios(errors, np.full(MANY, 0.1), ONE, 1)
     monkeypatch.setattr(range_scatter, "ROUNDS", 16)
     assert inlier_ratios(errors, np.full(MANY, 0.1), ONE, 1) == pytest.approx(once, rel=0.02)
+
+
+def test_a_pair_is_weighed_as_if_it_were_alone() -> None:
+    """However many ranges the others have, and in whatever order they come."""
+    rng = np.random.default_rng(9)
+    pair = rng.permutation(np.repeat([0, 2, 3], [5, 400, 60]))
+    errors, sigmas = rng.normal(0, 0.06, len(pair)), rng.uniform(0.05, 0.2, len(pair))
+    together = inlier_ratios(errors, sigmas, pair, 4)
+    for name in range(4):
+        mine = pair == name
+        alone = inlier_ratios(errors[mine], sigmas[mine], np.zeros(mine.sum(), dtype=int), 1)
+        assert together[name] == pytest.approx(alone[0], rel=1e-12)

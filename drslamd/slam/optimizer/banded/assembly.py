@@ -98,21 +98,28 @@ class Assembly:
         """Where the products of columns go, those of each set (t, m), in the entries of a system or
         beyond them; and which of them go to the other side of the corner as well, behind them."""
         n, width = self._layout.band, self._layout.width
-        high = n + self._layout.border
-        beyond = entries_of(self._layout)
+        high, first = n + self._layout.border, width * n
         at, apart, mirrored, count = [], [], [], 0
         for unknowns in self._unknowns:
-            one, other = (unknowns[of] for of in np.tril_indices(len(unknowns)))
-            row, column = np.maximum(one, other).ravel(), np.minimum(one, other).ravel()
-            in_band, in_border = column * (width - 1) + row, (row - n) * high + column
-            place = np.where(row < n, in_band, width * n + in_border)
-            place[column == NOWHERE] = beyond
-            twice = np.flatnonzero((column >= n) & (row != column))
-            at.append(place)
-            apart.append(count + twice)
-            mirrored.append(width * n + (column[twice] - n) * high + row[twice])
-            count += len(place)
-        return np.concatenate([*at, *mirrored]), np.concatenate(apart)
+            is_partial = bool((unknowns == NOWHERE).any())
+            # (a few columns at a time stay in the processor's cache)
+            for k, own in enumerate(unknowns):
+                row, column = np.maximum(own, unknowns[: k + 1]), np.minimum(own, unknowns[: k + 1])
+                place = column * (width - 1)
+                place += row
+                is_high = row >= n
+                if is_high.any():
+                    np.copyto(place, (row - n) * high + (column + first), where=is_high)
+                    twice = np.flatnonzero((column >= n) & (row != column))
+                    apart.append(count + twice)
+                    row, column = row.ravel()[twice], column.ravel()[twice]
+                    mirrored.append(first + (column - n) * high + row)
+                if is_partial:
+                    place[np.minimum(own, unknowns[: k + 1]) == NOWHERE] = entries_of(self._layout)
+                at.append(place.ravel())
+                count += place.size
+        none = np.zeros(0, dtype=np.int64)
+        return np.concatenate([*at, *mirrored, none]), np.concatenate([*apart, none])
 
     @cached_property
     def _entries(self) -> Index:

@@ -49,9 +49,7 @@ class BandLayout:
     @staticmethod
     def of(problem: Problem) -> BandLayout:
         count, robots = len(problem.initial), len(problem.priors.scale)
-        factors = (problem.odometry, problem.closures, problem.ranges)
-        i = np.concatenate([f.i for f in factors])
-        j = np.concatenate([f.j for f in factors])
+        i, j = problem.ends
         apart = border_poses(i, j, narrow=8 + 4 * robots)
         inside = np.ones(count, dtype=bool)
         inside[apart] = False

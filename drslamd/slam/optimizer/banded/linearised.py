@@ -37,7 +37,7 @@ def odometry_at(problem: Problem, point: Point) -> Linearised:
     """By both poses, scale, yaw rate and turn."""
     factors = problem.odometry
     return Linearised(
-        odometry_jacobian(problem, point.poses), factors.information, _pulled(factors, point.link)
+        odometry_jacobian(problem, point.poses), factors.information, factors.weighed(point.link)
     )
 
 
@@ -55,7 +55,7 @@ def closures_at(problem: Problem, poses: Array) -> Linearised:
     """By both poses."""
     factors = problem.closures
     error = pose_errors(poses, factors, factors.measured)
-    return Linearised(pose_jacobian(poses, factors), factors.information, _pulled(factors, error))
+    return Linearised(pose_jacobian(poses, factors), factors.information, factors.weighed(error))
 
 
 def ranges_at(
@@ -142,8 +142,3 @@ def _add_poses(out: Array, poses: Array, factors: BetweenFactors) -> None:
     out[2, 0], out[2, 1] = cos * y - sin * x, -cos * x - sin * y
     out[3:5, :2] = -out[:2, :2]
     out[2, 2], out[5, 2] = -1, 1
-
-
-def _pulled(factors: BetweenFactors, errors: Array) -> Array:
-    """(m, 3) W e."""
-    return np.asarray((factors.information @ errors[..., None])[..., 0])

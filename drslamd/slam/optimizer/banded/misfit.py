@@ -136,8 +136,7 @@ def _signs(blocks: int, probes: int) -> Array:
 
 def squares_of(problem: Problem, point: Point) -> Array:
     """(m,) e' W e of each link."""
-    weighed = (problem.odometry.information @ point.link[..., None])[..., 0]
-    return np.asarray((point.link * weighed).sum(axis=1))
+    return problem.odometry.squares(point.link)
 
 
 def outliers(problem: Problem, point: Point) -> NDArray[np.bool_]:

@@ -73,7 +73,7 @@ def descend(
         before, size = size, float(np.abs(step[layout.poses]).max())
         new = Point.of(problem, poses, point.calibration.plus(moved))
         metres = max(size, _metres_of_sensors(moved))
-        is_far = is_near and metres > NEAR
+        is_far = is_near and metres > FAR
         if is_far or not (is_kept or _is_better(equations, new, point)):
             (damping, level), factor = _stiffer(damping, level, metres, is_near), None
             size, is_near = (before if is_near else size), False

@@ -174,6 +174,8 @@ class Equations:
 
     def _add_mounting_priors(self, system: System, calibration: Calibration, least: float) -> None:
         layout, doubted = self.layout, self.problem.doubted
+        if not doubted.any():
+            return
         for prior, numbers, values in (
             (TRACK, layout.turn[doubted.track, None], calibration.turn[doubted.track, None]),
             (ANTENNA, layout.antenna[doubted.antenna], calibration.antenna[doubted.antenna]),
@@ -196,12 +198,11 @@ class Equations:
         gradient[layout.team_bias] += priors.bias.team_pull(team) - pull.sum()
         gradient[layout.scale] += priors.scale_pull(calibration.scale)
         doubted = problem.doubted
-        turn, antenna = (
-            TRACK.pull(calibration.turn[:, None])[:, 0],
-            ANTENNA.pull(calibration.antenna),
-        )
-        gradient[layout.turn[doubted.track]] += turn[doubted.track]
-        gradient[layout.antenna[doubted.antenna]] += antenna[doubted.antenna]
+        if doubted.any():
+            turn = TRACK.pull(calibration.turn[:, None])[:, 0]
+            gradient[layout.turn[doubted.track]] += turn[doubted.track]
+            antenna = ANTENNA.pull(calibration.antenna)
+            gradient[layout.antenna[doubted.antenna]] += antenna[doubted.antenna]
         gradient[layout.yaw] += priors.yaw_pull(calibration.yaw)
         gradient[layout.near_bias] += calibration.near_bias / priors.near_bias**2
         moved = point.poses[gauge] - problem.initial[gauge]

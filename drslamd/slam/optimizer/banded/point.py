@@ -47,11 +47,7 @@ class Point:
         ranges, model = problem.ranges, problem.model
         sight = range_errors(poses, ranges, calibration, model)
         scatter = inlier_scatter(
-            sight.error,
-            ranges.sigma,
-            ranges.pair,
-            pairs=problem.pairs,
-            sigmas_cut=model.cauchy_sigmas,
+            sight.error, ranges.sigma, problem.by_pair, sigmas_cut=model.cauchy_sigmas
         )
         odometry, threshold = problem.odometry, model.cauchy_sigmas * scatter
         link = pose_errors(poses, odometry, corrected(odometry, calibration))

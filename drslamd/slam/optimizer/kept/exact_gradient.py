@@ -5,52 +5,27 @@ It is `Equations.gradient`, several times as fast; a step of `fixed_point` costs
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
-from drslamd.slam.optimizer.problem import BetweenFactors, Problem, pose_errors
+from drslamd.slam.optimizer.problem import Problem, pose_errors
 from drslamd.slam.se2 import Array, Index
-
-
-class _Pulled(NamedTuple):
-    """How factors pull at the two poses that each joins.
-
-    Attributes:
-        i, j: (m,) these poses; at_i, at_j: (m,) their points, x + iy in w; turn_i, turn_j: (m,).
-    """
-
-    i: Index
-    j: Index
-    at_i: Array
-    at_j: Array
-    turn_i: Array
-    turn_j: Array
 
 
 def exact_gradient(equations: Equations, point: Point) -> Array:
     """(n + b,) half the derivative of the cost, in the layout of the equations."""
     problem, layout = equations.problem, equations.layout
     gradient = np.zeros(layout.band + layout.border)
-    at, turn = np.zeros(len(point.poses), dtype=complex), np.zeros(len(point.poses))
-    ranges = _range_pull(problem, point)
-    pull = _weighed(problem.odometry, point.link)
-    closures = problem.closures
-    of_closures = _weighed(closures, pose_errors(point.poses, closures, closures.measured))
-    for part in (
-        _of_ranges(problem, point, ranges),
-        _between(problem.odometry, point.poses, pull),
-        _between(closures, point.poses, of_closures),
-    ):
-        at += _sums(part.i, part.at_i, len(at)) + _sums(part.j, part.at_j, len(at))
-        turn += np.bincount(part.i, part.turn_i, len(at))
-        turn += np.bincount(part.j, part.turn_j, len(at))
-    gradient[layout.poses] = np.column_stack([at.real, at.imag, turn])
-    gradient[layout.bias] = np.bincount(problem.ranges.pair, ranges, problem.pairs)
-    gradient[layout.near_bias] = ranges @ problem.ranges.near_range_shape(problem.model)
-    scale, yaw = _of_odometry(problem, point, pull, ranges)
+    odometry, closures, ranges = problem.odometry, problem.closures, problem.ranges
+    of_links, of_ranges = odometry.weighed(point.link), _range_pull(problem, point)
+    errors = pose_errors(point.poses, closures, closures.measured)
+    pull = np.concatenate([of_links, closures.weighed(errors)])
+    turn = np.exp(1j * point.poses[:, 2])
+    gradient[layout.poses] = _of_poses(problem, point, turn, pull, of_ranges)
+    gradient[layout.bias] = np.bincount(ranges.pair, of_ranges, problem.pairs)
+    gradient[layout.near_bias] = of_ranges @ ranges.near_range_shape(problem.model)
+    scale, yaw = _of_odometry(problem, point, turn, of_links, of_ranges)
     gradient[layout.scale], gradient[layout.yaw] = scale, yaw
     doubted = problem.doubted
     if doubted.any():
@@ -64,8 +39,8 @@ def exact_gradient(equations: Equations, point: Point) -> Array:
 def mounting_pulls(problem: Problem, point: Point) -> Array:
     """(3 R,) half the derivative by the turns of R robots, then by their antennas' x and y."""
     odometry, ranges, robots = problem.odometry, problem.ranges, len(problem.priors.scale)
-    pull = _weighed(odometry, point.link)
-    turn = -np.bincount(odometry.robot, (pull * odometry.by_turn).sum(axis=1), robots)
+    pull = odometry.weighed(point.link)
+    turn = -np.bincount(odometry.robot, np.einsum("mk,mk->m", pull, odometry.by_turn), robots)
     seen = _range_pull(problem, point) * point.sight.direction
     antenna = np.zeros(robots, dtype=complex)
     for end, (pose, sign) in enumerate(((ranges.i, -1), (ranges.j, 1))):
@@ -81,41 +56,48 @@ def _range_pull(problem: Problem, point: Point) -> Array:
     return np.asarray(error / ((1 + squared) * ranges.sigma**2))
 
 
-def _of_ranges(problem: Problem, point: Point, pull: Array) -> _Pulled:
+def _of_poses(problem: Problem, point: Point, turn: Array, pull: Array, of_ranges: Array) -> Array:
+    """(k, 3) of all factors at once.
+
+    Args:
+        turn: (k,) headings as unit numbers.
+        pull: (m, 3) by the errors of odometry and closures; of_ranges: (n,) likewise.
+    """
+    (i, j), count = problem.ends, len(point.poses)
+    one, other = i[: len(pull)], j[: len(pull)]
+    place = point.poses[:, 0] + 1j * point.poses[:, 1]
+    turned = turn[one] * (pull[:, 0] + 1j * pull[:, 1])
+    lever = _across(place[other] - place[one], turned)
     _, direction, arm_i, arm_j = point.sight
-    seen = pull * direction
-    turn_i = -(np.conj(arm_i) * seen).imag
-    turn_j = (np.conj(arm_j) * seen).imag
-    return _Pulled(problem.ranges.i, problem.ranges.j, -seen, seen, turn_i, turn_j)
+    seen = of_ranges * direction
+    at = np.concatenate([turned, seen])
+    turn_i = np.concatenate([lever + pull[:, 2], _across(arm_i, seen)])
+    turn_j = np.concatenate([pull[:, 2], _across(arm_j, seen)])
+    sums = [
+        np.bincount(j, of_j, count) - np.bincount(i, of_i, count)
+        for of_i, of_j in ((at.real, at.real), (at.imag, at.imag), (turn_i, turn_j))
+    ]
+    return np.stack(sums, axis=-1)
 
 
-def _weighed(factors: BetweenFactors, errors: Array) -> Array:
-    """(m, 3) W e."""
-    return np.asarray((factors.information @ errors[..., None])[..., 0])
-
-
-def _between(factors: BetweenFactors, poses: Array, pull: Array) -> _Pulled:
-    turned = np.exp(1j * poses[factors.i, 2]) * (pull[:, :2] @ [1, 1j])
-    way = (poses[factors.j, :2] - poses[factors.i, :2]) @ [1, 1j]
-    lever = (np.conj(way) * turned).imag
-    return _Pulled(factors.i, factors.j, -turned, turned, -lever - pull[:, 2], pull[:, 2])
+def _across(arm: Array, pull: Array) -> Array:
+    """(m,) how pulls turn arms, both x + iy."""
+    return np.asarray(arm.real * pull.imag - arm.imag * pull.real)
 
 
 def _of_odometry(
-    problem: Problem, point: Point, pull: Array, of_ranges: Array
+    problem: Problem, point: Point, turn: Array, pull: Array, of_ranges: Array
 ) -> tuple[Array, Array]:
     """(robots,) by scales and yaw rates, of links and of the ranges that odometry has carried."""
     odometry, robots = problem.odometry, len(problem.priors.scale)
-    scale = np.bincount(
-        odometry.robot, (pull[:, :2] * odometry.measured[:, :2]).sum(axis=1), robots
-    )
-    yaw = np.bincount(odometry.robot, (pull * odometry.by_yaw).sum(axis=1), robots)
+    by_scale = np.einsum("mk,mk->m", pull[:, :2], odometry.measured[:, :2])
+    scale = np.bincount(odometry.robot, by_scale, robots)
+    yaw = np.bincount(odometry.robot, np.einsum("mk,mk->m", pull, odometry.by_yaw), robots)
     carried, ranges = problem.ranges.carried, problem.ranges
     if len(carried.rows):
         seen = of_ranges[carried.rows] * point.sight.direction[carried.rows]
-        back = np.exp(-1j * point.poses[:, 2])
         for end, (pose, sign) in enumerate(((ranges.i, 1), (ranges.j, -1))):
-            here = sign * seen * back[pose[carried.rows]]
+            here = sign * seen * np.conj(turn[pose[carried.rows]])
             robot = ranges.carriers[end]
             for sums, shift in zip((yaw, scale), carried.shifts[end], strict=True):
                 by = here.real * shift.real + here.imag * shift.imag

@@ -71,12 +71,6 @@ class Believed:
             equations.add_claimed_priors(system, calibration)
 
 
-def ends_of(problem: Problem) -> tuple[Index, Index]:
-    """(all,) both poses of the factors of odometry, closures and ranges, in this order."""
-    factors = (problem.odometry, problem.closures, problem.ranges)
-    return np.concatenate([f.i for f in factors]), np.concatenate([f.j for f in factors])
-
-
 @dataclass(frozen=True)
 class KeptFactor:
     """
@@ -93,7 +87,7 @@ class KeptFactor:
         """With the tail of a problem, at its point; None where that is not positive definite."""
         problem = believed.problem
         layout, numbers = places.dense(places.tail)
-        i, j = ends_of(problem)
+        i, j = problem.ends
         is_tail = np.zeros(len(problem.n), dtype=bool)
         is_tail[places.tail] = True
         system = believed.of_factors(is_tail[i] | is_tail[j], layout, priors=False)
@@ -114,7 +108,7 @@ class KeptFactor:
         is_head[np.concatenate([places.inside, places.far, more])] = True
         is_more = np.zeros(len(problem.n), dtype=bool)
         is_more[more] = True
-        i, j = ends_of(problem)
+        i, j = problem.ends
         which = is_head[i] & is_head[j] & (is_more[i] | is_more[j])
         system = believed.of_factors(which, layout, priors=False)
         _add(system.corner, self.rest, 3 * len(more))
@@ -167,7 +161,7 @@ def _newest(problem: Problem) -> Flags:
 
 def _needed(problem: Problem, is_head: Flags) -> Flags:
     """(k,) poses of the head that others hang on, or will: a robot may stand on its newest."""
-    i, j = ends_of(problem)
+    i, j = problem.ends
     across = is_head[i] != is_head[j]
     needed = _newest(problem)
     needed[i[across]] = needed[j[across]] = True
@@ -184,7 +178,7 @@ def build(
     """
     problem = believed.problem
     is_head = ~tail
-    i, j = ends_of(problem)
+    i, j = problem.ends
     which = is_head[i] & is_head[j]
     needed = _needed(problem, is_head)
     # in the order of time, what is needed last

@@ -38,6 +38,9 @@ MOVED = 0.12
 less, and half of it for pairs in the mean. A sigma goes with the fourth root, so it is off by 3 %
 at most; what is feared of a whole robot is a guess that scatters by some percent itself."""
 
+FEW = 400
+"""Poses: a smaller problem is solved anew in the time of what is done beside a kept factor."""
+
 
 @dataclass(frozen=True)
 class Sureness:
@@ -102,7 +105,7 @@ def solve(
         tolerance: see `newton_descent.TOLERANCE`.
         kept: what came of the solution before.
     """
-    if team.is_near:
+    if team.is_near and len(team.problem.n) >= FEW:
         for before in (kept, None) if isinstance(kept, Kept) else (None,):
             found = _solved(team, last, tolerance, before)
             if found is not None:

@@ -22,6 +22,11 @@ NEAR_M, NEAR_SIGMA = 1e-4, 1.03
 Said = list[tuple[Chain, GraphEntry]]
 
 
+@pytest.fixture(autouse=True)
+def however_small(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kept_solver, "FEW", 0)
+
+
 @dataclass
 class Second:
     """What was found, and what is right."""
@@ -131,3 +136,16 @@ def test_whatever_does_not_fit_is_solved_anew(fault: str, monkeypatch: pytest.Mo
         monkeypatch.setattr(kept_solver, names[fault], lambda *_, **__: None)
     seconds = list(driven(MetTeam(3, 40, 10), 3))
     assert all(second.is_right() and second.began_anew for second in seconds)
+
+
+@pytest.mark.parametrize(("more", "is_anew"), [(0, False), (1, True)])
+def test_a_small_problem_is_solved_anew(
+    more: int, is_anew: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seconds = driven(MetTeam(3, 40, 10), 6)
+    *_, before = [next(seconds) for _ in range(5)]
+    assert not before.began_anew
+    poses = sum(len(path.n) for path in before.found.trajectories.values())
+    # each robot makes one more
+    monkeypatch.setattr(kept_solver, "FEW", poses + 3 + more)
+    assert next(seconds).began_anew is is_anew

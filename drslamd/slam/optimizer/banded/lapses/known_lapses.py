@@ -33,6 +33,9 @@ def freed_again(problem: Problem, robots: list[int], lapses: Iterable[Lapse]) ->
     Args:
         robots: as the problem numbers them.
     """
+    lapses = list(lapses)
+    if not lapses:
+        return problem
     odometry, found = problem.odometry, likely_stretches(problem)
     first, last = problem.n[odometry.i], problem.n[odometry.j]
     for lapse in lapses:

@@ -36,12 +36,12 @@ def likely_stretches(problem: Problem) -> list[Freed]:
     for robot in range(len(problem.priors.scale)):
         mine = np.flatnonzero(problem.odometry.robot == robot)
         mine = mine[np.argsort(problem.n[problem.odometry.j[mine]], kind="stable")]
-        out += _of_robot(problem, robot, mine)[-MOST_TRIED:]
+        out += _of_robot(problem, robot, mine)
     return out
 
 
 def _of_robot(problem: Problem, robot: int, mine: Index) -> list[Freed]:
-    """Of its links (k,)."""
+    """The latest ones of its links (k,)."""
     odometry = problem.odometry
     seconds = _seconds(problem, mine)
     speed = np.hypot(*odometry.measured[mine, :2].T) / seconds
@@ -59,7 +59,7 @@ def _of_robot(problem: Problem, robot: int, mine: Index) -> list[Freed]:
     # each began and ended somewhere in the links beside
     return [
         freed_links(problem, robot, mine[max(first - 1, 0) : last + 2], is_still)
-        for first, last, is_still in sorted(stood + spun)
+        for first, last, is_still in sorted(stood + spun)[-MOST_TRIED:]
     ]
 
 
