@@ -15,7 +15,7 @@ import numpy as np
 
 from drslamd.slam.optimizer.banded import common_level, mountings, odometry_levels
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
-from drslamd.slam.optimizer.banded.common_level import ASKS, TAILS, pooled
+from drslamd.slam.optimizer.banded.common_level import ASKS, TAILS, CommonLevel, pooled
 from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.lapses.known_lapses import settled
 from drslamd.slam.optimizer.banded.misfit import (
@@ -84,11 +84,10 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
     equations, nominal = settled(equations, nominal, most, tolerance)
     check = _checked(equations, nominal)
     is_fine = check.is_passed() and not check.scores.ask()
-    if not check.scores.ask():
-        common = _in_common(equations, nominal, check, most, tolerance)
-        if common is not None:
-            return common
-    if not is_fine or not _fits(equations, nominal):
+    common = _in_common(equations, nominal, check, most, tolerance)
+    if common is not None and not check.scores.ask():
+        return _commonly(equations, common)
+    if common is None and not (is_fine and _fits(equations, nominal)):
         lapse = _by_lapse(equations, nominal, most, tolerance)
         if lapse is not None:
             return lapse
@@ -99,14 +98,16 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
         mounted, better = mountings.fitted(equations, nominal, check.scores, most, tolerance)
         again, gain = _checked(mounted, better), _gain(equations, nominal, mounted, better)
         is_worth = better.converged and gain >= check.scores.least_gain()
-        if is_worth and _fits(mounted, better) and again.is_passed():
-            return _as_is(mounted, better, again.ratio)
+        if is_worth and (common is None or gain >= common.gain):
+            beside = _in_common(mounted, better, again, most, tolerance)
+            if beside is not None:
+                return _commonly(mounted, beside)
+            if _fits(mounted, better) and again.is_passed():
+                return _as_is(mounted, better, again.ratio)
         if is_worth and gain > MUCH and check.scores.ask_alone():
             bases.insert(0, (mounted, better, again))
-        for base, point, said in bases:
-            common = _in_common(base, point, said, most, tolerance)
-            if common is not None:
-                return common
+        if common is not None:
+            return _commonly(equations, common)
         if check.is_passed() and not check.scores.ask_alone():
             return _as_is(equations, nominal, check.ratio)
     for base, point, said in bases:
@@ -131,15 +132,17 @@ def _by_lapse(
 
 def _in_common(
     equations: Equations, nominal: Point, check: _Check, most: int, tolerance: float
-) -> Explanation | None:
+) -> CommonLevel | None:
     """Odometry was worse than configured, of all robots alike or of one, if that explains all."""
     if check.pooled <= ASKS:
         return None
     found = common_level.common_level(equations, nominal, most, tolerance)
     if found is None or (found.ratio > TARGET).any() or not _fits(equations, found.point):
         return None
-    if runs(equations.problem, found.point):
-        return None
+    return None if runs(equations.problem, found.point) else found
+
+
+def _commonly(equations: Equations, found: CommonLevel) -> Explanation:
     feared = 1.0 + TAILS * (found.variance - 1.0)
     # what is the same for all is in the covariances, and no reason to doubt anybody
     lately = feared if found.is_alone else np.ones(len(feared))
