@@ -99,8 +99,8 @@ def common_level(
         is_alone = more >= gain + ALONE
         if is_alone:
             variance, gain, near = alone, more, beside
-    if variance.max() >= MOST:
-        return None
+    if variance.max() > 0.99 * MOST:
+        return None  # more would be as likely
     believed = Equations(raised(problem, variance, near), like=equations)
     point = descend(believed, near.calibration, most, tolerance)
     factor = BandFactor.of(believed.weighed(point))
