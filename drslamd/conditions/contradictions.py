@@ -115,8 +115,8 @@ def odometry(is_worse: bool) -> str | None:
     if not is_worse:
         return None
     return (
-        "odometry is some times as wrong as configured, and poses are less sure by as much; wheels "
-        "slip now and then, of this robot or of all, or [odometry] promises too much"
+        "odometry is some times as wrong as configured, and poses are less sure by as much: wheels "
+        "slip now and then, of this robot or of all; drive more slowly, or raise [odometry]"
     )
 
 

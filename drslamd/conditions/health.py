@@ -36,6 +36,7 @@ CAUSES_FIRST = (
     "budget",
     "load",
     "doubt",
+    "odometry",
     "partners",
     "pose",
     "site",

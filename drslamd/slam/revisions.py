@@ -17,7 +17,7 @@ import numpy as np
 
 from drslamd.conventions import GRID_HZ, Segment
 from drslamd.slam import se2
-from drslamd.slam.graph.estimate import TeamEstimate
+from drslamd.slam.graph.estimate import MUCH_WORSE, TeamEstimate
 from drslamd.slam.odometry.track import RESOLUTION
 from drslamd.slam.se2 import Array
 
@@ -52,6 +52,31 @@ class _Claim(NamedTuple):
     covariances: Array
 
 
+class _Model(NamedTuple):
+    """What a solution took for true beside what is configured.
+
+    Attributes:
+        mountings: that are not as configured, of which kind and of whom.
+        level: of the worst odometry that is feared and not in doubt.
+    """
+
+    mountings: frozenset[tuple[str, int]] = frozenset()
+    level: float = 1.0
+
+    @staticmethod
+    def of(estimate: TeamEstimate) -> _Model:
+        tracks = {("track", robot) for robot in estimate.turn}
+        mountings = frozenset(tracks | {("antenna", robot) for robot in estimate.antenna_m})
+        levels = estimate.odometry_level.items()
+        feared = [level for robot, level in levels if not estimate.is_slipping(robot)]
+        return _Model(mountings, max(feared, default=1.0))
+
+    def is_new(self, before: _Model) -> bool:
+        """Does it explain what the one before could not?"""
+        is_wider = self.level >= MUCH_WORSE > before.level
+        return is_wider or bool(self.mountings - before.mountings)
+
+
 class Revisions:
     """Of one robot's own pose, and of all pairs."""
 
@@ -59,6 +84,7 @@ class Revisions:
         self._claims: deque[tuple[float, _Claim]] = deque(maxlen=MOST_CLAIMS)
         self._moves: deque[tuple[float, dict[Whose, float]]] = deque(maxlen=MOST_CLAIMS)
         self._own = -1
+        self._model = _Model()
 
     @property
     def boldness(self) -> float:
@@ -88,6 +114,12 @@ class Revisions:
         if solved is None or not len(solved.n) or estimate.covariance(robot) is None:
             return
         self._own, now = robot, float(solved.n[-1])
+        model = _Model.of(estimate)
+        if model.is_new(self._model) and estimate.is_explained:
+            # what was claimed under another one says nothing against this
+            self._claims.clear()
+            self._moves.clear()
+        self._model = model
         for remembered in (self._claims, self._moves):
             while remembered and remembered[0][0] < now - REMEMBERED:
                 remembered.popleft()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drslamd.conventions import GRID_HZ, Chain, Segment
-from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
+from drslamd.slam.graph.estimate import MUCH_WORSE, Learned, TeamEstimate, Trajectory
 from drslamd.slam.revisions import (
     ALLOWED,
     ALLOWED_OF_PAIRS,
@@ -85,6 +85,44 @@ def test_angles_are_compared_around_the_circle() -> None:
 
 def test_claims_are_a_second_apart_and_few() -> None:
     assert REMEMBERED == 20 * GRID_HZ
+
+
+def antenna(estimate: TeamEstimate, robot: int) -> TeamEstimate:
+    """With the antenna of a robot learned beside its place."""
+    learned = (Learned(0.3, 0.05), Learned(0.0, 0.05))
+    return replace(estimate, antenna_m={**estimate.antenna_m, robot: learned})
+
+
+def test_what_was_claimed_before_a_mounting_was_learned_says_nothing_of_now() -> None:
+    before, moved = solution([0, 10]), solution([0, 10, 20], 3.0)
+    assert boldness(before, antenna(moved, 0)) == 1.0
+    assert boldness(before, replace(moved, turn={0: Learned(0.3, 0.05)})) == 1.0
+    # and a second one says nothing of the first
+    assert boldness(antenna(before, 1), antenna(antenna(moved, 0), 1)) == 1.0
+
+
+def test_what_is_claimed_under_the_same_mountings_is_compared() -> None:
+    before, moved = solution([0, 10]), solution([0, 10, 20], 3.0)
+    assert boldness(antenna(before, 0), antenna(moved, 0)) > 1.0
+    # one that is no longer believed was no better model
+    assert boldness(antenna(before, 0), moved) > 1.0
+    # nor one that still does not explain what was measured
+    unfit = replace(antenna(moved, 0), is_explained=False)
+    assert boldness(before, unfit) > 1.0
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "counts"),
+    [(1.0, MUCH_WORSE, False), (1.0, 2.9, True), (2.9, MUCH_WORSE, False), (3.1, 9.0, True)],
+)
+def test_nor_does_what_was_claimed_before_odometry_was_known_to_be_much_worse(
+    before: float, now: float, counts: bool
+) -> None:
+    claimed = replace(solution([0, 10]), odometry_level={0: before})
+    moved = replace(solution([0, 10, 20], 3.0), odometry_level={3: now})
+    assert (boldness(claimed, moved) > 1.0) is counts
+    # of whose odometry there is doubt all counts
+    assert boldness(claimed, replace(moved, late_level={3: MUCH_WORSE})) > 1.0
 
 
 # pairs

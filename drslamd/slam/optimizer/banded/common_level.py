@@ -37,8 +37,9 @@ MOST = 32.0
 """Nearly six times the sigma; where so much is asked for it is no slip."""
 CLEAR = 1.0
 """Of -2 log p that a factor must bring; as modelled it brings nothing."""
-ALONE = 4.0
-"""By so much more than everybody one robot must explain, for the others to be as configured."""
+ALONE = 10.0
+"""By so much more than everybody one robot must explain, for the others to be as configured; where
+all slip one explains up to 6 more by chance."""
 FEWEST = 3
 """Robots: of two nobody can tell who it was."""
 TAILS = 4.0
@@ -87,20 +88,21 @@ def common_level(
     if before is None:
         return None
     links = problem.odometry.robot
-    variance, gain = _likeliest(equations, nominal, before, np.ones(len(links), dtype=bool))
+    everybody = np.ones(len(links), dtype=bool)
+    variance, gain, near = _likeliest(equations, nominal, before, everybody)
     if gain < CLEAR:
         return None
     robots, is_alone = len(problem.priors.scale), False
     if robots >= FEWEST:
         worst = _worst(equations, nominal, robots)
-        alone, more = _likeliest(equations, nominal, before, links == worst)
+        alone, more, beside = _likeliest(equations, nominal, before, links == worst)
         is_alone = more >= gain + ALONE
         if is_alone:
-            variance, gain = alone, more
-    if variance.max() >= MOST:
-        return None
-    believed = Equations(raised(problem, variance, nominal), like=equations)
-    point = descend(believed, nominal.calibration, most, tolerance)
+            variance, gain, near = alone, more, beside
+    if variance.max() > 0.99 * MOST:
+        return None  # more would be as likely
+    believed = Equations(raised(problem, variance, near), like=equations)
+    point = descend(believed, near.calibration, most, tolerance)
     factor = BandFactor.of(believed.weighed(point))
     if factor is None or not point.converged:
         return None
@@ -119,12 +121,14 @@ def _worst(equations: Equations, nominal: Point, robots: int) -> int:
 
 def _likeliest(
     equations: Equations, nominal: Point, before: float, who: NDArray[np.bool_]
-) -> tuple[Array, float]:
-    """(m,) the likeliest variances over those configured, of some links, and the gain."""
-    logs, surprises = [0.0], [before]
-    for factor, surprise in _tried(equations, nominal, who):
+) -> tuple[Array, float, Point]:
+    """(m,) the likeliest variances over those configured, of some links, the gain, and a solution
+    near by."""
+    logs, surprises, points = [0.0], [before], [nominal]
+    for factor, surprise, point in _tried(equations, nominal, who):
         logs.append(np.log(factor))
         surprises.append(surprise)
+        points.append(point)
         if surprise > surprises[-2]:
             break
     at = int(np.argmin(surprises))
@@ -133,13 +137,13 @@ def _likeliest(
         # the vertex of the parabola through the best and those beside it
         left, here, right = surprises[at - 1 : at + 2]
         log += np.log(STEP) * (left - right) / (2 * (left - 2 * here + right))
-    return np.where(who, np.exp(log), 1.0), gain
+    return np.where(who, np.exp(log), 1.0), gain, points[at]
 
 
 def _tried(
     equations: Equations, nominal: Point, who: NDArray[np.bool_]
-) -> Iterator[tuple[float, float]]:
-    """Factors, and -2 log p of each but for a constant; as long as there is one."""
+) -> Iterator[tuple[float, float, Point]]:
+    """Factors, -2 log p of each but for a constant, and solutions; as long as there are any."""
     factor, near = STEP, nominal
     while factor <= MOST:
         problem = raised(equations.problem, np.where(who, factor, 1.0), near)
@@ -148,7 +152,7 @@ def _tried(
         surprise = _surprise(believed, point, nominal.threshold)
         if surprise is None:
             return
-        yield factor, surprise
+        yield factor, surprise, point
         factor, near = factor * STEP, point
 
 

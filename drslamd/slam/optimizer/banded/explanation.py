@@ -1,10 +1,10 @@
 """Is the model one of what was measured, and if not, what is?
 
 A solution as configured is asked three questions: does odometry fit, do ranges fit now, does some
-track or antenna ask to be another one? Most often all is well. Else, if no mounting asks, odometry
-that was worse all along is tried (`common_level`), then wheels that stood or spun (`lapses`), then
-mountings (`mountings`), which explain a fault for good, and then odometry that was worse for a
-while (`odometry_levels`).
+track or antenna ask to be another one? Most often all is well. Else odometry that was worse all
+along is tried (`common_level`), then wheels that stood or spun (`lapses`), then mountings
+(`mountings`), which explain a fault for good and must explain more than such odometry, and then
+odometry that was worse for a while (`odometry_levels`).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from drslamd.slam.optimizer.banded import common_level, mountings, odometry_levels
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
-from drslamd.slam.optimizer.banded.common_level import ASKS, TAILS, pooled
+from drslamd.slam.optimizer.banded.common_level import ASKS, TAILS, CommonLevel, pooled
 from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.lapses.known_lapses import settled
 from drslamd.slam.optimizer.banded.misfit import (
@@ -85,11 +85,10 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
     equations, nominal = settled(equations, nominal, most, tolerance)
     check = _checked(equations, nominal)
     is_fine = check.is_passed() and not check.scores.ask()
-    if not check.scores.ask():
-        common = _in_common(equations, nominal, check, most, tolerance)
-        if common is not None:
-            return common
-    if not is_fine or not _fits(equations, nominal):
+    common = _in_common(equations, nominal, check, most, tolerance)
+    if common is not None and not check.scores.ask():
+        return _commonly(equations, common)
+    if common is None and not (is_fine and _fits(equations, nominal)):
         lapse = _by_lapse(equations, nominal, most, tolerance)
         if lapse is not None:
             return lapse
@@ -100,14 +99,16 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
         mounted, better = mountings.fitted(equations, nominal, check.scores, most, tolerance)
         again, gain = _checked(mounted, better), _gain(equations, nominal, mounted, better)
         is_worth = better.converged and gain >= check.scores.least_gain()
-        if is_worth and _fits(mounted, better) and again.is_passed():
-            return _as_is(mounted, better, again.ratio)
+        if is_worth and (common is None or gain >= common.gain):
+            beside = _in_common(mounted, better, again, most, tolerance)
+            if beside is not None:
+                return _commonly(mounted, beside)
+            if _fits(mounted, better) and again.is_passed():
+                return _as_is(mounted, better, again.ratio)
         if is_worth and gain > MUCH and check.scores.ask_alone():
             bases.insert(0, (mounted, better, again))
-        for base, point, said in bases:
-            common = _in_common(base, point, said, most, tolerance)
-            if common is not None:
-                return common
+        if common is not None:
+            return _commonly(equations, common)
         if check.is_passed() and not check.scores.ask_alone():
             return _as_is(equations, nominal, check.ratio)
     for base, point, said in bases:
@@ -132,15 +133,17 @@ def _by_lapse(
 
 def _in_common(
     equations: Equations, nominal: Point, check: _Check, most: int, tolerance: float
-) -> Explanation | None:
+) -> CommonLevel | None:
     """Odometry was worse than configured, of all robots alike or of one, if that explains all."""
     if check.pooled <= ASKS:
         return None
     found = common_level.common_level(equations, nominal, most, tolerance)
     if found is None or (found.ratio > TARGET).any() or not _fits(equations, found.point):
         return None
-    if runs(equations.problem, found.point):
-        return None
+    return None if runs(equations.problem, found.point) else found
+
+
+def _commonly(equations: Equations, found: CommonLevel) -> Explanation:
     feared = 1.0 + TAILS * (found.variance - 1.0)
     # what is the same for all is in the covariances, and no reason to doubt anybody
     lately = feared if found.is_alone else np.ones(len(feared))

@@ -9,6 +9,7 @@ import numpy as np
 
 from drslamd.conventions import GRID_HZ
 from drslamd.slam.graph.estimate import Lapse
+from drslamd.slam.optimizer.banded.lapses.mirrors import on_likelier_side
 from drslamd.slam.optimizer.banded.lapses.placements import best_placed
 from drslamd.slam.optimizer.banded.lapses.stretches import (
     freed_links,
@@ -86,6 +87,7 @@ def settled(
         return equations, point
     for at, one in enumerate(freed):
         if not one.is_settled:
+            point = on_likelier_side(equations, point, one, most, tolerance)
             point, is_clear = best_placed(equations, point, one, most, tolerance)
             newest = problem.n[problem.odometry.j[problem.odometry.robot == one.robot]].max()
             is_old = newest >= span(problem, one)[1] + SETTLES_S * GRID_HZ

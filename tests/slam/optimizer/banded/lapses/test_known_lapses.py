@@ -99,6 +99,25 @@ def test_a_lapse_is_settled_after_ten_seconds_if_then_it_is_clear_where_it_led(
     assert remembered.is_settled is is_settled
 
 
+def test_the_side_on_which_a_way_bends_less_is_where_the_way_behind_begins(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem, freed = freed_team()
+    point = nominal(a_team()[0])
+    bent, behind = (replace(point, poses=point.poses + k) for k in (1.0, 2.0))
+    monkeypatch.setattr(known_lapses, "on_likelier_side", lambda *_: bent)
+    asked: list[object] = []
+
+    def placed(equations: Equations, at: object, *_: object) -> PlacedWay:
+        asked.append(at)
+        return PlacedWay(behind, is_clear=False)
+
+    monkeypatch.setattr(known_lapses, "best_placed", placed)
+    _, found = settled(Equations(with_freed(problem, freed)), point, 60, TOLERANCE)
+    assert asked == [bent]
+    assert found is behind
+
+
 def test_of_what_is_settled_nothing_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, freed = freed_team()
     monkeypatch.delattr(known_lapses, "best_placed")
