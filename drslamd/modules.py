@@ -31,6 +31,7 @@ class Modules:
     ) -> None:
         self._front, self._back, self._team, self._jobs = front, back, team, jobs
         self._neighbours = neighbours
+        self._is_awaited = False
 
     def on_odometry(self, robot: int, utime: int) -> list[Effect]:
         """A peer said where its wheels went: the next window of a pair that nobody knows of."""
@@ -84,8 +85,16 @@ class Modules:
         run = self._back.begin(self._team.present(utime), set(self._team.living(utime)), utime)
         return [self._jobs.begin(Job(OPTIMIZER), run)] if run else []
 
+    def optimize_soon(self, utime: int) -> list[Effect]:
+        """Module 3 now, or as soon as it has done what it does: its answer is waited for."""
+        self._is_awaited = not self._jobs.is_free(OPTIMIZER, utime)
+        return self.optimize(utime)
+
     def place(self, standing: Standing, neighbours: list[PeerInRange], utime: int) -> list[Effect]:
         """After a hole in our odometry: where do ranges place us? And where is what stands?"""
         carrier, is_free = self._team.robot_of_uwb, self._jobs.is_free
         asked = standing.asked(neighbours, carrier, is_free, utime)
-        return [self._jobs.begin(Job(name, told=told), run) for name, run, told in asked]
+        begun: list[Effect] = [
+            self._jobs.begin(Job(name, told=told), run) for name, run, told in asked
+        ]
+        return [*begun, *(self.optimize_soon(utime) if self._is_awaited else [])]

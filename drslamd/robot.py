@@ -291,7 +291,7 @@ class Robot:
         return self.modules.consistency(utime, pair) if is_answered else []
 
     def _tell_at_once(self, utime: int) -> list[Effect]:
-        return [*self._extend_log(utime), *self.modules.optimize(utime)]
+        return [*self._extend_log(utime), *self.modules.optimize_soon(utime)]
 
     # what we know of ourselves
 

@@ -56,6 +56,25 @@ def test_until_a_pair_is_told_what_is_found_of_it_goes_on_at_once_up_to_module_3
     assert len(solves(effects, OPTIMIZER)) == 1
 
 
+@pytest.mark.parametrize("is_asked", [False, True])
+def test_news_that_come_while_module_3_computes_are_solved_as_soon_as_it_has(
+    is_asked: bool,
+) -> None:
+    """Not a second later, and not without news."""
+    scene = Waiting()
+    modules, standing = scene.robot.modules, scene.robot.standing
+    under_way = scene.robot.jobs.begin(Job(OPTIMIZER), lambda: None)
+    if is_asked:
+        assert not solves(scene.checked(last_answer(scene)), OPTIMIZER)
+        assert scene.pair.is_told
+    assert not solves(modules.place(standing, [], scene.utime), OPTIMIZER)
+    scene.robot.jobs.finish(JobDone(scene.utime, under_way.job_id, None, 1000))
+    later = scene.utime + 10_000
+    begun = solves(modules.place(standing, [], later), OPTIMIZER)
+    assert len(begun) == is_asked
+    assert not solves(modules.place(standing, [], later + 250_000), OPTIMIZER)
+
+
 def test_a_pair_that_is_not_connected_yet_is_not_told() -> None:
     scene = Waiting(agreeing=4)
     assert scene.checked(last_answer(scene)) == []

@@ -43,6 +43,10 @@ MAX_SIGMA_M, MAX_SIGMA_RAD = 0.4, np.radians(8.0)
 """What is vaguer is not said yet."""
 FEWEST = 10
 """Ranges."""
+BEATEN_CHI2 = 12.0
+"""A minimum that ranges alone make so much worse than the best (2 log-likelihood, 400 to 1) is
+none. Where the robot was may be wrong in another way than was thought: with its help it takes
+`EXCLUDED_CHI2`."""
 
 
 class Prior(NamedTuple):
@@ -98,7 +102,7 @@ def place(seen: Sightings, stretch: WayUnder, prior: Prior, model: RangeModel) -
     is_poor = not first.chi2 <= POOR_FIT * len(seen) or problem.share_off(first.x) > MOST_OFF
     if is_poor:
         return "ranges and odometry disagree"
-    rivals = [one for one in judged[1:] if one.chi2 < first.chi2 + EXCLUDED_CHI2]
+    rivals = [one for one in judged[1:] if not first.beats(one)]
     if len(distinct_poses(np.array([one.x for one in (first, *rivals)]), MERGE_M, MERGE_RAD)) > 1:
         return "ambiguous"
     sigma_m = np.sqrt(np.linalg.eigvalsh(first.covariance[:2, :2])[-1])
@@ -108,11 +112,19 @@ def place(seen: Sightings, stretch: WayUnder, prior: Prior, model: RangeModel) -
 
 
 class _Judged(NamedTuple):
-    """A minimum (3,) with its covariance (3, 3) and chi-squared."""
+    """A minimum (3,) with its covariance (3, 3) and chi-squared; `before` is what where the robot
+    was adds to that."""
 
     x: Array
     covariance: Array
     chi2: float
+    before: float
+
+    def beats(self, other: _Judged) -> bool:
+        """Is the other one so much less likely that it is none?"""
+        apart = other.chi2 - self.chi2
+        by_ranges = apart - (other.before - self.before)
+        return apart >= EXCLUDED_CHI2 or min(apart, by_ranges) >= BEATEN_CHI2
 
 
 class _Problem:
@@ -212,9 +224,9 @@ class _Problem:
             spread = np.linalg.inv(normal + 1e-9 * np.eye(3))
             step = -spread @ (j.T @ weighted[:, 3] + v * by.T @ before)
             x = x + step * min(1.0, LONGEST / (float(np.abs(step).max()) + 1e-12))
-        chi2 = float(e @ weighted[:, 3] + self._robust(before @ before))
+        added = float(self._robust(before @ before))
         x[2] = float(se2.wrap(x[2]))
-        return _Judged(x, spread, chi2)
+        return _Judged(x, spread, float(e @ weighted[:, 3]) + added, added)
 
     def _noise(self, e: Array, j: Array, x: Array) -> Array:
         """(k, k) of the residuals: ranges share their errors with those before, with all of the

@@ -131,7 +131,7 @@ class Relocation:
         self._carry(beacons, estimate, own, until, utime)
         if is_placed:
             return None
-        return self._placing(beacons, estimate, own, until, utime)
+        return self._placing(beacons, estimate, own, utime)
 
     # while nothing is known of the way
 
@@ -192,13 +192,14 @@ class Relocation:
     # once the wheels count again
 
     def _placing(
-        self, beacons: list[Beacon], estimate: TeamEstimate, own: PairEnd, until: int, utime: int
+        self, beacons: list[Beacon], estimate: TeamEstimate, own: PairEnd, utime: int
     ) -> Callable[[], Found] | None:
         is_told = self._told_at is not None and utime - self._told_at < AGAIN_US
         start = own.track.segment_start
         if self._prior is None or self._prior_start != start or start < own.track.n0 or is_told:
             return None
-        return question(beacons, estimate, own, self._own, self._prior, until)
+        # (each peer's odometry counts as far as it came, not only as far as everybody's did)
+        return question(beacons, estimate, own, self._own, self._prior, utime)
 
     def on_found(self, found: Found, own: PairEnd | None, utime: int) -> bool:
         """A computation has ended: is there a closure to tell?"""

@@ -7,10 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drslamd.slam import se2
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.range_model import LINKTRACK
+from drslamd.slam.relocation import placing
 from drslamd.slam.relocation.placing import FEWEST, Placed, Prior, WayUnder, place
 from drslamd.slam.relocation.sightings import Sightings
+from drslamd.slam.se2 import Array
 
 NOISE = OdometryNoise(0.02, 0.002, 0.01, 0.008)
 W_T_O = np.array([4.0, -1.0, 2.2])
@@ -69,13 +72,46 @@ def test_who_has_hardly_moved_has_no_heading() -> None:
 def test_two_places_that_fit_are_ambiguous() -> None:
     """On a straight line, and of where it was nothing is known: the other side of the line between
     both peers fits as well."""
+    assert place(*on_a_line(), LINKTRACK) == "ambiguous"
+
+
+def on_a_line() -> tuple[Sightings, WayUnder, Prior]:
     seen, stretch = driven(3.0)
     straight = np.stack([stretch.way_m, 0 * stretch.way_m], axis=-1)
     turn = np.array([np.cos(2.2), np.sin(2.2)])
     true = W_T_O[:2] + stretch.way_m[:, None] * turn
     seen = replace(seen, range_m=np.hypot(*(true - seen.place).T))
     wide = Prior(np.array([3.0, 2.5]), 25.0 * np.eye(2), 6.0)
-    assert place(seen, replace(stretch, antenna=straight), wide, LINKTRACK) == "ambiguous"
+    return seen, replace(stretch, antenna=straight), wide
+
+
+@pytest.mark.parametrize(
+    ("by_ranges", "by_prior", "is_named"),
+    [
+        (11.9, 0.0, False),
+        (12.1, 0.0, True),
+        (11.9, 8.0, False),
+        (11.9, 8.2, True),
+        (12.1, -0.2, False),
+        (0.0, 20.1, True),
+    ],
+)
+def test_a_place_that_ranges_make_four_hundred_times_less_likely_is_none(
+    by_ranges: float, by_prior: float, is_named: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Or a hundred times less than that, where the place before the hole has a say in it."""
+    judged = placing._Problem.judged
+    first: list[float] = []
+
+    def with_costs(problem: placing._Problem, x: Array) -> placing._Judged:
+        found = judged(problem, x)
+        first.append(found.x[2])
+        is_same = abs(se2.wrap(found.x[2] - first[0])) < 0.1
+        worse = 0.0 if is_same else by_ranges + by_prior
+        return found._replace(chi2=5.0 + worse, before=0.0 if is_same else by_prior)
+
+    monkeypatch.setattr(placing._Problem, "judged", with_costs)
+    assert isinstance(place(*on_a_line(), LINKTRACK), Placed) is is_named
 
 
 @pytest.mark.parametrize("count", [FEWEST - 1, FEWEST])
