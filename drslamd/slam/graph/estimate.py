@@ -114,6 +114,7 @@ class TeamEstimate:
         settled: is it the same from wherever it was begun?
         lifted: state of the relaxation, with `rbcd`.
         nodes: by number, the places of modules that no robot carries.
+        left: those of modules that stand elsewhere since, nobody knows where.
         points: what stands, and of which only the place is known: every node, and parked robots.
         is_as_modelled: was it explained with odometry as it is configured?
         kept: what the solver keeps of it for the next one.
@@ -145,6 +146,7 @@ class TeamEstimate:
     settled: bool = True
     lifted: Lifted | None = None
     nodes: dict[int, Trajectory] = field(default_factory=dict)
+    left: dict[int, Trajectory] = field(default_factory=dict)
     points: frozenset[int] = frozenset()
     is_as_modelled: bool = True
     kept: object = field(default=None, repr=False, compare=False)
@@ -158,6 +160,11 @@ class TeamEstimate:
     def everybody(self) -> dict[int, Trajectory]:
         """Robots, and after them what stands without one."""
         return {**self.trajectories, **self.nodes}
+
+    @property
+    def paths(self) -> dict[int, Trajectory]:
+        """All that was solved."""
+        return {**self.everybody, **self.left}
 
     def covariance(self, robot: int) -> Array | None:
         """(3, 3) of the last pose of a robot; None where nothing is known of it."""

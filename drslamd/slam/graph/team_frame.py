@@ -148,7 +148,7 @@ def _in_frame(
     if previous is None:
         return {}
     if previous.frame == frame:
-        return previous.everybody
+        return previous.paths
     old = previous.trajectories.get(frame.robot)
     if old is None or old.chain != frame.chain:
         return {}
@@ -160,7 +160,7 @@ def _in_frame(
     w_T_old = se2.compose(known.poses[0], se2.inverse(before))
     return {
         robot: Trajectory(t.chain, t.n, se2.compose(w_T_old[None], t.poses))
-        for robot, t in previous.everybody.items()
+        for robot, t in previous.paths.items()
     }
 
 

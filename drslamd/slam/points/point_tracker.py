@@ -2,8 +2,10 @@
 
 What is said of it are a closure without a heading, and then ranges: those that led to its place,
 and one a second while the robot moves. Whether it still stands there, ranges of the last seconds
-say: a node that somebody moves is noticed as soon as they do not fit for some seconds, its closure
-is withdrawn, and it is looked for anew as if it had never been seen. Meanwhile no range is said
+say: a node that somebody moves is noticed as soon as they do not fit for some seconds, and it is
+looked for anew as if it had never been seen. Where ranges fitted for long, what was measured stays
+true: the place that it has left stays in the graph, and a range to the next one says that it was
+left. Else it may never have stood there, and its closure is withdrawn. Meanwhile no range is said
 that may be to another place, or the team would bend until all of them fit.
 """
 
@@ -49,6 +51,11 @@ HELD_SIGMAS, HELD_M = 2.0, 0.25
 """A range that is off by more of both is not said."""
 MOST_BIAS_M = 0.15
 """What a bias is known to as soon as a place is."""
+PROVEN_S = 15
+"""So many seconds of ranges that fit make a place one that was right: what lies on the other side
+of the way does not fit for long."""
+NEXT_SIGMA_M = 10.0
+"""Of the range that says that a place was left: it may still be carried about."""
 OFF_S = 6
 """So many seconds more in which ranges do not fit than in which they do: longer than a burst."""
 
@@ -93,7 +100,7 @@ class PointTracker:
         self._since = target.since_us
         self._before: Array | None = None
         self._place: Array | None = None
-        self._off, self._is_held = 0, False
+        self._off, self._fits, self._is_held = 0, 0, False
         self._closures: list[ClosureMeasurement] = []
         self._ranges: list[RangeMeasurement] = []
 
@@ -241,6 +248,7 @@ class PointTracker:
         is_off = metres > OFF_M and sigmas > OFF_SIGMAS
         self._off = max(0, self._off + (1 if is_off else -1))
         self._is_held = self._off > 0 or (metres > HELD_M and sigmas > HELD_SIGMAS)
+        self._fits += not self._is_held
         return self._off >= OFF_S
 
     def is_outdated(self, graph: PoseGraph) -> bool:
@@ -248,12 +256,38 @@ class PointTracker:
         known = graph.nodes.get(self.target.chain.robot)
         return self.told is not None and known is not None and known.keyframes.n[-1] > self.target.n
 
+    @property
+    def is_proven(self) -> bool:
+        """Did it stand where it was told, sure enough?"""
+        return is_node(self.target.chain.robot) and self._fits >= PROVEN_S
+
+    def leave(self, own: PairEnd, ranges: RangeBuffer, utime: int) -> None:
+        """It does not stand there any more: say so, and look for it anew."""
+        if not self.is_proven:
+            self.let_go(utime)
+            return
+        last, since = min(own.last_us, ranges.newest or 0), len(self._ranges)
+        self._sampled, self._place = 0, None
+        self._say(own, ranges.between(max(last - SECOND_US, own.first_us), last))
+        said = self._ranges[since:]
+        self._ranges[since:] = [
+            replace(one, b_n=self.target.n + 1, sigma_m=NEXT_SIGMA_M) for one in said
+        ]
+        if said:
+            self.begin_again(utime)
+        else:
+            self.let_go(utime)
+
     def let_go(self, utime: int) -> None:
-        """It does not stand there any more: withdraw what was told, and look for it anew."""
+        """It never stood there, or is something else: withdraw what was told, begin again."""
         if self.told is not None:
             self._closures.append(replace(self.told, kept=False))
+        self.begin_again(utime)
+
+    def begin_again(self, utime: int) -> None:
+        """Look for it as if it had never been seen."""
         self.told = self.found = self._before = None
-        self._since, self._off, self._is_held = utime, 0, False
+        self._since, self._off, self._fits, self._is_held = utime, 0, 0, False
 
     def _misfit(
         self, estimate: TeamEstimate, own: PairEnd, ranges: RangeBuffer

@@ -82,10 +82,13 @@ class Points:
             buffer = ranges.get(uwb_id)
             if buffer is None or uwb_id not in targets:
                 continue
-            if tracker.is_outdated(graph) or (
-                estimate is not None and tracker.watch(estimate, own, buffer)
-            ):
+            is_outdated = tracker.is_outdated(graph)
+            if is_outdated and tracker.is_proven:
+                tracker.begin_again(utime)
+            elif is_outdated:
                 tracker.let_go(utime)
+            elif estimate is not None and tracker.watch(estimate, own, buffer):
+                tracker.leave(own, buffer, utime)
             tracker.sample(own, buffer)
             run = tracker.look(own, buffer, utime)
             if run is not None:
@@ -192,8 +195,12 @@ def _place_number(
     known = graph.nodes.get(node.robot)
     following = int(known.keyframes.n[-1]) + 1 if known is not None else 0
     last = int(max(_places_told(graph, node), default=-1))
-    if last < 0 or estimate is None:
-        return following if last < 0 else last
+    if last < 0:
+        return following
+    if known is not None and known.keyframes.n[-1] > last:
+        return int(known.keyframes.n[-1])  # (it has left the last one that was found)
+    if estimate is None:
+        return last
     robot = own.data.chain.robot
     solved, there = estimate.trajectories.get(robot), estimate.nodes.get(node.robot)
     if solved is None or there is None or int(there.n[-1]) != last or not len(solved.n):

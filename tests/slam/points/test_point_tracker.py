@@ -13,11 +13,14 @@ from drslamd.slam import se2
 from drslamd.slam.graph.tables import NO_HEADING
 from drslamd.slam.points.point_tracker import (
     LOOK_US,
+    NEXT_SIGMA_M,
     OFF_M,
     OFF_S,
+    PROVEN_S,
     PointTracker,
     Target,
 )
+from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 
 NODE = node_chain(77)
 MODULE = Target(NODE)
@@ -130,6 +133,45 @@ def test_what_is_let_go_is_withdrawn_and_looked_for_anew() -> None:
     assert run is not None
     found, _ = run()
     assert found.verdict != ""
+
+
+@pytest.mark.parametrize("seconds", [PROVEN_S - 1, PROVEN_S])
+def test_what_stood_where_it_was_told_for_long_stays_told_and_stands_elsewhere_since(
+    seconds: int,
+) -> None:
+    """A range to the next place says so; what was not proven is withdrawn."""
+    scene, tracker = told()
+    for _ in range(seconds):
+        scene.drive(1)
+        assert not tracker.watch(scene.estimate(NODE.robot, PLACE), scene.own, scene.ranges)
+    assert tracker.is_proven is (seconds == PROVEN_S)
+    (first,) = tracker.tell()
+    tracker.tell_ranges()
+    tracker.leave(scene.own, scene.ranges, scene.utime)
+    assert tracker.told is None
+    assert not tracker.is_proven
+    if seconds < PROVEN_S:
+        assert tracker.tell() == [replace(first, kept=False)]
+        assert tracker.tell_ranges() == []
+        return
+    assert tracker.tell() == []
+    (left,) = tracker.tell_ranges()
+    assert (left.peer, left.b_n, left.sigma_m) == (NODE, 1, NEXT_SIGMA_M)
+    scene.say([first], [left])
+    assert scene.graph.nodes[NODE.robot].keyframes.n.tolist() == [0, 1]
+
+
+def test_of_what_is_out_of_sight_nothing_can_say_that_it_stands_elsewhere() -> None:
+    scene, tracker = told()
+    for _ in range(PROVEN_S):
+        scene.drive(1)
+        tracker.watch(scene.estimate(NODE.robot, PLACE), scene.own, scene.ranges)
+    tracker.tell()
+    tracker.tell_ranges()
+    tracker.leave(scene.own, RangeBuffer(), scene.utime)
+    (withdrawn,) = tracker.tell()
+    assert not withdrawn.kept
+    assert tracker.tell_ranges() == []
 
 
 def test_somebody_else_found_it_elsewhere() -> None:

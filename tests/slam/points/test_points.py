@@ -19,7 +19,7 @@ from drslamd.gossip.message_types import Pose, PoseState
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import ClosureMeasurement, GraphEntry
 from drslamd.slam.graph.tables import NO_HEADING
-from drslamd.slam.points.point_tracker import Target
+from drslamd.slam.points.point_tracker import PROVEN_S, Target
 from drslamd.slam.points.points import FIRST_NUMBER, MOST, Points
 
 UWB_ID, OTHER = 77, 78
@@ -78,6 +78,35 @@ def test_a_module_that_is_moved_gets_another_place() -> None:
     robot.estimate = None
     robot.drive(30)
     assert robot.kept() == [(FIRST_NUMBER + 2, 1)]
+
+
+def test_a_module_that_stood_long_enough_keeps_its_place_and_gets_the_next_one() -> None:
+    robot = Robot()
+    robot.drive(45)
+    robot.drive(PROVEN_S, is_solved=True)
+    robot.scene.node = PLACE + [-4.0, 2.0]
+    kept = []
+    for _ in range(30):
+        robot.drive(1, is_solved=True)
+        named = robot.scene.graph.nodes[NODE.robot].keyframes.n.tolist()
+        kept.append((named, robot.kept()))
+    assert ([0], [(FIRST_NUMBER + 1, 0)]) in kept
+    assert ([0, 1], [(FIRST_NUMBER + 1, 0)]) in kept
+    assert robot.kept() == [(FIRST_NUMBER + 1, 0), (FIRST_NUMBER + 2, 1)]
+
+
+@pytest.mark.parametrize("seconds", [PROVEN_S - 1, PROVEN_S])
+def test_what_somebody_else_found_elsewhere_was_here_before_if_ranges_fitted_for_long(
+    seconds: int,
+) -> None:
+    robot = Robot()
+    robot.drive(45)
+    robot.drive(seconds, is_solved=True)
+    (closure,) = robot.scene.graph.pairs[OWN.robot, NODE.robot].kept_closures()
+    insert(robot, Chain(8, 1), replace(closure, b_n=1))
+    robot.drive(1)
+    kept = [(FIRST_NUMBER + 1, 0)] if seconds == PROVEN_S else []
+    assert robot.kept() == kept
 
 
 @pytest.mark.parametrize(("moved", "said"), [((2.0, -2.0), 0), ((2.0, 2.0), 3)])

@@ -106,6 +106,7 @@ class TeamProblem:
             costs some steps more and would be in vain while others come.
         is_near: is there one of nearly all of them, with a model that was right?
         by_gyro: robots whose constant yaw rate is that of a gyro.
+        left: modules of which only places are here that they have left since.
     """
 
     problem: Problem
@@ -116,6 +117,7 @@ class TeamProblem:
     is_known: bool
     by_gyro: frozenset[int]
     is_near: bool = False
+    left: frozenset[int] = frozenset()
 
 
 def build_problem(
@@ -157,8 +159,14 @@ def build_problem(
     start = _start(previous, known, pairs, robots, by_gyro)
     solved = {chain.chain: places.n[places.of_robot(chain.chain.robot)] for chain in chains}
     is_known, is_near = _knows(previous, group, solved), _is_near(previous, group, solved)
+    left = frozenset(
+        data.chain.robot
+        for data in chains
+        if is_node(data.chain.robot) and data.keyframes.n[-1] > solved[data.chain][-1]
+    )
+    by_gyros = frozenset(by_gyro)
     return TeamProblem(
-        problem, start, list(solved), pairs, places, is_known, frozenset(by_gyro), is_near
+        problem, start, list(solved), pairs, places, is_known, by_gyros, is_near, left
     )
 
 
@@ -173,7 +181,7 @@ def _knows(previous: TeamEstimate | None, group: Group, keyframes: Mapping[Chain
     """Is there a good solution of these keyframes (k,) in the frame of the group?"""
     if previous is None or previous.frame != group.frame or not previous.converged:
         return False
-    known = {t.chain: t.n for t in previous.everybody.values()}
+    known = {t.chain: t.n for t in previous.paths.values()}
     return known.keys() == keyframes.keys() and all(
         np.array_equal(known[chain], n) for chain, n in keyframes.items()
     )
@@ -267,7 +275,8 @@ def solved(
         kept: what came of the solution before.
     """
     mine = {chain.robot: team.places.of_robot(chain.robot) for chain in team.chains}
-    last = tuple(int(at[-1]) for at in mine.values())
+    stays = [chain.robot for chain in team.chains if chain.robot not in team.left]
+    last = tuple(int(mine[robot][-1]) for robot in stays)
     tolerance = tolerance or (SETTLED if team.is_known else TOLERANCE)
     solution, kept = solve(team, last, tolerance, kept)
     learned, spread, doubted = solution.calibration, solution.spread, solution.doubted
@@ -284,11 +293,10 @@ def solved(
     return TeamEstimate(
         frame=group.frame,
         trajectories={robot: path for robot, path in paths.items() if not is_node(robot)},
-        nodes={number: path for number, path in paths.items() if is_node(number)},
+        nodes={number: paths[number] for number in stays if is_node(number)},
+        left={number: paths[number] for number in team.left},
         points=points,
-        joint=standing_points.without_headings(
-            solution.joint, np.isin([chain.robot for chain in team.chains], list(points))
-        ),
+        joint=standing_points.without_headings(solution.joint, np.isin(stays, list(points))),
         bias_m=_named(team.pairs, learned.bias, spread.bias),
         bias_sigma_m=dict(zip(team.pairs, solution.bias_sigmas.tolist(), strict=True)),
         scale=_named(list(mine), learned.scale, spread.scale),
@@ -309,7 +317,7 @@ def solved(
         # (a good one stays good, should the last digits not come to rest)
         converged=solution.converged or team.is_known,
         settled=team.is_known,
-        fitted={robot: int(team.problem.n[at]) for robot, at in zip(mine, last, strict=True)},
+        fitted={robot: int(team.problem.n[mine[robot][-1]]) for robot in mine},
         is_as_modelled=solution.is_explained and bool((solution.odometry_level <= 1).all()),
         kept=kept,
     )

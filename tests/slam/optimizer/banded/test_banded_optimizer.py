@@ -23,10 +23,11 @@ from slam_scenes import (
     small_team,
 )
 
-from drslamd.conventions import Chain, Segment
+from drslamd.conventions import Chain, Segment, node_chain
 from drslamd.slam.graph.estimate import Lapse, Learned, TeamEstimate, Trajectory
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.graph.tables import NO_HEADING
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.odometry.gyro_noise import GyroNoise
 from drslamd.slam.optimizer.banded import banded_solver
@@ -40,6 +41,8 @@ from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.problem import Doubted, Freed
 from drslamd.slam.range_model import LINKTRACK
 from drslamd.slam.robot_model import RobotModel
+
+PLACE_ONLY = (0.04, 0.0, 0.0, 0.04, 0.0, float(NO_HEADING))
 
 
 def solved(graph: PoseGraph, group: Group, previous: TeamEstimate | None = None) -> TeamEstimate:
@@ -76,6 +79,39 @@ def test_a_team_is_solved_in_the_frame_of_its_lowest_robot() -> None:
         )
         error[2] = math.remainder(error[2], 2 * math.pi)
         assert error @ np.linalg.solve(covariance, error) < 14.2
+
+
+def test_a_place_that_was_left_holds_those_who_measured_it_and_is_nobodys_any_more() -> None:
+    """Until the next one is told, to which somebody has a range."""
+    team, node, place = small_team(1, count=40), node_chain(77), np.array([2.0, 1.0])
+    said = []
+    for k in range(30):
+        metres = float(np.hypot(*(place - team.truth[0][k, :2])))
+        said.append(range_item(int(team.n[0][k]), node, 0, metres, sigma=0.05))
+    seen = [*product(inverted(team.truth[0][5]), np.array([*place, 0.0]))[:2], 0.0]
+    told = replace(closure(9, int(team.n[0][5]), node, 0, seen), covariance=PLACE_ONLY)
+    team.graph.insert(team.chains[0], GraphEntry(2, None, (), tuple(said), (told,)))
+    points = frozenset([Segment(*node, 0)])
+    group = replace(group_of(team.graph), points=points)
+    before = solved(team.graph, group)
+    assert sorted(before.nodes) == [node.robot]
+    assert before.joint.shape == (12, 12)
+    away = range_item(int(team.n[0][39]), node, 1, 7.0)
+    team.graph.insert(team.chains[0], GraphEntry(3, ranges=(away,)))
+    after = solved(team.graph, group, before)
+    assert after.nodes == {}
+    assert after.covariance(node.robot) is None
+    assert np.allclose(after.joint, before.joint[:9, :9], rtol=1e-3, atol=1e-9)
+    assert after.left[node.robot].poses == pytest.approx(before.nodes[node.robot].poses, abs=1e-5)
+    # a solution of the same keyframes is settled, whose place nobody claims or not
+    assert solved(team.graph, group, after).settled
+    again = replace(told, number=10, b_n=1)
+    team.graph.insert(team.chains[0], GraphEntry(4, closures=(again,)))
+    both = replace(group, points=points | {Segment(*node, 1)})
+    found = solved(team.graph, both, after)
+    assert found.nodes[node.robot].n.tolist() == [0, 1]
+    assert found.left == {}
+    assert found.joint.shape == (12, 12)
 
 
 def test_what_is_claimed_is_named_by_its_robot_and_its_pair() -> None:
