@@ -23,6 +23,7 @@ from drslamd.slam.pose_now import noise_of_way
 from drslamd.slam.range_model import RangeModel
 from drslamd.slam.relative_pose.pair_end import PairEnd, level
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
+from drslamd.slam.robot_model import RobotModel
 from drslamd.slam.se2 import Array
 
 FAR_SIGMAS = 3.0
@@ -94,6 +95,21 @@ class _End(NamedTuple):
     added: Array
 
 
+class _Known(NamedTuple):
+    """The antenna of a partner, and all that it follows from: who stands says nothing new."""
+
+    estimate: TeamEstimate
+    data: ChainData
+    changes: int
+    model: RobotModel
+    n: int
+    end: _End | None
+
+    def follows(self, estimate: TeamEstimate, data: ChainData, n: int) -> bool:
+        is_same = self.estimate is estimate and self.data is data and self.model is data.model
+        return is_same and (self.n, self.changes) == (n, data.changes)
+
+
 class RangeWatch:
     """Of one robot.
 
@@ -111,6 +127,8 @@ class RangeWatch:
         self._gap_m, self._jump_m = 0.0, 0.0
         self._late_m: deque[float] = deque(maxlen=LASTS)
         self._believed = -1
+        self._known: dict[int, _Known] = {}
+        """By partner."""
 
     @property
     def gap_m(self) -> float:
@@ -137,9 +155,11 @@ class RangeWatch:
     ) -> None:
         """Once a second."""
         gaps: dict[int, _Gap] = {}
+        ours: dict[int, _End | None] = {}
+        self._known = {robot: known for robot, known in self._known.items() if robot in partners}
         for robot, partner in partners.items() if estimate is not None else ():
             assert estimate is not None
-            gap = self._off(estimate, own, partner, utime)
+            gap = self._off(estimate, own, partner, utime, ours)
             if gap is not None:
                 gaps[robot] = gap
         self.off = {r: self.off.get(r, 0) + 1 if gap.is_far else 0 for r, gap in gaps.items()}
@@ -167,18 +187,37 @@ class RangeWatch:
                 return 0.0
         return float(np.hypot(*jump.way))
 
+    def _antenna_of(self, estimate: TeamEstimate, data: ChainData, n: int) -> _End | None:
+        """Where the antenna of a partner was at keyframe n."""
+        robot = data.chain.robot
+        known = self._known.get(robot)
+        if known is None or not known.follows(estimate, data, n):
+            end = _antenna(estimate, data, _way(estimate, data, n))
+            known = self._known[robot] = _Known(estimate, data, data.changes, data.model, n, end)
+        return known.end
+
     def _off(
-        self, estimate: TeamEstimate, own: PairEnd, partner: Partner, utime: int
+        self,
+        estimate: TeamEstimate,
+        own: PairEnd,
+        partner: Partner,
+        utime: int,
+        ours: dict[int, _End | None],
     ) -> _Gap | None:
-        """How far the newest ranges are off; None where nothing can be said."""
+        """How far the newest ranges are off; None where nothing can be said.
+
+        Args:
+            ours: our antenna by time, as far as it was asked for.
+        """
         at = _newest(own, partner, utime)
         if at is None:
             return None
         n, when = at
         near = AT_ONCE * GRID_US
         found = partner.ranges.between(when - near, when + near).in_sight(self._model)
-        a = _antenna(estimate, own.data, _own_way(estimate, own, when))
-        b = _antenna(estimate, partner.data, _way(estimate, partner.data, n))
+        if when not in ours:
+            ours[when] = _antenna(estimate, own.data, _own_way(estimate, own, when))
+        a, b = ours[when], self._antenna_of(estimate, partner.data, n)
         if not len(found.utime) or a is None or b is None:
             return None
         pair = (own.data.chain.robot, partner.data.chain.robot)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterable, Iterator
 
 from drslamd.conventions import Chain
@@ -20,6 +21,10 @@ bytes."""
 MOST_MEASUREMENTS = 1_280
 """Of which a chapter is made early: 64 full entries, 30 parts of noise at most."""
 NOT_LAST = (0, 0, 0)
+
+
+def _number(entry: GraphEntry) -> int:
+    return entry.seq
 
 
 class ChapterWriter:
@@ -44,10 +49,9 @@ class ChapterWriter:
         rows = [state for state in states if (state.id, state.epoch) == own]
         if not rows or self._is_asked or len(self._entries) < FEWEST:
             return
-        held = [(0, rows[0].complete), *((row.first, row.complete) for row in rows[1:])]
-        lacking = sum(
-            not any(begin <= entry.seq < end for begin, end in held) for entry in self._entries
-        )
+        beyond = self._entries[bisect_left(self._entries, rows[0].complete, key=_number) :]
+        held = [(row.first, row.complete) for row in rows[1:]]
+        lacking = sum(not any(begin <= entry.seq < end for begin, end in held) for entry in beyond)
         self._is_asked = lacking >= FEWEST
 
     def due(self, seq: int) -> list[GraphEntry]:
