@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -468,3 +469,45 @@ def test_what_is_noise_makes_no_gap(sigmas: float, wrong: bool) -> None:
     # it is that of the last second only
     assert scene.look(None) == {}
     assert scene.watch.gap_m == 0.0
+
+
+def drove(scene: Scene, estimate: TeamEstimate) -> TeamEstimate:
+    """The partner said a keyframe more, off its way."""
+    scene.partner.add(Keyframe(NEWEST + 10 + AHEAD, 0, 500 * 30, 20_000, 0))
+    return estimate
+
+
+def said_late(scene: Scene, estimate: TeamEstimate) -> TeamEstimate:
+    """A keyframe of its way came late, and its wheels count otherwise than configured."""
+    scene.partner.add(Keyframe(NEWEST - 5 + AHEAD, 0, 0, 30_000, 0))
+    return estimate
+
+
+def is_mounted_elsewhere(scene: Scene, estimate: TeamEstimate) -> TeamEstimate:
+    scene.partner.take_model(1, RobotModel(EXACT, 2.0, 2.0, 1.4))
+    return estimate
+
+
+def was_solved_anew(scene: Scene, estimate: TeamEstimate) -> TeamEstimate:
+    moved = Trajectory(Chain(PARTNER, 1), np.array([SOLVED + AHEAD]), W_PARTNER[None] + 0.5)
+    return replace(estimate, trajectories={**estimate.trajectories, PARTNER: moved})
+
+
+@pytest.mark.parametrize("change", [drove, said_late, is_mounted_elsewhere, was_solved_anew])
+def test_a_partner_of_whom_something_is_new_is_looked_at_anew(
+    change: Callable[[Scene, TeamEstimate], TeamEstimate],
+) -> None:
+    scene = Scene(end=NEWEST + 12)
+    scene.hear(between() + 5.0, NEWEST - 3, NEWEST + 11)
+    estimate = replace(solved(), yaw={PARTNER: Learned(0.2, 0.1)})
+    scene.look(estimate)
+    before = scene.watch._gap_m
+    assert before > 1.0
+    scene.look(estimate)
+    assert scene.watch._gap_m == before
+    estimate = change(scene, estimate)
+    scene.look(estimate)
+    first, scene.watch = scene.watch._gap_m, RangeWatch(SIGMA, LINKTRACK)
+    scene.look(estimate)
+    assert first == scene.watch._gap_m
+    assert first != before
