@@ -75,14 +75,11 @@ class ClockDifferences:
 
 def _binned(difference: Index) -> tuple[Counter[int], Counter[int]]:
     """How many of the differences (m,) are in each bin of `SAME_TIME`, and their sums."""
-    bins, place = np.unique(difference // SAME_TIME, return_inverse=True)
-    count = np.bincount(place, minlength=len(bins)).tolist()
-    total = [int(difference[place == k].sum()) for k in range(len(bins))]
-    names = bins.tolist()
-    return (
-        Counter(dict(zip(names, count, strict=True))),
-        Counter(dict(zip(names, total, strict=True))),
-    )
+    bins = (difference // SAME_TIME).tolist()
+    total: Counter[int] = Counter()
+    for name, samples in zip(bins, difference.tolist(), strict=True):
+        total[name] += samples
+    return Counter(bins), total
 
 
 def shifts(robots: set[int], ahead: Mapping[tuple[int, int], Ahead]) -> list[dict[int, float]]:

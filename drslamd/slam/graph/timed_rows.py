@@ -127,9 +127,15 @@ class TimedRows:
             inside = [block for block in range(low, high + 1) if block in self._blocks]
         else:
             inside = sorted(block for block in self._blocks if low <= block <= high)
+        if not inside:
+            return np.empty((0, self._width))
         parts = [self._blocks[block] for block in inside]
-        rows = np.concatenate([np.empty((0, self._width)), *parts])
-        return rows[slice(*np.searchsorted(rows[:, 0], [first, end]).tolist())]
+        # only at both ends there may be others
+        if first > inside[0] * BLOCK:
+            parts[0] = parts[0][np.searchsorted(parts[0][:, 0], first) :]
+        if end < (inside[-1] + 1) * BLOCK:
+            parts[-1] = parts[-1][: np.searchsorted(parts[-1][:, 0], end)]
+        return np.concatenate(parts)
 
     @property
     def rows(self) -> Array:

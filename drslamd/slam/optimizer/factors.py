@@ -224,8 +224,10 @@ def ranges(graph: PoseGraph, numbers: Numbering) -> tuple[RangeFactors, list[tup
     of_pair = _of_pairs([len(pair.ranges) for pair in pairs])
     ends = _ends(numbers, pairs, of_pair, table.a_n, table.b_n)
     used = np.asarray((ends >= 0).all(axis=0))
-    (i, j), table, of_pair = ends[:, used], table.chosen(used), of_pair[used]
-    moves = np.concatenate([np.zeros((0, 2, 2, 2)), *(pair.moves for pair in pairs)])[used]
+    moves = np.concatenate([np.zeros((0, 2, 2, 2)), *(pair.moves for pair in pairs)])
+    if not used.all():
+        ends, table, of_pair, moves = ends[:, used], table.chosen(used), of_pair[used], moves[used]
+    i, j = ends
     there = np.unique(of_pair)
     names = sorted({_name(pairs[k]) for k in there.tolist()})
     place = {name: k for k, name in enumerate(names)}

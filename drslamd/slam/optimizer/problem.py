@@ -160,6 +160,8 @@ class RangeFactors:
         return len(self.i)
 
     def chosen(self, which: NDArray[np.bool_]) -> RangeFactors:
+        if which.all():
+            return self
         return RangeFactors(
             i=self.i[which],
             j=self.j[which],

@@ -157,6 +157,8 @@ def _few(most: int, at: Between, order: tuple[Array, ...]) -> Index:
     there = at.a.there & at.b.there
     held = np.flatnonzero(there)
     old = held[chains.is_old[at.a.rows[held]] | chains.is_old[at.b.rows[held]]]
+    if not len(old):
+        return held
     one, other = chains.near[at.a.rows[old]], chains.near[at.b.rows[old]]
     part = at.part[old]
     ranked = np.lexsort((*(key[old] for key in reversed(order)), other, one, part))
