@@ -39,7 +39,6 @@ PAGED = (
     [
         (" SG_ I M :", " I M :", "B is on a page of I, which is no signal of the DBC file"),
         (" SG_ I M :", " SG_ I M ,", "B is on a page of I, which is no signal of the DBC file"),
-        ("8|16@1+", "-8|4@1+", "B has 4 bits from bit -8 on"),
     ],
 )
 def test_a_signal_that_cannot_be_found_in_a_frame_is_one_sentence(
@@ -49,6 +48,12 @@ def test_a_signal_that_cannot_be_found_in_a_frame_is_one_sentence(
     assert messages_of(PAGED, {"left": "A.B"})
     with pytest.raises(ConfigError, match=rf'^wheels.left = "A.B": {fault}; correct the file'):
         messages_of(PAGED.replace(old, new), {"left": "A.B"})
+
+
+def test_bits_before_the_first_are_one_sentence() -> None:
+    pytest.importorskip("cantools")
+    with pytest.raises(ConfigError, match="B has 8 bits from bit -1 on; correct the file"):
+        messages_of(TEXT.replace("0|8", "-1|8"), {"left": "A.B"})
 
 
 TOKENS = re.compile(r"\d+|\w+|\S|\s")
