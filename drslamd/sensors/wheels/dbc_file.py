@@ -76,7 +76,10 @@ def messages_of(text: str, paths: dict[str, str]) -> dict[str, Message]:
     }
     cut = _HEAD + "".join(_cut(text, blocks[name][0], wanted[name]) for name in names)
     read = {message.name: message for message in _read(cut)}
-    return {key: read[path.split(".")[0]] for key, path in paths.items()}
+    found = {key: read[path.split(".")[0]] for key, path in paths.items()}
+    for key, path in paths.items():
+        _require_whole(key, path, found[key])
+    return found
 
 
 class _Block:
@@ -112,6 +115,21 @@ def _require(key: str, path: str, blocks: dict[str, list[_Block]]) -> None:
     names = [match["name"] for match in there[0].signals]
     if signal not in names:
         raise ConfigError([_absent(key, path, "signal", signal, names)])
+
+
+def _require_whole(key: str, path: str, message: Message) -> None:
+    """Are the signals there, and those that say on which page each is?"""
+    names, fault = {signal.name for signal in message.signals}, ""
+    if path.split(".")[1] not in names:
+        fault = "its line in the DBC file is not of the form that it should have"
+    for signal in message.signals:
+        pager = signal.multiplexer_signal
+        if pager is not None and pager not in names:
+            fault = f"{signal.name} is on a page of {pager}, which is no signal of the DBC file"
+        if signal.start < 0 or signal.length < 1:
+            fault = f"{signal.name} has {signal.length} bits from bit {signal.start} on"
+    if fault:
+        raise ConfigError([f'wheels.{key} = "{path}": {fault}; correct the file'])
 
 
 def _cut(text: str, block: _Block, names: set[str]) -> str:

@@ -89,7 +89,7 @@ def test_one_reading_beyond_is_none_and_changes_nothing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("low", "high"), [(0, 0), (0, 1), (0, 499), (0, 599.5), (0, 65_533), (5, 5), (0, 1e300)]
+    ("low", "high"), [(0, 0), (0, 1), (0, 499), (0, 999.5), (0, 65_533), (5, 5), (0, 1e300)]
 )
 def test_a_range_that_cannot_be_one_of_a_counter_is_not_believed(low: float, high: float) -> None:
     """Too short for what 3 m/s bring in one sample, no whole number, or full but for marks."""
@@ -97,6 +97,7 @@ def test_a_range_that_cannot_be_one_of_a_counter_is_not_believed(low: float, hig
     assert driven(wheels, [0] * 50) == 0.0
     assert wheels.base.gaps.total() == 1
     assert driven(wheels, turning(65_536, 49, 1_500), 50) == pytest.approx(1.499 * 49, abs=0.06)
+    assert wheels.driver.tally.refused == {}
 
 
 def test_what_the_configuration_says_counts_instead() -> None:
