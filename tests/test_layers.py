@@ -77,10 +77,12 @@ SLAM_ORDER = [
 """The rooms of `slam` and what stands beside them, in the order of the paper."""
 
 OPTIMIZER_ORDER = [
+    "lapack",
     "bias_prior",
     "mounting_prior",
     "sensor_priors",
     "problem",
+    "factor_errors",
     "complex_factors",
     "vertex_cover",
     "factors",

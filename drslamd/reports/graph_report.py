@@ -22,7 +22,8 @@ from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem, build_problem
-from drslamd.slam.optimizer.problem import BetweenFactors, corrected, range_errors
+from drslamd.slam.optimizer.factor_errors import corrected, range_errors
+from drslamd.slam.optimizer.problem import BetweenFactors
 from drslamd.slam.se2 import Array
 
 MOST_ROWS = 10_000

@@ -1,11 +1,7 @@
 """The team's least-squares problem as plain arrays: what every optimiser of module 3 receives.
 
 Poses ``w_T_k`` are numbered in the order of time over all robots. A factor names its two poses by
-that number. Errors are defined here once, so that every optimiser minimises the same cost:
-
-    odometry   e = [R_i' (p_j - p_i), theta_j - theta_i] - measured, corrected by scale and yaw rate
-    closure    the same, without correction
-    range      e = |p_j + R_j q_j - p_i - R_i q_i| + bias + near_bias exp(-r / L) - r
+that number; what its error is say `factor_errors`.
 """
 
 from __future__ import annotations
@@ -13,12 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drslamd.slam import range_model, se2
 from drslamd.slam.calibration.range_scatter import SideBySide
 from drslamd.slam.optimizer.sensor_priors import Calibration, Priors
 from drslamd.slam.range_model import LINKTRACK, RangeModel
@@ -298,58 +292,3 @@ class Problem:
     def by_pair(self) -> SideBySide:
         """Its ranges."""
         return SideBySide.of(self.ranges.pair, self.pairs)
-
-
-def pose_errors(poses: Array, factors: BetweenFactors, measured: Array) -> Array:
-    """(m, 3) predicted minus measured relative poses, in frame i."""
-    i, j = poses[factors.i].T, poses[factors.j].T
-    cos, sin, x, y = np.cos(i[2]), np.sin(i[2]), j[0] - i[0], j[1] - i[1]
-    error = np.empty((3, len(factors)))
-    error[0], error[1] = cos * x + sin * y, cos * y - sin * x
-    error[2] = j[2] - i[2]
-    error -= measured.T
-    error[2] = se2.wrap(error[2])
-    return np.asarray(error.T)
-
-
-def corrected(odometry: OdometryFactors, calibration: Calibration) -> Array:
-    """(m, 3) odometry with scale, yaw rate and turn taken out."""
-    scale, yaw, turn = (
-        constant[odometry.robot]
-        for constant in (calibration.scale, calibration.yaw, calibration.turn)
-    )
-    measured = odometry.measured.T
-    out = measured - yaw * odometry.by_yaw.T + turn * odometry.by_turn.T
-    out[:2] -= scale * measured[:2]
-    return np.asarray(out.T)
-
-
-class RangeErrors(NamedTuple):
-    """Of m ranges, as complex numbers x + iy.
-
-    Attributes:
-        error: (m,) predicted minus measured, m.
-        direction: (m,) unit line of sight from i to j in w.
-        arm_i, arm_j: (m,) from the poses to the antennas in w.
-    """
-
-    error: Array
-    direction: Array
-    arm_i: Array
-    arm_j: Array
-
-
-def range_errors(
-    poses: Array, ranges: RangeFactors, calibration: Calibration, model: RangeModel
-) -> RangeErrors:
-    """Of all ranges."""
-    turn = np.exp(1j * poses[:, 2])
-    arm_i, arm_j = (
-        turn[k] * arm for k, arm in zip((ranges.i, ranges.j), ranges.arms(calibration), strict=True)
-    )
-    place = poses[:, 0] + 1j * poses[:, 1]
-    sight = place[ranges.j] + arm_j - place[ranges.i] - arm_i
-    error, direction = range_model.residuals(sight, ranges.measured)  # eq. (1)
-    error += calibration.bias[ranges.pair]
-    error += calibration.near_bias * ranges.near_range_shape(model)
-    return RangeErrors(error, direction, arm_i, arm_j)

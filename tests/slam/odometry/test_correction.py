@@ -10,7 +10,8 @@ from slam_problems import straight_by_turn, straight_by_yaw
 from slam_scenes import Array, inverted, product, same_pose, wander
 
 from drslamd.slam.odometry.correction import Correction
-from drslamd.slam.optimizer.problem import OdometryFactors, corrected
+from drslamd.slam.optimizer.factor_errors import corrected
+from drslamd.slam.optimizer.problem import OdometryFactors
 from drslamd.slam.optimizer.sensor_priors import Calibration
 
 

@@ -14,8 +14,9 @@ from scipy.sparse import coo_array, csc_array, diags_array
 from scipy.sparse.linalg import spsolve
 
 from drslamd.slam import se2
+from drslamd.slam.optimizer.factor_errors import pose_errors
 from drslamd.slam.optimizer.factors import chain_links
-from drslamd.slam.optimizer.problem import BetweenFactors, pose_errors
+from drslamd.slam.optimizer.problem import BetweenFactors
 from lab.recordings.recording import Array
 from lab.reproduce.dpgo import chain
 from lab.reproduce.experiment import GRID_S, POSE_TIMES, Trial

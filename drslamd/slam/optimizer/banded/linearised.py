@@ -9,11 +9,8 @@ from numpy.typing import NDArray
 
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
-from drslamd.slam.optimizer.problem import (
-    BetweenFactors,
-    Problem,
-    pose_errors,
-)
+from drslamd.slam.optimizer.factor_errors import pose_errors
+from drslamd.slam.optimizer.problem import BetweenFactors, Problem
 from drslamd.slam.se2 import Array
 
 

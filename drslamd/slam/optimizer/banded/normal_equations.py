@@ -12,8 +12,9 @@ from drslamd.slam.optimizer.banded.layout import BandLayout
 from drslamd.slam.optimizer.banded.linearised import Linearised
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
+from drslamd.slam.optimizer.factor_errors import pose_errors
 from drslamd.slam.optimizer.mounting_prior import ANTENNA, TRACK
-from drslamd.slam.optimizer.problem import Problem, pose_errors
+from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.se2 import Array
 

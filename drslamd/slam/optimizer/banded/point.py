@@ -5,13 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from drslamd.slam.calibration.range_scatter import inlier_scatter
-from drslamd.slam.optimizer.problem import (
-    Problem,
-    RangeErrors,
-    corrected,
-    pose_errors,
-    range_errors,
-)
+from drslamd.slam.optimizer.factor_errors import RangeErrors, corrected, pose_errors, range_errors
+from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.se2 import Array
 

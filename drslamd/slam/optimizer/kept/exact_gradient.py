@@ -9,7 +9,8 @@ import numpy as np
 
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
-from drslamd.slam.optimizer.problem import Problem, pose_errors
+from drslamd.slam.optimizer.factor_errors import pose_errors
+from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array, Index
 
 

@@ -12,7 +12,8 @@ from slam_problems import mismounted, team_problem
 from slam_scenes import Array
 
 from drslamd.slam.optimizer.banded import linearised
-from drslamd.slam.optimizer.problem import Problem, corrected, pose_errors, range_errors
+from drslamd.slam.optimizer.factor_errors import corrected, pose_errors, range_errors
+from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.range_model import LINKTRACK
 

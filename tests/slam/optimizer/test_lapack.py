@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg
 from scipy.linalg.lapack import dtbtrs
 
-from drslamd.slam.optimizer.banded.lapack import cholesky_banded, triangular_banded
+from drslamd.slam.optimizer.lapack import cholesky_banded, triangular_banded
 
 RNG = np.random.default_rng(1)
 
