@@ -156,9 +156,18 @@ class RangeFactors:
     def chosen(self, which: NDArray[np.bool_]) -> RangeFactors:
         if which.all():
             return self
-        ends = (self.i, self.j, self.q_i, self.q_j)
-        columns = (*ends, self.measured, self.sigma, self.pair, self.robots, self.turned)
-        return RangeFactors(*(column[which] for column in columns), self.carried.chosen(which))
+        return RangeFactors(
+            i=self.i[which],
+            j=self.j[which],
+            q_i=self.q_i[which],
+            q_j=self.q_j[which],
+            measured=self.measured[which],
+            sigma=self.sigma[which],
+            pair=self.pair[which],
+            robots=self.robots[which],
+            turned=self.turned[which],
+            carried=self.carried.chosen(which),
+        )
 
     def near_range_shape(self, model: RangeModel) -> Array:
         """(m,) of `RangeModel.near_range_shape`."""
