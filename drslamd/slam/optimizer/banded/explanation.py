@@ -34,6 +34,8 @@ from drslamd.slam.se2 import Array
 
 SUSPICIOUS = 3.0
 """Guessed s / g above which it is computed."""
+MANY_OUTLIERS = 2 * FEW_OUTLIERS
+"""Of the ranges of any pair: slip has half of that at first, so it is not what leaves more."""
 MUCH = 100.0
 """Of cost: a mounting that takes away so much is right, though something else is wrong as well."""
 
@@ -135,7 +137,7 @@ def _in_common(
     equations: Equations, nominal: Point, check: _Check, most: int, tolerance: float
 ) -> CommonLevel | None:
     """Odometry was worse than configured, of all robots alike or of one, if that explains all."""
-    if check.pooled <= ASKS:
+    if check.pooled <= ASKS or not _fits(equations, nominal, MANY_OUTLIERS):
         return None
     found = common_level.common_level(equations, nominal, most, tolerance)
     if found is None or (found.ratio > TARGET).any() or not _fits(equations, found.point):
@@ -151,9 +153,9 @@ def _commonly(equations: Equations, found: CommonLevel) -> Explanation:
     return Explanation(equations, found.point, None, seen, feared, lately)
 
 
-def _fits(equations: Equations, point: Point) -> bool:
+def _fits(equations: Equations, point: Point, most: float = FEW_OUTLIERS) -> bool:
     """Are few ranges outliers?"""
-    return bool(outlier_share(equations.problem, point).max(initial=0) < FEW_OUTLIERS)
+    return bool(outlier_share(equations.problem, point).max(initial=0) < most)
 
 
 def _as_is(equations: Equations, point: Point, ratio: Array) -> Explanation:

@@ -164,6 +164,20 @@ def test_what_leaves_one_robot_standing_out_is_not_common(
     assert bool((level == level[0]).all() and level[0] > 1) is is_taken
 
 
+@pytest.mark.parametrize(("share", "is_asked"), [(0.11, True), (0.13, False)])
+def test_what_leaves_many_outliers_is_not_looked_for_in_all_odometry(
+    share: float, is_asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It takes long where ranges are nonsense."""
+    problem = all_are_worse()
+    point = nominal(problem)
+    monkeypatch.setattr(
+        explanation, "outlier_share", lambda _, at: np.array([share if at is point else 0.0])
+    )
+    level = explained(problem, point).level
+    assert bool((level == level[0]).all() and level[0] > 1) is is_asked
+
+
 @pytest.mark.parametrize(("asks", "is_asked"), [(0.99, True), (1.01, False)])
 def test_it_is_looked_into_where_all_together_are_worse(
     asks: float, is_asked: bool, monkeypatch: pytest.MonkeyPatch
