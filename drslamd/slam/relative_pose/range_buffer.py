@@ -16,8 +16,10 @@ from drslamd.slam.se2 import Array
 KEEP_S = 130
 """The longest window that a configuration may ask for, and some delay."""
 MAX_UWB_IDS = 64
-"""Modules whose ranges are remembered, 2 MB; a radio cell holds no more."""
+"""Modules whose ranges are remembered, 2.5 MB; a radio cell holds no more."""
 MOST_BINS = KEEP_S * 10
+SPARE_BINS = MOST_BINS // 4
+"""After so many more the rest is moved back to the front."""
 RANGES_FRESH_US = 3 * SECOND_US
 """A module that was silent for longer is not in range."""
 RAW_IN_BIN = 32
@@ -65,7 +67,7 @@ class RangeBuffer:
             nlos_db: see `RangeModel.blocked_sigma`.
         """
         self._nlos_db, self._model = nlos_db, model
-        self._done = np.empty((2 * MOST_BINS, 3))
+        self._done = np.empty((MOST_BINS + SPARE_BINS, 3))
         """Time, range and doubt; those that count stand from `_first` to `_end`."""
         self._first = self._end = 0
         self._bin: list[tuple[int, float, float]] = []

@@ -7,7 +7,12 @@ import pytest
 
 from drslamd.conventions import GRID_US
 from drslamd.slam.range_model import LINKTRACK
-from drslamd.slam.relative_pose.range_buffer import RangeBuffer, TimedRanges
+from drslamd.slam.relative_pose.range_buffer import (
+    MOST_BINS,
+    SPARE_BINS,
+    RangeBuffer,
+    TimedRanges,
+)
 
 NLOS_DB = 10.0
 
@@ -65,3 +70,16 @@ def test_blocked_rows_are_left_out_while_half_remain(blocked: int, left: int) ->
     doubt[:blocked] = LINKTRACK.blocked_sigma_m
     table = TimedRanges(np.arange(10.0), np.ones(10), doubt)
     assert len(table.in_sight(LINKTRACK).utime) == left
+
+
+@pytest.mark.parametrize(
+    "bins", [1, MOST_BINS, MOST_BINS + 1, MOST_BINS + SPARE_BINS, 3 * MOST_BINS + 7]
+)
+def test_the_latest_tenths_of_a_second_are_kept_and_no_older_ones(bins: int) -> None:
+    ranges = RangeBuffer()
+    for k in range(bins + 1):
+        ranges.add(k * GRID_US, float(k))
+    found = ranges.between(-1, bins * GRID_US)
+    first = max(0, bins - MOST_BINS)
+    assert found.range_m.tolist() == [float(k) for k in range(first, bins + 1)]
+    assert found.utime.tolist() == [float(k * GRID_US) for k in range(first, bins + 1)]
