@@ -12,9 +12,9 @@ is the posterior mean of a variance (1 where nothing is measured), and c is modu
 often as they do.
 
 That is for windows, each of one pair. The modules of a team are of one kind and in one room, so of
-all pairs together what was configured is said once and not once for each pair: the team's scatter
-is found likewise out of all ranges, and a pair is held at that in place of 1 (`shared_ratios`). How
-much of an error is left a second later is found for the team as well (`lasting`).
+all pairs together what was configured is said once and not once for each pair: the scatter of all
+others is found likewise out of their ranges, and a pair is held at that in place of 1
+(`shared_ratios`). How much of an error is left a second later is found for the team (`lasting`).
 """
 
 from __future__ import annotations
@@ -78,8 +78,8 @@ def shared_ratios(
 ) -> Array:
     """(pairs,) the same, where pairs of one team are taken to be alike; see `scatter_ratios`."""
     total, count = _sums(errors, sigmas, pair, pairs, configured, most_sigmas)
-    team = (PRIOR_RANGES + total.sum()) / (PRIOR_RANGES + count.sum())
-    return np.asarray(np.sqrt((PRIOR_RANGES * team + total) / (PRIOR_RANGES + count)))
+    others = (PRIOR_RANGES + total.sum() - total) / (PRIOR_RANGES + count.sum() - count)
+    return np.asarray(np.sqrt((PRIOR_RANGES * others + total) / (PRIOR_RANGES + count)))
 
 
 def lasting(

@@ -52,12 +52,12 @@ def test_every_pair_has_its_own() -> None:
     assert ratios(errors, np.full(MANY, 0.1), pair, 2) == pytest.approx([0.5, 0.8], rel=0.03)
 
 
-def test_pairs_of_a_team_are_held_at_what_all_scatter_and_not_at_what_is_configured() -> None:
+def test_pairs_of_a_team_are_held_at_what_others_scatter_and_not_at_what_is_configured() -> None:
     """Four ranges of pair 1 beside many of pair 0; of pair 2 there are none."""
     errors = np.append(np.full(400, 0.05), np.full(4, 0.1))
     pair = np.append(np.zeros(400, dtype=int), np.ones(4, dtype=int))
-    team = (20 + 400 * 0.25 + 4) / 424
-    expected = [(20 * team + 100) / 420, (20 * team + 4) / 24, team]
+    others = [(20 + 4) / 24, (20 + 100) / 420, (20 + 104) / 424]
+    expected = [(20 * others[0] + 100) / 420, (20 * others[1] + 4) / 24, others[2]]
     found = shared_ratios(errors, np.full(404, 0.1), pair, pairs=3, configured=0.1, most_sigmas=2.5)
     assert found == pytest.approx(np.sqrt(expected))
     none = shared_ratios(errors[:0], errors[:0], pair[:0], pairs=2, configured=0.1, most_sigmas=2.5)
