@@ -10,8 +10,8 @@ import numpy as np
 from scipy.optimize import brentq, least_squares
 from slam_scenes import Array
 
-from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout
 from drslamd.slam.optimizer.banded.assembly import System
+from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout
 from drslamd.slam.optimizer.banded.normal_equations import GAUGE_SIGMA
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.problem import Doubted, Problem
