@@ -26,7 +26,7 @@ from drslamd.slam.optimizer.kept.exact_gradient import mounting_pulls
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array
 
-GROWN = 1.1
+GROWN = 1.03
 """Times as many links as when a freedom was computed."""
 
 
@@ -35,8 +35,8 @@ class Freedom:
     """What the other measurements could check of each robot's odometry, some seconds ago.
 
     It grows with the way, as the links do or faster: the more ranges there are, the more each link
-    is checked. To compute it takes as long as several steps, so it is done again when there are a
-    tenth more links.
+    is checked. To compute it takes as long as several steps, so it is done again when there are
+    some more links (`GROWN`).
 
     Attributes:
         checked: (robots,) g, see `misfit`; links: (robots,) of so many.

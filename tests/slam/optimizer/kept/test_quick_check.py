@@ -120,8 +120,8 @@ def test_what_could_be_checked_grows_with_the_way() -> None:
     assert pooled == pytest.approx((sum(s) + 1) / (7 + 40 + 1))
 
 
-@pytest.mark.parametrize(("times", "is_fresh"), [(1.09, True), (1.11, False)])
-def test_what_could_be_checked_is_fresh_until_one_robot_has_a_tenth_more_links(
+@pytest.mark.parametrize(("times", "is_fresh"), [(1.02, True), (1.04, False)])
+def test_what_could_be_checked_is_fresh_until_one_robot_has_three_in_a_hundred_more_links(
     times: float, is_fresh: bool
 ) -> None:
     problem = a_problem()
