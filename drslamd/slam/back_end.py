@@ -69,6 +69,8 @@ class BackEnd:
         self._is_beside = False
         self._inserted = 0
         self._known = _Known()
+        self._looked_at: GraphView | None = None
+        """By module 3, last."""
         self._digested: tuple[GraphView, set[int], int] | None = None
         """What was digested last, and what came of it."""
         self._not_converged = 0
@@ -84,8 +86,9 @@ class BackEnd:
 
     def said_digest(self) -> int:
         """The same of the graph as module 3 looked at it last: what is said each second shall not
-        cost a look of its own, and without news it is the same."""
-        view = self.graph.latest_view
+        cost a look of its own, and without news it is the same. Whoever else looks, to answer a
+        question, changes nothing of what is said."""
+        view = self._looked_at or self.graph.view
         known = self._digested
         if known is None or known[0] is not view or known[1] != self._grouped:
             known = self._digested = view, self._grouped, view.digest(self._grouped)
@@ -127,7 +130,8 @@ class BackEnd:
             return None
         if self._takes_turns and not self.exchange.begin(self._neighbours(talking), utime):
             return None
-        chain = self.graph.view.chains.get(self._own.robot)
+        self._looked_at = self.graph.view
+        chain = self._looked_at.chains.get(self._own.robot)
         if chain is None:
             self._known = now
             return None

@@ -294,6 +294,9 @@ def test_what_is_said_of_a_graph_is_of_when_module_3_looked_at_it(team: SmallTea
     assert back.said_digest() == back.digest()
     back.insert(team.chains[2], GraphEntry(7, keyframes=(Keyframe(9_000, 0, 1, 2, 3),)))
     before = back.said_digest()
+    # somebody asks for the status
+    assert back.digest() != before
+    assert back.said_digest() == before
     assert back.begin({0, 1, 2}) is not None
     assert back.said_digest() == back.digest() != before
 

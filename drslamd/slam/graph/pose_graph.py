@@ -42,7 +42,6 @@ class PoseGraph:
         self.pairs: dict[tuple[int, int], PairData] = {}
         self._thinning = Thinning(recent_s)
         self._view: GraphView | None = None
-        self._latest: GraphView | None = None
         self._forgets = recent_s <= RECENT_S
         """What chapters leave out is needed where times are recent for longer than usual."""
 
@@ -51,18 +50,12 @@ class PoseGraph:
         """What module 3 solves: old times thinned, and the same for all who hold the same."""
         if self._view is None:
             self._view = self._thinning.view(self.chains, self.nodes, self.usable())
-            self._latest = self._view
         return self._view
-
-    @property
-    def latest_view(self) -> GraphView:
-        """The view that was last looked at: some entries may have come since."""
-        return self.view if self._latest is None else self._latest
 
     def frozen(self) -> PoseGraph:
         """The view as it is now and nothing else, for a thread that is not ours."""
         still = PoseGraph()
-        still._view = still._latest = self.view
+        still._view = self.view
         return still
 
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
