@@ -10,11 +10,6 @@ errors e_i and sigmas sigma_i,
 is the posterior mean of a variance (1 where nothing is measured), and c is module 3's own threshold
 (`RangeModel.cauchy_sigmas`). Neighbouring ranges share their errors, so the prior counts as
 often as they do.
-
-That is for windows, each of one pair. The modules of a team are of one kind and in one room, so of
-all pairs together what was configured is said once and not once for each pair: the scatter of all
-others is found likewise out of their ranges, and a pair is held at that in place of 1
-(`shared_ratios`). How much of an error is left a second later is found for the team (`lasting`).
 """
 
 from __future__ import annotations
@@ -23,7 +18,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drslamd.conventions import GRID_HZ
 from drslamd.slam.se2 import Array, Index
 
 PRIOR_RANGES = 20
@@ -37,9 +31,6 @@ NO_RANGE = 1e200
 """Squared error, in sigmas, of what counts for nothing."""
 LEAST_SCATTER = 0.3
 """No module is more than three times better than what must be allowed for."""
-NEXT = GRID_HZ * 3 // 2
-"""Steps of the grid to the range of the next second; what is thinned lies farther apart."""
-TINY = 1e-12
 PLAIN = 1.05
 """A range with a sigma so many times the smallest of its pair is doubted for reasons of its own,
 being short or blocked, and tells nothing of the others."""
@@ -63,58 +54,14 @@ def scatter_ratios(
         configured: m, what windows allow for.
         most_sigmas: bursts count as far as module 3 believes them.
     """
-    total, count = _sums(errors, sigmas, pair, pairs, configured, most_sigmas)
-    return np.asarray(np.sqrt((PRIOR_RANGES + total) / (PRIOR_RANGES + count)))
-
-
-def shared_ratios(
-    errors: Array,
-    sigmas: Array,
-    pair: Index,
-    *,
-    pairs: int,
-    configured: float,
-    most_sigmas: float,
-) -> Array:
-    """(pairs,) the same, where pairs of one team are taken to be alike; see `scatter_ratios`."""
-    total, count = _sums(errors, sigmas, pair, pairs, configured, most_sigmas)
-    others = (PRIOR_RANGES + total.sum() - total) / (PRIOR_RANGES + count.sum() - count)
-    return np.asarray(np.sqrt((PRIOR_RANGES * others + total) / (PRIOR_RANGES + count)))
-
-
-def lasting(
-    errors: Array, sigmas: Array, pair: Index, n: Array, *, usual: float, most_sigmas: float
-) -> float:
-    """Correlation of errors that are a second apart, of all pairs.
-
-    Args:
-        errors, sigmas, pair: see `scatter_ratios`.
-        n: (n,) when they were measured, steps of the keyframes' grid.
-        usual: what the model of ranges says; it counts like a prior of the scatter.
-    """
-    order = np.lexsort((n, pair))
-    size = np.clip(errors / sigmas, -most_sigmas, most_sigmas)[order]
-    apart, pair = np.diff(n[order]), pair[order]
-    is_next = (pair[1:] == pair[:-1]) & (apart > 0) & (apart <= NEXT)
-    one, other = size[:-1][is_next], size[1:][is_next]
-    if not len(one):
-        return usual
-    squares = float((one @ one + other @ other) / 2)
-    prior = PRIOR_RANGES * squares / len(one)
-    return float((usual * prior + one @ other) / max(prior + squares, TINY))
-
-
-def _sums(
-    errors: Array, sigmas: Array, pair: Index, pairs: int, configured: float, most_sigmas: float
-) -> tuple[Array, Array]:
-    """(pairs,) squares over what is configured, and (pairs,) of how many ranges."""
     least = np.full(pairs, np.inf)
     np.minimum.at(least, pair, sigmas)
     plain = sigmas <= PLAIN * least[pair]
     sizes = np.minimum(np.abs(errors), most_sigmas * sigmas)[plain]
     squares = (sizes / configured) ** 2
     total = np.bincount(pair[plain], squares, pairs)
-    return total, np.bincount(pair[plain], minlength=pairs)
+    count = np.bincount(pair[plain], minlength=pairs)
+    return np.asarray(np.sqrt((PRIOR_RANGES + total) / (PRIOR_RANGES + count)))
 
 
 @dataclass(frozen=True)

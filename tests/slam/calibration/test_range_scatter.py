@@ -16,9 +16,7 @@ from drslamd.slam.calibration.range_scatter import (
     PRIOR_RANGES,
     SideBySide,
     inlier_scatter,
-    lasting,
     scatter_ratios,
-    shared_ratios,
 )
 from drslamd.slam.se2 import Array, Index
 
@@ -50,53 +48,6 @@ def test_every_pair_has_its_own() -> None:
     pair = np.arange(MANY) % 2
     errors = rng.normal(0, np.where(pair, 0.08, 0.05))
     assert ratios(errors, np.full(MANY, 0.1), pair, 2) == pytest.approx([0.5, 0.8], rel=0.03)
-
-
-def test_pairs_of_a_team_are_held_at_what_others_scatter_and_not_at_what_is_configured() -> None:
-    """Four ranges of pair 1 beside many of pair 0; of pair 2 there are none."""
-    errors = np.append(np.full(400, 0.05), np.full(4, 0.1))
-    pair = np.append(np.zeros(400, dtype=int), np.ones(4, dtype=int))
-    others = [(20 + 4) / 24, (20 + 100) / 420, (20 + 104) / 424]
-    expected = [(20 * others[0] + 100) / 420, (20 * others[1] + 4) / 24, others[2]]
-    found = shared_ratios(errors, np.full(404, 0.1), pair, pairs=3, configured=0.1, most_sigmas=2.5)
-    assert found == pytest.approx(np.sqrt(expected))
-    none = shared_ratios(errors[:0], errors[:0], pair[:0], pairs=2, configured=0.1, most_sigmas=2.5)
-    assert none.tolist() == [1.0, 1.0]
-
-
-def slow(rng: np.random.Generator, count: int, kept: float) -> Array:
-    """(count,) of sigma 1, of which so much is left in the next one."""
-    drawn, out = rng.normal(size=count), np.zeros(count)
-    for k in range(1, count):
-        out[k] = kept * out[k - 1] + math.sqrt(1 - kept**2) * drawn[k]
-    return out
-
-
-@pytest.mark.parametrize("kept", [0.0, 0.43, 0.8])
-def test_how_much_of_an_error_is_left_a_second_later_is_found(kept: float) -> None:
-    """Two pairs, their ranges in no order of time, of unlike sigmas."""
-    rng = np.random.default_rng(4)
-    pair, n = np.repeat([0, 1], 4000), np.tile(10 * np.arange(4000), 2)
-    sigmas = np.where(pair, 0.1, 0.2)
-    errors = sigmas * np.append(slow(rng, 4000, kept), slow(rng, 4000, kept)) / 2
-    mixed = rng.permutation(8000)
-    columns = (errors[mixed], sigmas[mixed], pair[mixed], n[mixed])
-    assert lasting(*columns, usual=0.43, most_sigmas=2.5) == pytest.approx(kept, abs=0.03)
-
-
-@pytest.mark.parametrize(("apart", "found"), [(10, 27.6 / 39), (15, 27.6 / 39), (16, 0.43)])
-def test_only_ranges_of_the_next_second_tell_what_is_left(apart: int, found: float) -> None:
-    """Twenty that are all alike, of which 19 follow another one."""
-    n = apart * np.arange(20)
-    left = lasting(np.ones(20), np.ones(20), ONE[:20], n, usual=0.43, most_sigmas=2.5)
-    assert left == pytest.approx(found)
-
-
-def test_of_single_ranges_and_of_none_it_is_as_modelled() -> None:
-    for count in (0, 1):
-        few = np.zeros(count)
-        left = lasting(few, few + 0.1, ONE[:count], few, usual=0.43, most_sigmas=2.5)
-        assert left == 0.43
 
 
 def test_bursts_hardly_count() -> None:

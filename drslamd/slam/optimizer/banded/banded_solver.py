@@ -62,8 +62,7 @@ def solve(
     scatter = claims.scatter_of(problem, point)
     feared = Equations(raised(problem, explained.feared, point), like=equations)
     wanted = np.array(marginals, dtype=int)
-    counted = claims.claimed_scatter(problem, point)
-    joint, spread, biases = claims.covariances(feared, point, counted, wanted)
+    joint, spread, biases = claims.covariances(feared, point, scatter, wanted)
     freed = still_freed(problem, point)
     is_same = len(freed) == len(problem.freed) == known
     doubted = tuple(one for one in freed if not one.is_settled)

@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-
 import numpy as np
 
 from drslamd.slam import se2
-from drslamd.slam.calibration.range_scatter import (
-    LEAST_SCATTER,
-    lasting,
-    scatter_ratios,
-    shared_ratios,
-)
+from drslamd.slam.calibration.range_scatter import LEAST_SCATTER, scatter_ratios
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
@@ -38,7 +30,7 @@ def covariances(
 
     Args:
         equations: of a problem whose odometry is believed as far as it should be.
-        scatter: (pairs,) see `claimed_scatter`.
+        scatter: (pairs,) see `scatter_of`.
     """
     layout, model = equations.layout, equations.problem.model
     claims = model.correlated_ratio(1.0) * np.maximum(scatter, LEAST_SCATTER)
@@ -74,30 +66,8 @@ def _is_known(joint: Array) -> bool:
 
 def scatter_of(problem: Problem, point: Point) -> Array:
     """(pairs,) how much ranges scatter about the solution, over what is configured."""
-    return _scatter_by(scatter_ratios, problem, point)
-
-
-def claimed_scatter(problem: Problem, point: Point) -> Array:
-    """(pairs,) the same as it is claimed of poses: pairs of one team are taken to be alike, and
-    errors that last longer than modelled count as so much larger ones."""
     ranges, model = problem.ranges, problem.model
-    keep = float(np.exp(-1 / model.slow_s))
-    left = lasting(
-        point.sight.error,
-        ranges.sigma,
-        ranges.pair,
-        problem.n[ranges.i],
-        usual=model.slow_share**2 * keep,
-        most_sigmas=model.cauchy_sigmas,
-    )
-    share = float(np.sqrt(np.clip(left / keep, model.slow_share**2, 1.0)))
-    slower = replace(model, slow_share=share).correlated_ratio(1.0)
-    return slower / model.correlated_ratio(1.0) * _scatter_by(shared_ratios, problem, point)
-
-
-def _scatter_by(ratios: Callable[..., Array], problem: Problem, point: Point) -> Array:
-    ranges, model = problem.ranges, problem.model
-    return ratios(
+    return scatter_ratios(
         point.sight.error,
         ranges.sigma,
         ranges.pair,

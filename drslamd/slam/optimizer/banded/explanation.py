@@ -19,7 +19,6 @@ from drslamd.slam.optimizer.banded.common_level import ASKS, TAILS, CommonLevel,
 from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.lapses.known_lapses import settled
 from drslamd.slam.optimizer.banded.misfit import (
-    LEAST_FEARED,
     Run,
     guessed_misfit,
     misfit,
@@ -160,7 +159,7 @@ def _fits(equations: Equations, point: Point, most: float = FEW_OUTLIERS) -> boo
 
 def _as_is(equations: Equations, point: Point, ratio: Array) -> Explanation:
     robot = equations.problem.odometry.robot
-    feared = np.maximum(ratio, LEAST_FEARED)[robot]
+    feared = np.maximum(ratio, 1.0)[robot]
     return Explanation(equations, point, None, np.ones(len(robot)), feared, feared)
 
 

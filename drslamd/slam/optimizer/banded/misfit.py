@@ -27,8 +27,6 @@ from drslamd.slam.se2 import Array, Index
 
 DOUBT = 1.0
 """Degrees of freedom that hold a ratio at 1: a robot has but two or three that ranges can check."""
-LEAST_FEARED = 0.1
-"""Of the variance that is configured: what is feared of any odometry, however well it fits."""
 PROBES = 6
 """Rows of random signs that estimate g of a whole robot to some percent."""
 AT_ONCE = 1024

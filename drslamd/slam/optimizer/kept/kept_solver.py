@@ -15,7 +15,7 @@ from drslamd.slam import se2
 from drslamd.slam.calibration.range_scatter import LEAST_SCATTER
 from drslamd.slam.optimizer.banded import banded_solver, claims, mountings
 from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem
-from drslamd.slam.optimizer.banded.misfit import LEAST_FEARED, lately_wrong
+from drslamd.slam.optimizer.banded.misfit import lately_wrong
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import raised
 from drslamd.slam.optimizer.banded.point import Point
@@ -134,8 +134,7 @@ def _solved(
     if ratio is None:
         return None
     scatter = claims.scatter_of(problem, point)
-    counted = claims.claimed_scatter(problem, point)
-    sure = Sureness.of(team, counted, np.maximum(ratio, LEAST_FEARED))
+    sure = Sureness.of(team, scatter, np.maximum(ratio, 1.0))
     believed = sure.believed(problem, point)
     known = kept.claimed if kept and not sure.has_moved(kept.sure) else None
     claimed = _matrix(known, believed, pairs, with_blocks=False)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -35,7 +34,7 @@ from slam_scenes import matrix, same_pose, wander
 
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.banded_solver import solve
-from drslamd.slam.optimizer.banded.claims import UNKNOWN, claimed_scatter, covariances
+from drslamd.slam.optimizer.banded.claims import UNKNOWN, covariances
 from drslamd.slam.optimizer.banded.explanation import explain
 from drslamd.slam.optimizer.banded.lapses.stretches import with_freed
 from drslamd.slam.optimizer.banded.misfit import guessed_misfit
@@ -99,7 +98,8 @@ def test_a_track_that_is_far_off_is_let_go_and_said() -> None:
     error[2] = math.remainder(error[2], 2 * math.pi)
     assert error @ np.linalg.solve(solution.joint, error) < 14.2
     assert (solution.odometry_level == 1).all()
-    assert 0.7 < solution.feared_level.min() < solution.feared_level.max() < 1.5
+    assert solution.feared_level.min() >= 1
+    assert solution.feared_level.max() < 1.5
     plain = solve(team_problem(7, robots=3, count=120)[0])
     assert not plain.doubted.any()
     assert (plain.calibration.turn == 0).all()
@@ -159,35 +159,29 @@ def test_the_pose_graph_of_gtsam_has_the_same_minimum_and_marginals() -> None:
     wanted = (0, 7, 48, 49)
     solution = solve(problem, marginals=wanted, tolerance=1e-12)
 
-    def graph_of(level: float) -> Any:
-        graph = gtsam.NonlinearFactorGraph()
-        hold = gtsam.noiseModel.Isotropic.Sigma(3, 1e-5)
-        graph.add(gtsam.PriorFactorPose2(0, gtsam.Pose2(*truth[0]), hold))
-        for edges, times in ((links, level**2), (closures, 1.0)):
-            for i, j, measured, covariance in zip(
-                edges.i, edges.j, edges.measured, edges.covariance, strict=True
-            ):
-                turn = matrix((0, 0, -measured[2]))
-                noise = gtsam.noiseModel.Gaussian.Covariance(times * turn @ covariance @ turn.T)
-                graph.add(gtsam.BetweenFactorPose2(int(i), int(j), gtsam.Pose2(*measured), noise))
-        return graph
-
+    graph = gtsam.NonlinearFactorGraph()
+    hold = gtsam.noiseModel.Isotropic.Sigma(3, 1e-5)
+    graph.add(gtsam.PriorFactorPose2(0, gtsam.Pose2(*truth[0]), hold))
+    for edges in (links, closures):
+        for i, j, measured, covariance in zip(
+            edges.i, edges.j, edges.measured, edges.covariance, strict=True
+        ):
+            turn = matrix((0, 0, -measured[2]))
+            noise = gtsam.noiseModel.Gaussian.Covariance(turn @ covariance @ turn.T)
+            graph.add(gtsam.BetweenFactorPose2(int(i), int(j), gtsam.Pose2(*measured), noise))
     values = gtsam.Values()
     for k, pose in enumerate(start):
         values.insert(k, gtsam.Pose2(*pose))
     params = gtsam.LevenbergMarquardtParams()
     params.setRelativeErrorTol(1e-15)
     params.setAbsoluteErrorTol(1e-15)
-    best = gtsam.LevenbergMarquardtOptimizer(graph_of(1.0), values, params).optimize()
+    best = gtsam.LevenbergMarquardtOptimizer(graph, values, params).optimize()
     for k in range(50):
         theirs = best.atPose2(k)
         assert same_pose(
             solution.poses[k], np.array([theirs.x(), theirs.y(), theirs.theta()]), 2e-6
         )
-    # links fit so well that they are believed more when something is claimed
-    assert (solution.feared_level == solution.feared_level[0]).all()
-    assert solution.feared_level[0] < 1
-    marginals = gtsam.Marginals(graph_of(float(solution.feared_level[0])), best)
+    marginals = gtsam.Marginals(graph, best)
     for number, k in enumerate(wanted):
         ours = solution.joint[3 * number : 3 * number + 3, 3 * number : 3 * number + 3]
         turn = matrix((0, 0, best.atPose2(k).theta()))  # theirs are in the frame of the pose
@@ -206,13 +200,12 @@ def test_what_is_claimed_is_the_dense_inverse_with_odometry_as_bad_as_it_looks()
     equations = Equations(problem)
     factor = BandFactor.of(equations.weighed(point))
     assert factor is not None
-    ratio = guessed_misfit(equations, point, factor).ratio(links.robot, 3)
+    ratio = np.maximum(guessed_misfit(equations, point, factor).ratio(links.robot, 3), 1.0)
     assert 1.2 < ratio.max() < 3
     covariance = ratio[links.robot][:, None, None] * links.covariance
-    covariance += np.maximum(ratio - 1, 0)[links.robot][:, None, None] * 0.004**2 * np.eye(3)
+    covariance += (ratio - 1)[links.robot][:, None, None] * 0.004**2 * np.eye(3)
     worse = replace(problem, odometry=replace(links, covariance=covariance))
-    scatter = claimed_scatter(problem, point)
-    claims = math.sqrt(1 + 1.28 / (math.exp(0.4) - 1)) * np.maximum(scatter, 0.3)
+    claims = math.sqrt(1 + 1.28 / (math.exp(0.4) - 1)) * np.maximum(solution.scatter, 0.3)
     inverse = np.linalg.inv(claimed_information(worse, x, point.threshold, claims))
     learned = np.linalg.inv(learned_information(worse, x, point.threshold, claims))
     at = (3 * wanted[:, None] + np.arange(3)).ravel()
@@ -237,7 +230,7 @@ def test_where_somebody_slipped_the_solution_is_the_one_that_explains_it() -> No
     slipped = links_of(problem, 1, 25, 31)
     assert solution.odometry_level[slipped].min() > 10
     assert np.median(solution.odometry_level) == 1
-    assert (solution.feared_level >= solution.odometry_level)[slipped].all()
+    assert (solution.feared_level >= solution.odometry_level).all()
     assert not solution.doubted.any()
     error = solution.poses - truth
     error[:, 2] = np.angle(np.exp(1j * error[:, 2]))
@@ -266,7 +259,7 @@ def test_a_stretch_that_was_freed_is_told_and_feared_until_ranges_have_shown_whe
     again = solve(wider, most=60)
     assert [one.links.tolist() for one in again.freed] == [freed.links.tolist()]
     assert (again.odometry_level[slipped] == (FIRST_LEVEL if is_news else 1)).all()
-    assert (again.feared_level >= again.odometry_level)[slipped].all() or not is_news
+    assert (again.feared_level >= again.odometry_level).all()
     late = np.flatnonzero(again.late_level == FIRST_LEVEL)
     assert late.tolist() == (links_of(problem, 1, 24, 41).tolist() if is_news else [])
 
