@@ -49,23 +49,27 @@ class _Voice:
 
     Attributes:
         sender: its address.
+        sent: when its latest message was made, on its own clock.
         delay_us: the least (arrival here - time there) of late.
         since, latest: when its first and its latest message were made, on our clock.
         heard: when something came from it.
     """
 
     sender: str
+    sent: int
     delay_us: int
     since: int
     latest: int
     heard: int
 
     def speaks(self, sent: int, utime: int, sender: str) -> None:
+        """A copy, whoever sends it, and what was overtaken say nothing new."""
+        if sent <= self.sent:
+            return
         crept = max(0, utime - self.heard) // CREEP
         self.delay_us = min(self.delay_us + crept, utime - sent)
-        made = sent + self.delay_us
-        if made > self.latest:
-            self.latest, self.sender = made, sender
+        self.sent, self.sender = sent, sender
+        self.latest = max(self.latest, sent + self.delay_us)
         self.heard = max(self.heard, utime)
 
 
@@ -108,7 +112,7 @@ class Namesakes:
         elif answers and epoch > self._over.get(robot, -1):
             voices = self._voices.setdefault(robot, {})
             self._make_room(robot, voices)
-            voices[epoch] = _Voice(sender, utime - header.utime, utime, utime, utime)
+            voices[epoch] = _Voice(sender, header.utime, utime - header.utime, utime, utime, utime)
             if len(voices) > 1:
                 self._several.add(robot)
 

@@ -235,6 +235,18 @@ def test_what_was_made_before_the_later_start_counts_for_nothing_however_late_it
     assert late.twice(T0 + 5 * SECOND) == set()
 
 
+@pytest.mark.parametrize(("newer_us", "is_news"), [(0, False), (1, True)])
+def test_a_copy_of_the_latest_word_says_nothing_however_often_it_comes(
+    newer_us: int, is_news: bool
+) -> None:
+    """A clock may have lost time since, so it would look like a new one."""
+    found = namesakes((10, 0), (20, SECOND))
+    before = found.latest
+    for after in range(2, 20):
+        found.hear(spoken(10, T0 + newer_us), False, T0 + after * SECOND, "a stranger")
+    assert (found.latest != before) == is_news
+
+
 def test_it_is_over_thirty_seconds_after_the_last_word() -> None:
     found = namesakes((10, 0), (20, 0), (10, SECOND), (20, 2 * SECOND))
     assert found.twice(T0 + SECOND + GONE_US - 1) == {3}
