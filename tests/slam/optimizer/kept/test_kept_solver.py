@@ -17,7 +17,7 @@ from drslamd.slam.optimizer.banded import banded_optimizer
 from drslamd.slam.optimizer.banded.banded_solver import SETTLED
 from drslamd.slam.optimizer.kept import kept_solver, quick_check
 
-NEAR_M, NEAR_SIGMA = 1e-4, 1.06
+NEAR_M, NEAR_SIGMA = 1e-4, 1.03
 """What is feared of odometry may be of some links ago, and goes up and down with each."""
 
 Said = list[tuple[Chain, GraphEntry]]
