@@ -35,19 +35,16 @@ class Asked(NamedTuple):
 
 
 class _Kept(NamedTuple):
-    """A pose and all that it follows from; a track only grows, so its end stands for it."""
+    """A pose and all that it follows from: a track only grows, so its end stands for it, and an
+    estimate for what solutions moved by, which is counted with each."""
 
     estimate: TeamEstimate
     noise: OdometryNoise
     end: int
-    boldness: float
     pose: PoseNow | None
 
-    def follows(
-        self, estimate: TeamEstimate, noise: OdometryNoise, end: int, boldness: float
-    ) -> bool:
-        is_same = self.estimate is estimate and self.noise is noise
-        return is_same and (self.end, self.boldness) == (end, boldness)
+    def follows(self, estimate: TeamEstimate, noise: OdometryNoise, end: int) -> bool:
+        return self.estimate is estimate and self.noise is noise and self.end == end
 
 
 class Standing:
@@ -69,15 +66,16 @@ class Standing:
 
     def pose(self) -> PoseNow | None:
         """Our latest pose in the frame of the team; None while we are not localised."""
-        estimate, front, boldness = self._back.estimate, self._front, self._back.revisions.boldness
+        estimate, front = self._back.estimate, self._front
         if estimate is None:
             return None
         track, noise = front.reckoning.track, front.model.noise
-        if self._kept is None or not self._kept.follows(estimate, noise, track.end, boldness):
+        if self._kept is None or not self._kept.follows(estimate, noise, track.end):
             found = pose_now(estimate, self._robot, track, noise)
             if found is not None:
-                found = found._replace(covariance=found.covariance * boldness)
-            self._kept = _Kept(estimate, noise, track.end, boldness, found)
+                covariance = found.covariance * self._back.revisions.boldness
+                found = found._replace(covariance=covariance)
+            self._kept = _Kept(estimate, noise, track.end, found)
         return self._kept.pose
 
     def whereabouts(self, utime: int) -> Whereabouts:
