@@ -84,11 +84,15 @@ def test_a_terminal_is_as_it_was_after_the_end(place: Path, number: signal.Signa
     with answering(place, answer(), "status"):
         child = subprocess.Popen(command, stdout=theirs, stderr=theirs, env=environment)
         os.close(theirs)
-        drawn = read_until(ours, b"connected group")
-        child.send_signal(number)
-        assert child.wait(PATIENCE_S) == 0
-        drawn += read_until(ours, LEAVE.encode())
-    os.close(ours)
+        try:
+            drawn = read_until(ours, b"connected group")
+            child.send_signal(number)
+            assert child.wait(PATIENCE_S) == 0
+            drawn += read_until(ours, LEAVE.encode())
+        finally:
+            child.kill()
+            child.wait()
+            os.close(ours)
     text = drawn.decode()
     assert text.startswith(ENTER + HOME)
     assert text.endswith(LEAVE)

@@ -14,6 +14,7 @@ import asyncio
 import functools
 import gc
 import os
+import signal
 import sysconfig
 import threading
 import time
@@ -35,6 +36,12 @@ TASK_GRACE_S = 0.5
 _INSTALLED = os.path.realpath(sysconfig.get_path("purelib"))
 _PACKAGE = str(REPOSITORY / "drslamd")
 _loop_faults: list[str] = []
+
+
+def pytest_configure() -> None:
+    """What a script starts in the background ignores interrupts, and so would our children."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def threads() -> dict[int, str]:

@@ -10,8 +10,9 @@ import pytest
 from lab import run_tests
 from places import REPOSITORY
 
-QUICK = ["lint", "format", "types", "quick tests"]
-STEPS = [*QUICK, "slow tests in virtual time", "slow tests"]
+QUICK = ["lint", "format", "quick tests", "types"]
+SLOW = ["slow tests in virtual time", "slow tests"]
+STEPS = sorted([*QUICK, *SLOW])
 
 
 class Steps:
@@ -25,7 +26,7 @@ class Steps:
         monkeypatch.setattr(run_tests, "_run", self._run)
         monkeypatch.setattr(run_tests, "_other_interpreters", lambda: self.others)
 
-    def _run(self, name: str, *command: str) -> int:
+    def _run(self, name: str, *command: str, shown: bool = True) -> int:
         self.names.append(name)
         self.commands[name] = command
         return int(name in self.failing)
@@ -38,15 +39,15 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> Steps:
 
 def test_everything_is_run_and_quick_leaves_the_slow_out(steps: Steps) -> None:
     assert run_tests.main([]) == 0
-    assert steps.names == STEPS
+    assert sorted(steps.names) == STEPS
     steps.names.clear()
     assert run_tests.main(["--quick"]) == 0
-    assert steps.names == QUICK
+    assert sorted(steps.names) == sorted(QUICK)
 
 
 def test_every_folder_with_slow_tests_is_in_one_of_the_two_steps(steps: Steps) -> None:
     run_tests.main([])
-    shared, alone = (steps.commands[name] for name in STEPS[-2:])
+    shared, alone = (steps.commands[name] for name in SLOW)
     folders = [part for part in shared if part.startswith("tests/")]
     assert all((REPOSITORY / folder).is_dir() for folder in folders)
     assert folders == [p.removeprefix("--ignore=") for p in alone if p.startswith("--ignore=")]
@@ -59,7 +60,7 @@ def test_one_step_that_fails_does_not_stop_the_others(
 ) -> None:
     steps.failing = {name}
     assert run_tests.main([]) == 1
-    assert steps.names == STEPS
+    assert sorted(steps.names) == STEPS
     assert f"FAILED: {name}\n" in capsys.readouterr().out
 
 
@@ -78,6 +79,17 @@ def test_types_are_checked_of_every_test_file(steps: Steps) -> None:
     run_tests.main(["--quick"])
     files = {str(p.relative_to(REPOSITORY)) for p in (REPOSITORY / "tests").rglob("*.py")}
     assert files <= set(steps.commands["types"])
+
+
+def test_what_runs_beside_the_tests_is_told_at_its_end_and_only_if_it_failed(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    says = "print('a wrong type'); raise SystemExit({})"
+    assert run_tests._run("types", sys.executable, "-c", says.format(0), shown=False) == 0
+    assert "a wrong type" not in capfd.readouterr().out
+    assert run_tests._run("types", sys.executable, "-c", says.format(1), shown=False) == 1
+    told = capfd.readouterr().out
+    assert told.index("== types\na wrong type") < told.index("== types: FAILED")
 
 
 def test_an_interpreter_is_found_when_it_says_its_version(

@@ -45,7 +45,7 @@ def test_noise_without_line_ends_is_one_overlong_line() -> None:
     assert (lines, overlong) == ([b"next"], 1)
 
 
-@pytest.mark.parametrize("value", range(256))
-def test_a_poisoned_byte_never_spoils_the_next_line(value: int) -> None:
-    lines, _ = lines_of(b"ab" + bytes([value]) + b"cd\rnext\r")
-    assert lines[-1] == b"next"
+def test_a_poisoned_byte_never_spoils_the_next_line() -> None:
+    for value in range(256):
+        lines, _ = lines_of(b"ab" + bytes([value]) + b"cd\rnext\r")
+        assert lines[-1] == b"next", value

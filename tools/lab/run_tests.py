@@ -50,7 +50,6 @@ def main(arguments: list[str] | None = None) -> int:
     steps = [
         ("lint", [python, "-m", "ruff", "check", "drslamd", "tools", "tests"]),
         ("format", [python, "-m", "ruff", "format", "--check", "drslamd", "tools", "tests"]),
-        ("types", [python, "-m", "mypy", "drslamd", "tools/lab", *_test_files()]),
         # as many at once as there are cores
         ("quick tests", [python, "-m", "pytest", "-q", "-n", "auto", "-m", "not slow"]),
     ]
@@ -59,7 +58,12 @@ def main(arguments: list[str] | None = None) -> int:
         real = [f"--ignore={folder}" for folder in IN_VIRTUAL_TIME]
         steps.append(("slow tests in virtual time", [*slow, "-n", "auto", *IN_VIRTUAL_TIME]))
         steps.append(("slow tests", [*slow, *real]))
-    failed = [name for name, command in steps if _run(name, *command)]
+    types = [python, "-m", "mypy", "drslamd", "tools/lab", *_test_files()]
+    with ThreadPoolExecutor(1) as pool:
+        # they take the time in which tests wait
+        beside = pool.submit(_run, "types", *types, shown=False)
+        failed = [name for name, command in steps if _run(name, *command)]
+        failed += ["types"] if beside.result() else []
     if not options.quick:
         failed += _other_interpreters()
     print(f"FAILED: {', '.join(failed)}" if failed else "all passed")
@@ -71,12 +75,16 @@ def _test_files() -> list[str]:
     return [str(path.relative_to(ROOT)) for path in sorted((ROOT / "tests").rglob("*.py"))]
 
 
-def _run(name: str, *command: str) -> int:
+def _run(name: str, *command: str, shown: bool = True) -> int:
+    """Its exit code; what is not shown while it runs is printed at its end, if it failed."""
     began = time.monotonic()
-    print(f"== {name}", flush=True)
-    code = subprocess.run(command, cwd=ROOT, check=False).returncode
-    _ended(name, code, began)
-    return code
+    if shown:
+        print(f"== {name}", flush=True)
+    done = subprocess.run(command, cwd=ROOT, check=False, text=True, capture_output=not shown)
+    if not shown and done.returncode:
+        print(f"\n== {name}\n{done.stdout}{done.stderr}")
+    _ended(name, done.returncode, began)
+    return done.returncode
 
 
 def _ended(name: str, code: int, began: float) -> None:

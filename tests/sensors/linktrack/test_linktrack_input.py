@@ -409,11 +409,11 @@ def test_whole_and_byte_by_byte_and_random_reads_give_the_same(seed: int) -> Non
 
 
 @pytest.mark.row("D3")
-@pytest.mark.parametrize("value", range(256))
-def test_one_poisoned_byte_costs_no_range(value: int) -> None:
-    uwb = trusting()
-    frame = node_frame3(OWN, [Peer(9, 1500)], local_ms=1020)
-    assert len(uwb.feed(bytes([value]) + frame, T0 + 20 * MS)) == 1
+def test_one_poisoned_byte_costs_no_range() -> None:
+    for value in range(256):
+        uwb = trusting()
+        frame = node_frame3(OWN, [Peer(9, 1500)], local_ms=1020)
+        assert len(uwb.feed(bytes([value]) + frame, T0 + 20 * MS)) == 1, value
 
 
 @pytest.mark.row("D1")

@@ -86,11 +86,11 @@ def test_a_line_behind_a_torn_one_is_read() -> None:
     assert len(driver.feed(b"$ODO,1020,1" + ascii_line(1040, 2, 2), T0 + 40 * MS)) == 1
 
 
-@pytest.mark.parametrize("value", range(256))
-def test_a_poisoned_byte_before_a_line_costs_nothing(value: int) -> None:
-    driver = AsciiDriver()
-    driver.feed(ascii_line(1000, 0, 0), T0)
-    assert len(driver.feed(bytes([value]) + ascii_line(1020, 2, 2), T0 + 20 * MS)) == 1
+def test_a_poisoned_byte_before_a_line_costs_nothing() -> None:
+    for value in range(256):
+        driver = AsciiDriver()
+        driver.feed(ascii_line(1000, 0, 0), T0)
+        assert len(driver.feed(bytes([value]) + ascii_line(1020, 2, 2), T0 + 20 * MS)) == 1, value
 
 
 @settings(derandomize=True, max_examples=200, deadline=None)

@@ -81,10 +81,10 @@ def test_whole_and_byte_by_byte_and_random_reads_give_the_same(seed: int) -> Non
     assert fed(list(cut(stream, seed))) == whole
 
 
-@pytest.mark.parametrize("value", range(256))
-def test_one_poisoned_byte_costs_no_packet(value: int) -> None:
-    stream = [*packets(1), bytes([value]), *packets(2, 61860)]
-    assert len(counts(fed([b"".join(stream)])[0])) == 2
+def test_one_poisoned_byte_costs_no_packet() -> None:
+    for value in range(256):
+        stream = [*packets(1), bytes([value]), *packets(2, 61860)]
+        assert len(counts(fed([b"".join(stream)])[0])) == 2, value
 
 
 def test_unknown_sub_payloads_are_skipped_by_their_length() -> None:

@@ -100,12 +100,12 @@ def test_counters_use_all_32_bits() -> None:
     assert sample == WheelCounts(T0, -(1 << 31), (1 << 31) - 1, 32)
 
 
-@pytest.mark.parametrize("value", range(256))
-def test_a_poisoned_byte_costs_roboteq_one_line_at_most(value: int) -> None:
-    driver = roboteq()
-    samples = driver.feed(bytes([value]) + b"C=1:2\rC=3:4\r", T0)
-    assert samples[-1] == WheelCounts(T0, 3, 4, 32)
-    assert samples[:-1] in ([], [WheelCounts(T0, 1, 2, 32)])
+def test_a_poisoned_byte_costs_roboteq_one_line_at_most() -> None:
+    for value in range(256):
+        driver = roboteq()
+        samples = driver.feed(bytes([value]) + b"C=1:2\rC=3:4\r", T0)
+        assert samples[-1] == WheelCounts(T0, 3, 4, 32), value
+        assert samples[:-1] in ([], [WheelCounts(T0, 1, 2, 32)]), value
 
 
 def test_every_line_ends_in_exactly_one_count() -> None:
