@@ -99,7 +99,8 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
     if check.scores.ask():
         mounted, better = mountings.fitted(equations, nominal, check.scores, most, tolerance)
         again, gain = _checked(mounted, better), _gain(equations, nominal, mounted, better)
-        is_worth = better.converged and gain >= check.scores.least_gain()
+        explains = check.scores.ask_alone() or again.pooled <= ASKS
+        is_worth = better.converged and explains and gain >= check.scores.least_gain()
         if is_worth and (common is None or gain >= common.gain):
             beside = _in_common(mounted, better, again, most, tolerance)
             if beside is not None:

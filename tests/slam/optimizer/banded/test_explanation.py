@@ -22,7 +22,7 @@ from slam_scenes import Array
 
 from drslamd.slam.optimizer.banded import common_level, explanation, mountings, odometry_levels
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
-from drslamd.slam.optimizer.banded.common_level import TAILS, CommonLevel
+from drslamd.slam.optimizer.banded.common_level import ASKS, TAILS, CommonLevel
 from drslamd.slam.optimizer.banded.explanation import MUCH, Explanation, explain
 from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.misfit import (
@@ -488,6 +488,24 @@ def test_antennas_that_only_ask_together_must_be_worth_it(
     found = scene.explained()
     assert found.equations is (scene.mounted if is_taken else scene.equations)
     assert scene.levelled == []
+
+
+@pytest.mark.parametrize(("pooled", "is_taken"), [(ASKS, True), (1.01 * ASKS, False)])
+def test_antennas_that_only_ask_together_must_explain_all_odometry(
+    pooled: float, is_taken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Who slips has antennas that seem to be off a little."""
+    scene = Asked(monkeypatch, gain=4 * WORTH)
+    none = np.zeros(2)
+    together = Scores(none, none, 2 * TOGETHER + 1)
+
+    def checked(equations: Equations, point: Point) -> explanation._Check:
+        is_mounted = equations is scene.mounted
+        return explanation._Check(np.ones(2), [], together, pooled if is_mounted else 1.0)
+
+    monkeypatch.setattr(explanation, "_checked", checked)
+    monkeypatch.setattr(explanation, "_in_common", lambda *_: None)
+    assert (scene.explained().equations is scene.mounted) is is_taken
 
 
 def test_mountings_whose_solution_was_not_reached_are_not_taken(
