@@ -54,8 +54,9 @@ def link_residuals(problem: Problem, x: Array) -> list[float]:
     links, closures = problem.odometry, problem.closures
     right = links.measured.copy()
     for m, robot in enumerate(links.robot):
+        right[m] += c.turn[robot] * links.by_turn[m]
         right[m, :2] *= 1 - c.scale[robot]
-        right[m] += c.turn[robot] * links.by_turn[m] - c.yaw[robot] * links.by_yaw[m]
+        right[m] -= c.yaw[robot] * links.by_yaw[m]
     return [
         *whitened(poses[links.i], poses[links.j], right, links.covariance),
         *whitened(poses[closures.i], poses[closures.j], closures.measured, closures.covariance),

@@ -31,15 +31,29 @@ def pose_errors(poses: Array, factors: BetweenFactors, measured: Array) -> Array
 
 
 def corrected(odometry: OdometryFactors, calibration: Calibration) -> Array:
-    """(m, 3) odometry with scale, yaw rate and turn taken out."""
+    """(m, 3) odometry with scale, yaw rate and turn taken out; what turns move of a way is as much
+    longer or shorter as the way."""
     scale, yaw, turn = (
         constant[odometry.robot]
         for constant in (calibration.scale, calibration.yaw, calibration.turn)
     )
     measured = odometry.measured.T
-    out = measured - yaw * odometry.by_yaw.T + turn * odometry.by_turn.T
+    out = measured - yaw * odometry.by_yaw.T + turn * by_turn(odometry, calibration).T
     out[:2] -= scale * measured[:2]
     return np.asarray(out.T)
+
+
+def by_turn(odometry: OdometryFactors, calibration: Calibration) -> Array:
+    """(m, 3) how `corrected` moves when turns are longer by a fraction."""
+    out = odometry.by_turn.copy()
+    out[:, :2] *= 1 - calibration.scale[odometry.robot, None]
+    return np.asarray(out)
+
+
+def by_scale(odometry: OdometryFactors, calibration: Calibration) -> Array:
+    """(m, 2) how places of `corrected` move when ways are shorter by a fraction, times -1."""
+    turn = calibration.turn[odometry.robot, None]
+    return np.asarray(odometry.measured[:, :2] + turn * odometry.by_turn[:, :2])
 
 
 class RangeErrors(NamedTuple):

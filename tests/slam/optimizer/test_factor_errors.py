@@ -84,6 +84,19 @@ def test_turns_that_are_longer_turn_a_link_on_by_half_of_what_they_lack() -> Non
     assert right[2] == pytest.approx(chords[2])
 
 
+def test_turns_and_ways_that_both_count_half_are_put_right_together() -> None:
+    """An arc of 2 m and 0.3 rad, all of which was counted half, chord and turn."""
+    whole = np.array([2 * math.cos(0.15), 2 * math.sin(0.15), 0.3])
+    counted = np.array([[math.cos(0.075), math.sin(0.075), 0.15]])
+    one = np.zeros(1, dtype=int)
+    odometry = OdometryFactors(
+        one, one, counted, np.eye(3)[None], one, np.zeros((1, 3)), straight_by_turn(counted)
+    )
+    known = replace(Calibration.zero(0, 1), scale=np.array([-1.0]), turn=np.array([1.0]))
+    # to first order in a turn of 0.075 rad
+    assert corrected(odometry, known)[0] == pytest.approx(whole, abs=2 * 0.075**2)
+
+
 def test_an_antenna_beside_its_place_moves_with_the_robot_as_it_stood() -> None:
     """Against poses multiplied as matrices; robots stood turned against their keyframes, and what
     odometry carried is where its constants let it be."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
-from drslamd.slam.optimizer.factor_errors import pose_errors
+from drslamd.slam.optimizer.factor_errors import by_scale, by_turn, pose_errors
 from drslamd.slam.optimizer.problem import BetweenFactors, Problem
 from drslamd.slam.se2 import Array
 
@@ -34,17 +34,17 @@ def odometry_at(problem: Problem, point: Point) -> Linearised:
     """By both poses, scale, yaw rate and turn."""
     factors = problem.odometry
     return Linearised(
-        odometry_jacobian(problem, point.poses), factors.information, factors.weighed(point.link)
+        odometry_jacobian(problem, point), factors.information, factors.weighed(point.link)
     )
 
 
-def odometry_jacobian(problem: Problem, poses: Array) -> Array:
+def odometry_jacobian(problem: Problem, point: Point) -> Array:
     """(m, 3, 9): derivative of the errors by both poses, scale, yaw rate and turn."""
-    factors = problem.odometry
+    factors, calibration = problem.odometry, point.calibration
     jacobian = np.zeros((9, 3, len(factors)))
-    _add_poses(jacobian, poses, factors)
-    jacobian[6, :2] = factors.measured[:, :2].T
-    jacobian[7], jacobian[8] = factors.by_yaw.T, -factors.by_turn.T
+    _add_poses(jacobian, point.poses, factors)
+    jacobian[6, :2] = by_scale(factors, calibration).T
+    jacobian[7], jacobian[8] = factors.by_yaw.T, -by_turn(factors, calibration).T
     return np.asarray(jacobian.transpose(2, 1, 0))
 
 

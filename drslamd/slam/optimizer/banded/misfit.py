@@ -91,7 +91,7 @@ def misfit(equations: Equations, point: Point, factor: BandFactor) -> Misfit:
         factor: of `Equations.weighed` at that point.
     """
     problem = equations.problem
-    jacobian = linearised.odometry_jacobian(problem, point.poses)
+    jacobian = linearised.odometry_jacobian(problem, point)
     squares, information = squares_of(problem, point), problem.odometry.information
     blocks = factor.covariance_blocks(equations.layout.odometry_unknowns(problem.odometry))
     if blocks is None:
@@ -106,7 +106,7 @@ def guessed_misfit(equations: Equations, point: Point, factor: Solver) -> Misfit
     The signs are the same for everybody who has the same problem.
     """
     problem, layout = equations.problem, equations.layout
-    jacobian = linearised.odometry_jacobian(problem, point.poses)
+    jacobian = linearised.odometry_jacobian(problem, point)
     squares, information = squares_of(problem, point), problem.odometry.information
     signs = _signs(-(-len(jacobian) // AT_ONCE), PROBES)[: len(jacobian)]
     jacobian = np.ascontiguousarray(jacobian)

@@ -9,7 +9,7 @@ import numpy as np
 
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
-from drslamd.slam.optimizer.factor_errors import pose_errors
+from drslamd.slam.optimizer.factor_errors import by_scale, by_turn, pose_errors
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array, Index
 
@@ -41,7 +41,8 @@ def mounting_pulls(problem: Problem, point: Point) -> Array:
     """(3 R,) half the derivative by the turns of R robots, then by their antennas' x and y."""
     odometry, ranges, robots = problem.odometry, problem.ranges, len(problem.priors.scale)
     pull = odometry.weighed(point.link)
-    turn = -np.bincount(odometry.robot, np.einsum("mk,mk->m", pull, odometry.by_turn), robots)
+    of_turn = np.einsum("mk,mk->m", pull, by_turn(odometry, point.calibration))
+    turn = -np.bincount(odometry.robot, of_turn, robots)
     seen = _range_pull(problem, point) * point.sight.direction
     antenna = np.zeros(robots, dtype=complex)
     for end, (pose, sign) in enumerate(((ranges.i, -1), (ranges.j, 1))):
@@ -91,8 +92,8 @@ def _of_odometry(
 ) -> tuple[Array, Array]:
     """(robots,) by scales and yaw rates, of links and of the ranges that odometry has carried."""
     odometry, robots = problem.odometry, len(problem.priors.scale)
-    by_scale = np.einsum("mk,mk->m", pull[:, :2], odometry.measured[:, :2])
-    scale = np.bincount(odometry.robot, by_scale, robots)
+    of_scale = np.einsum("mk,mk->m", pull[:, :2], by_scale(odometry, point.calibration))
+    scale = np.bincount(odometry.robot, of_scale, robots)
     yaw = np.bincount(odometry.robot, np.einsum("mk,mk->m", pull, odometry.by_yaw), robots)
     carried, ranges = problem.ranges.carried, problem.ranges
     if len(carried.rows):

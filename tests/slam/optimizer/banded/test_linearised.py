@@ -74,7 +74,7 @@ def of_ranges(problem: Problem, poses: Array, known: Calibration) -> Array:
 def test_links_are_differentiated_by_both_poses_scale_yaw_rate_and_turn() -> None:
     links = PROBLEM.odometry
     found = linearised.odometry_at(PROBLEM, HERE)
-    assert np.array_equal(found.jacobian, linearised.odometry_jacobian(PROBLEM, POSES))
+    assert np.array_equal(found.jacobian, linearised.odometry_jacobian(PROBLEM, HERE))
     for m in range(len(links)):
         poses = by_poses(lambda p: of_links(PROBLEM, p, KNOWN), m, (links.i[m], links.j[m]))
         assert np.allclose(found.jacobian[m, :, :6], poses, atol=1e-7)
