@@ -105,7 +105,7 @@ def relatives(estimate: TeamEstimate, own: int, leg: Leg, legs: dict[int, Leg]) 
     levers = np.array([peer.lever for peer in legs.values()])
     along[:, 0, 2], along[:, 1, 2] = -levers[:, 1], levers[:, 0]
     j = np.concatenate([-across, along], axis=2)
-    bold = np.array([estimate.bold(own, robot) for robot in legs])
-    known = bold[:, None, None] * (j @ joint @ np.swapaxes(j, 1, 2))
+    times = np.array([estimate.narrow(own, robot) for robot in legs])
+    known = times[:, None, None] * (j @ joint @ np.swapaxes(j, 1, 2))
     added = np.array([peer.added for peer in legs.values()]).T
     return Relatives(poses, known[:, UPPER[0], UPPER[1]].T + added)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import compress
+from itertools import combinations, compress
 from typing import TypeVar
 
 import numpy as np
@@ -296,6 +296,7 @@ def solved(
         nodes={number: paths[number] for number in stays if is_node(number)},
         left={number: paths[number] for number in team.left},
         points=points,
+        narrower=_narrower(stays, solution.shares),
         joint=standing_points.without_headings(solution.joint, np.isin(stays, list(points))),
         bias_m=_named(team.pairs, learned.bias, spread.bias),
         bias_sigma_m=dict(zip(team.pairs, solution.bias_sigmas.tolist(), strict=True)),
@@ -334,3 +335,10 @@ def _latest(team: TeamProblem, of_links: Array) -> dict[int, float]:
 def _named(names: list[Name], values: Array, sigmas: Array) -> dict[Name, Learned]:
     pairs = zip(values.tolist(), sigmas.tolist(), strict=True)
     return {name: Learned(*pair) for name, pair in zip(names, pairs, strict=True)}
+
+
+def _narrower(robots: list[int], shares: Array) -> dict[tuple[int, int], float]:
+    """See `TeamEstimate.narrower`, where there is anything to say."""
+    at = {robot: k for k, robot in enumerate(robots)} if len(shares) else {}
+    found = {(a, b): float(shares[at[a], at[b]]) for a, b in combinations(sorted(at), 2)}
+    return {pair: share for pair, share in found.items() if share < 1.0}

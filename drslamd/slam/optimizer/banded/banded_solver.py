@@ -14,17 +14,19 @@ import numpy as np
 
 from drslamd.slam import se2
 from drslamd.slam.optimizer.banded import claims
-from drslamd.slam.optimizer.banded.explanation import explain
+from drslamd.slam.optimizer.banded.band_factor import BandFactor
+from drslamd.slam.optimizer.banded.explanation import Explanation, explain
 from drslamd.slam.optimizer.banded.lapses.known_lapses import still_freed
 from drslamd.slam.optimizer.banded.lapses.stretches import under
 from drslamd.slam.optimizer.banded.misfit import contradicted
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import FIRST_LEVEL, raised
+from drslamd.slam.optimizer.banded.pairs import narrowing
 from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
-from drslamd.slam.se2 import Array
+from drslamd.slam.se2 import Array, Index
 
 SETTLED = 1e-7
 """m and rad: the last step of a solution that is the same, to a tenth of it, from wherever it was
@@ -63,6 +65,7 @@ def solve(
     feared = Equations(raised(problem, explained.feared, point), like=equations)
     wanted = np.array(marginals, dtype=int)
     joint, spread, biases = claims.covariances(feared, point, scatter, wanted)
+    shares = _shares(explained, joint, wanted)
     freed = still_freed(problem, point)
     is_same = len(freed) == len(problem.freed) == known
     doubted = tuple(one for one in freed if not one.is_settled)
@@ -79,6 +82,7 @@ def solve(
         converged=nominal.converged,
         scatter=scatter,
         joint=joint,
+        shares=shares,
         spread=spread,
         bias_sigmas=biases,
         odometry_level=np.maximum(explained.level, news),
@@ -89,3 +93,19 @@ def solve(
         doubted=claims.still_doubted(problem.doubted, point.calibration, spread),
         freed=freed,
     )
+
+
+def _shares(explained: Explanation, joint: Array, wanted: Index) -> Array:
+    """See `Solution.shares`: where all is as modelled."""
+    equations, point, ratio = explained.equations, explained.point, explained.ratio
+    is_usual = ratio is not None and not equations.problem.freed
+    if ratio is None or not is_usual or not 1 < len(wanted) <= narrowing.MOST_POSES:
+        return np.ones((0, 0))
+    factor = BandFactor.of(equations.weighed(point))
+    seen = factor and narrowing.seen_noise(equations, point, factor, ratio)
+    if not seen:
+        return np.ones((0, 0))
+    problem = equations.problem
+    feared = raised(problem, seen.feared[problem.odometry.robot], point)
+    narrow = claims.covariances(Equations(feared, like=equations), point, seen.scatter, wanted)[0]
+    return narrowing.shares(point.poses[wanted], joint, narrow)
