@@ -39,6 +39,7 @@ def solve(
     marginals: tuple[int, ...] = (),
     most: int = 30,
     tolerance: float = TOLERANCE,
+    known: Array | None = None,
 ) -> Solution:
     """The solution as configured; where odometry cannot have been so, with what it deserves.
 
@@ -51,8 +52,9 @@ def solve(
         marginals: poses whose joint covariance is wanted.
         most: bound on steps.
         tolerance: see `newton_descent.TOLERANCE`.
+        known: `Solution.shares` that hold still.
     """
-    equations, known = Equations(problem), len(problem.freed)
+    equations, before = Equations(problem), len(problem.freed)
     start = start or Calibration.zero(problem.pairs, len(problem.priors.scale))
     # who was solved before is most often where he was, but for a second of driving
     nominal = descend(equations, start, most, tolerance, is_near=problem.fitted is not None)
@@ -65,9 +67,9 @@ def solve(
     feared = Equations(raised(problem, explained.feared, point), like=equations)
     wanted = np.array(marginals, dtype=int)
     joint, spread, biases = claims.covariances(feared, point, scatter, wanted)
-    shares = _shares(explained, joint, wanted)
+    shares = _shares(explained, joint, wanted, known)
     freed = still_freed(problem, point)
-    is_same = len(freed) == len(problem.freed) == known
+    is_same = len(freed) == len(problem.freed) == before
     doubted = tuple(one for one in freed if not one.is_settled)
     late = FIRST_LEVEL * under(problem, doubted, after_s=np.inf)
     # nobody goes on from a solution with other stretches freed as from one that is as modelled
@@ -95,12 +97,16 @@ def solve(
     )
 
 
-def _shares(explained: Explanation, joint: Array, wanted: Index) -> Array:
+def _shares(
+    explained: Explanation, joint: Array, wanted: Index, known: Array | None = None
+) -> Array:
     """See `Solution.shares`: where all is as modelled."""
     equations, point, ratio = explained.equations, explained.point, explained.ratio
     is_usual = ratio is not None and not equations.problem.freed
     if ratio is None or not is_usual or not 1 < len(wanted) <= narrowing.MOST_POSES:
         return np.ones((0, 0))
+    if known is not None:
+        return known
     factor = BandFactor.of(equations.weighed(point))
     seen = factor and narrowing.seen_noise(equations, point, factor, ratio)
     if not seen:

@@ -96,9 +96,15 @@ class Shares:
     links: int
     left: Array
 
-    def holds(self, team: TeamProblem, robots: tuple[int, ...]) -> bool:
+    @staticmethod
+    def of(team: TeamProblem, last: tuple[int, ...], left: Array) -> Shares:
+        """Of the poses `last`, one of each robot."""
+        robots = tuple(team.problem.robot[list(last)].tolist())
+        return Shares(robots, len(team.problem.odometry), left)
+
+    def hold(self, now: Shares) -> bool:
         """Are they those of the same robots, which have not driven much further since?"""
-        return self.robots == robots and len(team.problem.odometry) <= GROWN * self.links
+        return self.robots == now.robots and now.links <= GROWN * self.links
 
 
 @dataclass(frozen=True)
@@ -136,7 +142,16 @@ def solve(
             found = _solved(team, last, tolerance, before)
             if found is not None:
                 return found
-    return banded_solver.solve(team.problem, team.start, last, tolerance=tolerance), None
+    before = kept.shares if isinstance(kept, Kept) else kept
+    known = before if isinstance(before, Shares) and before.hold(_none(team, last)) else None
+    left = known.left if known else None
+    solution = banded_solver.solve(team.problem, team.start, last, tolerance=tolerance, known=left)
+    return solution, known or Shares.of(team, last, solution.shares)
+
+
+def _none(team: TeamProblem, last: tuple[int, ...]) -> Shares:
+    """Nothing is known of them."""
+    return Shares.of(team, last, np.ones((0, 0)))
 
 
 def _solved(
@@ -197,10 +212,9 @@ class Seen(NamedTuple):
 def _shares(team: TeamProblem, last: tuple[int, ...], kept: Kept | None, seen: Seen) -> Shares:
     """See `Solution.shares`."""
     problem, point = team.problem, seen.point
-    robots = tuple(problem.robot[list(last)].tolist())
-    if kept is not None and kept.shares.holds(team, robots):
+    nothing = _none(team, last)
+    if kept is not None and kept.shares.hold(nothing):
         return kept.shares
-    nothing = Shares(robots, len(problem.odometry), np.ones((0, 0)))
     if problem.freed or not 1 < len(last) <= narrowing.MOST_POSES:
         return nothing
     noise = narrowing.seen_noise(seen.equations, point, seen.matrix, seen.ratio)
