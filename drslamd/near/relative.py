@@ -2,7 +2,9 @@
 
 Of two robots the solution knows more than of each: where both are wrong alike, they are right
 about each other. So what is told of a pair comes from their joint covariance, carried to the end
-of both legs. With errors a (ours) and b of x, y, theta in w, d the way from us to the peer, and
+of both legs, and is smaller where sensors were seen to be better than configured
+(`TeamEstimate.narrow`). With errors a (ours) and b of x, y, theta in w, d the way from us to the
+peer, and
 
     S = [1 0 -dy; 0 1 dx; 0 0 1]
 

@@ -398,9 +398,12 @@ def test_what_pairs_are_narrowed_by_is_held_against_what_solutions_moved(
 ) -> None:
     back, _ = settled(team)
     asked: list[dict[tuple[int, int], float]] = []
-    monkeypatch.setattr(
-        back.revisions, "no_narrower", lambda narrower: asked.append(narrower) or held
-    )
+
+    def no_narrower(narrower: dict[tuple[int, int], float]) -> dict[tuple[int, int], float]:
+        asked.append(narrower)
+        return held
+
+    monkeypatch.setattr(back.revisions, "no_narrower", no_narrower)
     assert back.estimate is not None
     back.on_solution(replace(back.estimate, narrower={(0, 1): 0.5}))
     assert asked == [{(0, 1): 0.5}]

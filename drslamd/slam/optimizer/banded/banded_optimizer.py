@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import combinations, compress
+from itertools import compress
 from typing import TypeVar
 
 import numpy as np
@@ -28,6 +28,7 @@ from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.banded.banded_solver import SETTLED
 from drslamd.slam.optimizer.banded.lapses.known_lapses import freed_again, lapse_of
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE
+from drslamd.slam.optimizer.banded.pairs.narrowing import narrower
 from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.contract import Job
@@ -277,8 +278,7 @@ def solved(
     mine = {chain.robot: team.places.of_robot(chain.robot) for chain in team.chains}
     stays = [chain.robot for chain in team.chains if chain.robot not in team.left]
     last = tuple(int(mine[robot][-1]) for robot in stays)
-    tolerance = tolerance or (SETTLED if team.is_known else TOLERANCE)
-    solution, kept = solve(team, last, tolerance, kept)
+    solution, kept = solve(team, last, tolerance or (SETTLED if team.is_known else TOLERANCE), kept)
     learned, spread, doubted = solution.calibration, solution.spread, solution.doubted
     assert spread is not None
     n, poses = team.problem.n, solution.poses
@@ -296,7 +296,7 @@ def solved(
         nodes={number: paths[number] for number in stays if is_node(number)},
         left={number: paths[number] for number in team.left},
         points=points,
-        narrower=_narrower(stays, solution.shares),
+        narrower=narrower(stays, solution.shares),
         joint=standing_points.without_headings(solution.joint, np.isin(stays, list(points))),
         bias_m=_named(team.pairs, learned.bias, spread.bias),
         bias_sigma_m=dict(zip(team.pairs, solution.bias_sigmas.tolist(), strict=True)),
@@ -335,10 +335,3 @@ def _latest(team: TeamProblem, of_links: Array) -> dict[int, float]:
 def _named(names: list[Name], values: Array, sigmas: Array) -> dict[Name, Learned]:
     pairs = zip(values.tolist(), sigmas.tolist(), strict=True)
     return {name: Learned(*pair) for name, pair in zip(names, pairs, strict=True)}
-
-
-def _narrower(robots: list[int], shares: Array) -> dict[tuple[int, int], float]:
-    """See `TeamEstimate.narrower`, where there is anything to say."""
-    at = {robot: k for k, robot in enumerate(robots)} if len(shares) else {}
-    found = {(a, b): float(shares[at[a], at[b]]) for a, b in combinations(sorted(at), 2)}
-    return {pair: share for pair, share in found.items() if share < 1.0}

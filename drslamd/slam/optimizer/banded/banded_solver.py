@@ -59,15 +59,13 @@ def solve(
     # who was solved before is most often where he was, but for a second of driving
     nominal = descend(equations, start, most, tolerance, is_near=problem.fitted is not None)
     explained = explain(equations, nominal, most, tolerance)
-    equations, point = explained.equations, explained.point
-    problem = equations.problem
+    equations, point, problem = explained.equations, explained.point, explained.equations.problem
     poses: Array = point.poses.copy()
     poses[:, 2] = se2.wrap(poses[:, 2])
     scatter = claims.scatter_of(problem, point)
     feared = Equations(raised(problem, explained.feared, point), like=equations)
     wanted = np.array(marginals, dtype=int)
     joint, spread, biases = claims.covariances(feared, point, scatter, wanted)
-    shares = _shares(explained, joint, wanted, known)
     freed = still_freed(problem, point)
     is_same = len(freed) == len(problem.freed) == before
     doubted = tuple(one for one in freed if not one.is_settled)
@@ -84,7 +82,7 @@ def solve(
         converged=nominal.converged,
         scatter=scatter,
         joint=joint,
-        shares=shares,
+        shares=_shares(explained, joint, wanted, known),
         spread=spread,
         bias_sigmas=biases,
         odometry_level=np.maximum(explained.level, news),

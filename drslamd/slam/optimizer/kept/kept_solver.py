@@ -83,7 +83,7 @@ class Sureness:
 
 
 @dataclass(frozen=True)
-class Shares:
+class KeptShares:
     """What is left of the covariances of pairs (`banded.pairs.narrowing`), some seconds ago. It
     moves slowly, and to find it takes longer than a second that is kept.
 
@@ -97,12 +97,12 @@ class Shares:
     left: Array
 
     @staticmethod
-    def of(team: TeamProblem, last: tuple[int, ...], left: Array) -> Shares:
+    def of(team: TeamProblem, last: tuple[int, ...], left: Array) -> KeptShares:
         """Of the poses `last`, one of each robot."""
         robots = tuple(team.problem.robot[list(last)].tolist())
-        return Shares(robots, len(team.problem.odometry), left)
+        return KeptShares(robots, len(team.problem.odometry), left)
 
-    def hold(self, now: Shares) -> bool:
+    def hold(self, now: KeptShares) -> bool:
         """Are they those of the same robots, which have not driven much further since?"""
         return self.robots == now.robots and now.links <= GROWN * self.links
 
@@ -124,7 +124,7 @@ class Kept:
     sure: Sureness
     variances: Array
     checked: Freedom
-    shares: Shares
+    shares: KeptShares
 
 
 def solve(
@@ -142,16 +142,16 @@ def solve(
             found = _solved(team, last, tolerance, before)
             if found is not None:
                 return found
-    before = kept.shares if isinstance(kept, Kept) else kept
-    known = before if isinstance(before, Shares) and before.hold(_none(team, last)) else None
+    shares = kept.shares if isinstance(kept, Kept) else kept
+    known = shares if isinstance(shares, KeptShares) and shares.hold(_none(team, last)) else None
     left = known.left if known else None
     solution = banded_solver.solve(team.problem, team.start, last, tolerance=tolerance, known=left)
-    return solution, known or Shares.of(team, last, solution.shares)
+    return solution, known or KeptShares.of(team, last, solution.shares)
 
 
-def _none(team: TeamProblem, last: tuple[int, ...]) -> Shares:
+def _none(team: TeamProblem, last: tuple[int, ...]) -> KeptShares:
     """Nothing is known of them."""
-    return Shares.of(team, last, np.ones((0, 0)))
+    return KeptShares.of(team, last, np.ones((0, 0)))
 
 
 def _solved(
@@ -188,13 +188,13 @@ def _solved(
     if joint is None or spread is None or downwards is None or held is None:
         return None
     since = kept.sure if kept and known else sure
-    shares = _shares(team, last, kept, Seen(equations, point, current, ratio, joint))
+    shares = _shares(team, last, kept, JustSolved(equations, point, current, ratio, joint))
     after = Kept(downwards, held, since, variances, checked, shares)
     said = _said(equations, point, scatter, sure.feared, joint, *spread)
     return replace(said, shares=shares.left), after
 
 
-class Seen(NamedTuple):
+class JustSolved(NamedTuple):
     """A solution.
 
     Attributes:
@@ -209,7 +209,9 @@ class Seen(NamedTuple):
     joint: Array
 
 
-def _shares(team: TeamProblem, last: tuple[int, ...], kept: Kept | None, seen: Seen) -> Shares:
+def _shares(
+    team: TeamProblem, last: tuple[int, ...], kept: Kept | None, seen: JustSolved
+) -> KeptShares:
     """See `Solution.shares`."""
     problem, point = team.problem, seen.point
     nothing = _none(team, last)

@@ -156,14 +156,14 @@ def test_a_small_problem_is_solved_anew(
 
 
 def test_shares_of_pairs_hold_until_a_tenth_of_the_way_is_new_and_for_the_same_robots() -> None:
-    found = kept_solver.Shares((0, 3), 100, np.ones((2, 2)))
+    found = kept_solver.KeptShares((0, 3), 100, np.ones((2, 2)))
     for robots, links, holds in (
         ((0, 3), 110, True),
         ((0, 3), 111, False),
         ((0, 4), 100, False),
         ((0, 3, 4), 100, False),
     ):
-        assert found.hold(kept_solver.Shares(robots, links, np.ones((0, 0)))) is holds
+        assert found.hold(kept_solver.KeptShares(robots, links, np.ones((0, 0)))) is holds
 
 
 def test_shares_that_were_kept_are_those_that_are_found_anew() -> None:

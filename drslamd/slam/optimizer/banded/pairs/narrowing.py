@@ -10,6 +10,7 @@ since few ranges tell of them.
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -102,3 +103,14 @@ def shares(poses: Array, claimed: Array, seen: Array) -> Array:
     left = np.einsum("kii->k", np.linalg.solve(wide, narrow)) / 3
     out[i, j] = out[j, i] = np.clip(left, LEAST_SHARE, 1.0)
     return out
+
+
+def narrower(robots: list[int], left: Array) -> dict[tuple[int, int], float]:
+    """What is left of the covariances of pairs a < b, where that is not all of it.
+
+    Args:
+        left: see `shares`, or of none.
+    """
+    at = {robot: k for k, robot in enumerate(robots)} if len(left) else {}
+    found = {(a, b): float(left[at[a], at[b]]) for a, b in combinations(sorted(at), 2)}
+    return {pair: share for pair, share in found.items() if share < 1.0}

@@ -9,7 +9,6 @@ import pytest
 from slam_problems import team_problem
 from slam_scenes import Array
 
-from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.banded_solver import solve
 from drslamd.slam.optimizer.banded.newton_descent import descend
@@ -146,7 +145,7 @@ def test_nor_is_a_large_team_narrowed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_nor_where_the_matrix_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(banded_solver.narrowing, "expected_squares", lambda *_: None)
+    monkeypatch.setattr(narrowing, "expected_squares", lambda *_: None)
     assert not len(told(0.01))
 
 
