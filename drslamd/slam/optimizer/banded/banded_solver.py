@@ -100,8 +100,7 @@ def _shares(
 ) -> Array:
     """See `Solution.shares`: where all is as modelled."""
     equations, point, ratio = explained.equations, explained.point, explained.ratio
-    is_usual = ratio is not None and not equations.problem.freed
-    if ratio is None or not is_usual or not 1 < len(wanted) <= narrowing.MOST_POSES:
+    if ratio is None or not narrowing.may_narrow(equations.problem, len(wanted)):
         return np.ones((0, 0))
     if known is not None:
         return known

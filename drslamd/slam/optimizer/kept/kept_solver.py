@@ -217,7 +217,7 @@ def _shares(
     nothing = _none(team, last)
     if kept is not None and kept.shares.hold(nothing):
         return kept.shares
-    if problem.freed or not 1 < len(last) <= narrowing.MOST_POSES:
+    if not narrowing.may_narrow(problem, len(last)):
         return nothing
     noise = narrowing.seen_noise(seen.equations, point, seen.matrix, seen.ratio)
     if noise is None:

@@ -20,6 +20,7 @@ from drslamd.slam.optimizer.banded.misfit import squares_of_ranges
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.pairs.expected_squares import expected_squares
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array
 
 ALIKE = 1.7
@@ -46,6 +47,11 @@ class SeenNoise(NamedTuple):
 
     scatter: Array
     feared: Array
+
+
+def may_narrow(problem: Problem, poses: int) -> bool:
+    """Are there pairs, not too many of them, and nobody whose wheels may stand or spin?"""
+    return 1 < poses <= MOST_POSES and not problem.freed
 
 
 def seen_noise(

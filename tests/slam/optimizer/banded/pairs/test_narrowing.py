@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,9 +20,11 @@ from drslamd.slam.optimizer.banded.pairs.narrowing import (
     LEAST_SHARE,
     MOST_POSES,
     held_variances,
+    may_narrow,
     seen_noise,
     shares,
 )
+from drslamd.slam.optimizer.problem import Freed
 from drslamd.slam.optimizer.sensor_priors import Calibration
 
 FIVE = 8.5
@@ -135,6 +138,14 @@ def test_pairs_are_narrowed_where_sensors_are_better_and_not_where_they_are_as_c
 
 def test_a_model_that_is_not_one_of_what_was_measured_narrows_nobody() -> None:
     assert not len(told(0.01, robots=2, count=12, link_error=6.0))
+
+
+def test_nor_one_in_which_wheels_may_have_stood_nor_a_single_robot_nor_a_large_team() -> None:
+    problem, _ = team_problem(5, robots=2, count=4)
+    for poses, may in ((1, False), (2, True), (MOST_POSES, True), (MOST_POSES + 1, False)):
+        assert may_narrow(problem, poses) is may
+    freed = Freed(0, np.array([1]), np.zeros((1, 3, 3)), stands=True)
+    assert not may_narrow(replace(problem, freed=(freed,)), 2)
 
 
 def test_nor_is_a_large_team_narrowed(monkeypatch: pytest.MonkeyPatch) -> None:
