@@ -2,7 +2,9 @@
 
 Of two robots the solution knows more than of each: where both are wrong alike, they are right
 about each other. So what is told of a pair comes from their joint covariance, carried to the end
-of both legs. With errors a (ours) and b of x, y, theta in w, d the way from us to the peer, and
+of both legs, and is smaller where sensors were seen to be better than configured
+(`TeamEstimate.narrow`). With errors a (ours) and b of x, y, theta in w, d the way from us to the
+peer, and
 
     S = [1 0 -dy; 0 1 dx; 0 0 1]
 
@@ -105,7 +107,7 @@ def relatives(estimate: TeamEstimate, own: int, leg: Leg, legs: dict[int, Leg]) 
     levers = np.array([peer.lever for peer in legs.values()])
     along[:, 0, 2], along[:, 1, 2] = -levers[:, 1], levers[:, 0]
     j = np.concatenate([-across, along], axis=2)
-    bold = np.array([estimate.bold(own, robot) for robot in legs])
-    known = bold[:, None, None] * (j @ joint @ np.swapaxes(j, 1, 2))
+    times = np.array([estimate.narrow(own, robot) for robot in legs])
+    known = times[:, None, None] * (j @ joint @ np.swapaxes(j, 1, 2))
     added = np.array([peer.added for peer in legs.values()]).T
     return Relatives(poses, known[:, UPPER[0], UPPER[1]].T + added)

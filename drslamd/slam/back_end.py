@@ -198,6 +198,9 @@ class BackEnd:
         self.revisions.on_solution(result, self._own.robot)
         if bold := self.revisions.of_pairs:
             self.estimate = result = replace(result, boldness=bold)
+        if narrower := result.narrower:
+            held = self.revisions.no_narrower(narrower)
+            self.estimate = result = replace(result, narrower=held)
         if own is not None:
             self.history.update(own)
         if result.lifted is None:

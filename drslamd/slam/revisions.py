@@ -99,9 +99,19 @@ class Revisions:
         found = {(pair[0], pair[1]): self._boldness(pair) for pair in pairs}
         return {pair: bold for pair, bold in found.items() if bold > 1.0}
 
+    def no_narrower(self, narrower: dict[tuple[int, int], float]) -> dict[tuple[int, int], float]:
+        """By how much variances of pairs a < b may be smaller, and were not moved by more, of those
+        by which they would like to be."""
+        held = {pair: max(share, self._moved(pair)) for pair, share in narrower.items()}
+        return {pair: share for pair, share in held.items() if share < 1.0}
+
     def _boldness(self, whose: Whose) -> float:
+        return max(1.0, self._moved(whose))
+
+    def _moved(self, whose: Whose) -> float:
+        """The farthest move of late, over what is allowed."""
         most = max((moves.get(whose, 0.0) for _, moves in self._moves), default=0.0)
-        return max(1.0, most / (ALLOWED if len(whose) == 1 else ALLOWED_OF_PAIRS))
+        return most / (ALLOWED if len(whose) == 1 else ALLOWED_OF_PAIRS)
 
     def on_solution(self, estimate: TeamEstimate, robot: int) -> None:
         """Module 3 has answered.

@@ -105,3 +105,13 @@ def test_few_peers_are_seen_as_many_are() -> None:
         assert (each == one).all()
         assert np.allclose(sures, sure, rtol=1e-12, atol=0)
         assert abs(one[0, 2]) <= np.pi
+
+
+def test_a_pair_is_told_as_sure_as_it_was_seen_to_be_and_the_team_as_before() -> None:
+    own, legs = leg_of(4), {9: leg_of(9), 2: leg_of(2)}
+    narrow = replace(TEAM, narrower={(4, 9): 0.3})
+    plain, known = (relatives(team, 4, own, legs).known for team in (TEAM, narrow))
+    added = np.array(legs[9].added)
+    assert np.allclose(known[:, 0] - added, 0.3 * (plain[:, 0] - added))
+    assert np.array_equal(known[:, 1], plain[:, 1])
+    assert np.array_equal(narrow.relatives([(4, 9)])[2], TEAM.relatives([(4, 9)])[2])

@@ -390,3 +390,21 @@ def test_without_its_peers_there_is_nothing_beside_it(team: SmallTeam) -> None:
     back.beside = set()
     assert begin(back, {7}) is None
     assert back.onlooked is None
+
+
+@pytest.mark.parametrize("held", [{(0, 1): 0.7}, {}])
+def test_what_pairs_are_narrowed_by_is_held_against_what_solutions_moved(
+    team: SmallTeam, held: dict[tuple[int, int], float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    back, _ = settled(team)
+    asked: list[dict[tuple[int, int], float]] = []
+
+    def no_narrower(narrower: dict[tuple[int, int], float]) -> dict[tuple[int, int], float]:
+        asked.append(narrower)
+        return held
+
+    monkeypatch.setattr(back.revisions, "no_narrower", no_narrower)
+    assert back.estimate is not None
+    back.on_solution(replace(back.estimate, narrower={(0, 1): 0.5}))
+    assert asked == [{(0, 1): 0.5}]
+    assert back.estimate.narrower == held

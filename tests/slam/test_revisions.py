@@ -180,3 +180,23 @@ def test_pairs_of_the_first_robots_of_a_large_team_are_watched() -> None:
     moved = [(2.0 * x, y) for x, y in places]
     found = of_pairs(team(places, [0, 10]), team(moved, [0, 10, 20]))
     assert {robot for pair in found for robot in pair} == set(range(MOST_ROBOTS))
+
+
+@pytest.mark.parametrize(
+    ("sigmas", "left"),
+    [(0.0, 0.4), (1.7, 0.4), (1.8, 1.8**2 / 7.5), (2.7, 2.7**2 / 7.5), (2.8, None)],
+)
+def test_no_pair_is_told_as_surer_than_later_solutions_move_it(
+    sigmas: float, left: float | None
+) -> None:
+    revisions = Revisions()
+    moved = [*STANDING[:2], (0.0, 4.0 + sigmas * SIGMA * math.sqrt(2))]
+    revisions.on_solution(team(STANDING, [0, 10]), 0)
+    revisions.on_solution(team(moved, [0, 10, 20]), 0)
+    found = revisions.no_narrower({(0, 2): 0.4, (0, 1): 0.4})
+    assert found[0, 1] == 0.4
+    assert found.get((0, 2)) == (left and pytest.approx(left, rel=1e-3))
+
+
+def test_who_would_be_no_narrower_is_made_so_by_nobody() -> None:
+    assert Revisions().no_narrower({}) == {}

@@ -109,6 +109,8 @@ class TeamEstimate:
         contradicted: pairs whose ranges of late do not fit the rest.
         boldness: by how much variances of pairs a < b that were claimed of late were too small
             (`revisions`), where they were.
+        narrower: times `joint`, variances of pairs a < b in each other, where sensors were seen to
+            be better than configured.
         is_explained: is the model, with what was learned, one of what was measured?
         converged: is it good enough to be used?
         settled: is it the same from wherever it was begun?
@@ -139,6 +141,7 @@ class TeamEstimate:
     fitted: dict[int, int] = field(default_factory=dict)
     contradicted: frozenset[tuple[int, int]] = frozenset()
     boldness: dict[tuple[int, int], float] = field(default_factory=dict)
+    narrower: dict[tuple[int, int], float] = field(default_factory=dict)
     is_explained: bool = True
     cost: float = 0.0
     iterations: int = 0
@@ -213,6 +216,11 @@ class TeamEstimate:
     def bold(self, a: int, b: int) -> float:
         """Times the covariance of a pair, see `boldness`."""
         return self.boldness.get((min(a, b), max(a, b)), 1.0)
+
+    def narrow(self, a: int, b: int) -> float:
+        """Likewise where a pair is told as sure as it was seen to be, see `narrower`."""
+        pair = (min(a, b), max(a, b))
+        return max(self.boldness.get(pair, 0.0), self.narrower.get(pair, 1.0))
 
     def is_slipping(self, robot: int) -> bool:
         """Was odometry of a robot much worse than configured in the last seconds?"""

@@ -144,3 +144,15 @@ def test_what_was_learned_of_the_wheels_corrects_odometry() -> None:
     assert team.correction(4) == Correction(scale=0.1, yaw=0.02, turn=0.3)
     assert team.correction(9) == Correction(scale=-0.2)
     assert team.correction(7) == Correction()
+
+
+@pytest.mark.parametrize(
+    ("boldness", "narrower", "times"),
+    [({}, {}, 1.0), ({}, {(2, 7): 0.4}, 0.4), ({(2, 7): 3.0}, {(2, 7): 0.4}, 3.0)],
+)
+def test_a_pair_that_was_moved_too_far_is_no_narrower_whatever_its_sensors_say(
+    boldness: dict[tuple[int, int], float], narrower: dict[tuple[int, int], float], times: float
+) -> None:
+    team = replace(a_team(), boldness=boldness, narrower=narrower)
+    assert team.narrow(2, 7) == team.narrow(7, 2) == times
+    assert team.narrow(2, 3) == 1.0

@@ -78,6 +78,7 @@ def _honesty(name: str, played: Iterable[tuple[int, Recording]], runs: int) -> i
     nees = tally["pair/nees"].mean
     print(f"{name}, {runs} runs")
     print(f"  pairs, NEES {nees:.2f} ({LEAST} to {MOST}), n {tally['pair/nees'].n}")
+    print(f"  pairs in their 95 % ellipses {100 * tally['pair/inside'].mean:.1f} %")
     print(f"  own pose, NEES {tally['own/nees'].mean:.2f}, n {tally['own/nees'].n}")
     print(f"  age of a peer, mean {tally['pair/age'].mean:.2f} s")
     print(f"  fastest step of odom {tally['odom/step'].most:.2f} m/s", flush=True)

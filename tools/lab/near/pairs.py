@@ -15,7 +15,7 @@ from lab.recordings.recording import Array, Recording
 from lab.recordings.seat import on_axle
 from lab.reproduce.tally import Tally
 from lab.score import metrics
-from lab.score.claims import mahalanobis
+from lab.score.claims import claim, mahalanobis
 
 MOST_MPS = 3.0
 """No robot of ours is so fast: what moves further in odom has jumped."""
@@ -23,8 +23,16 @@ LOOKS_HZ = 10
 
 
 def honesty(recording: Recording, seed: int) -> Tally:
-    """One run: `pair/nees` and `own/nees` per degree of freedom, `odom/step` in m/s."""
-    simulator, tally = virtual_team.start(recording, seed), Tally()
+    """One run: `pair/nees` and `own/nees` per degree of freedom, `pair/inside` is the share of
+    positions in their 95 % ellipses, `odom/step` in m/s."""
+    tally = Tally()
+    played(tally, recording, seed)
+    return tally
+
+
+def played(tally: Tally, recording: Recording, seed: int) -> Simulator:
+    """The same run, and the team at its end."""
+    simulator = virtual_team.start(recording, seed)
     last: dict[int, Near] = {}
     for look in range(1, LOOKS_HZ * int(recording.duration) + 1):
         simulator.run(look / LOOKS_HZ)
@@ -37,7 +45,8 @@ def honesty(recording: Recording, seed: int) -> Tally:
             last[robot] = near
             if look % LOOKS_HZ == 0 and near.state == PoseState.LOCALISED:
                 _add(tally, recording, simulator, robot, near)
-    return tally
+    simulator.run(recording.duration + virtual_team.SETTLE_S)
+    return simulator
 
 
 def on_axles(recording: Recording) -> Recording:
@@ -66,8 +75,9 @@ def _add(tally: Tally, recording: Recording, simulator: Simulator, robot: int, n
             continue
         there = _true(recording, peer, member, peers.utimes[k])
         covariance = se2.unpacked(peers.covariance[:, k])
-        squared = mahalanobis(peers.a_T_b[k], covariance, metrics.relative(here, there))
-        tally.add("pair/nees", squared / 3)
+        claimed = claim(peers.a_T_b[k], covariance, metrics.relative(here, there))
+        tally.add("pair/nees", claimed.squared / 3)
+        tally.add("pair/inside", float(claimed.is_inside))
         tally.add("pair/age", (near.utime - peers.utimes[k]) / 1e6)
 
 

@@ -28,6 +28,7 @@ from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.banded.banded_solver import SETTLED
 from drslamd.slam.optimizer.banded.lapses.known_lapses import freed_again, lapse_of
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE
+from drslamd.slam.optimizer.banded.pairs.narrowing import narrower
 from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.contract import Job
@@ -277,8 +278,7 @@ def solved(
     mine = {chain.robot: team.places.of_robot(chain.robot) for chain in team.chains}
     stays = [chain.robot for chain in team.chains if chain.robot not in team.left]
     last = tuple(int(mine[robot][-1]) for robot in stays)
-    tolerance = tolerance or (SETTLED if team.is_known else TOLERANCE)
-    solution, kept = solve(team, last, tolerance, kept)
+    solution, kept = solve(team, last, tolerance or (SETTLED if team.is_known else TOLERANCE), kept)
     learned, spread, doubted = solution.calibration, solution.spread, solution.doubted
     assert spread is not None
     n, poses = team.problem.n, solution.poses
@@ -296,6 +296,7 @@ def solved(
         nodes={number: paths[number] for number in stays if is_node(number)},
         left={number: paths[number] for number in team.left},
         points=points,
+        narrower=narrower(stays, solution.shares),
         joint=standing_points.without_headings(solution.joint, np.isin(stays, list(points))),
         bias_m=_named(team.pairs, learned.bias, spread.bias),
         bias_sigma_m=dict(zip(team.pairs, solution.bias_sigmas.tolist(), strict=True)),

@@ -14,17 +14,19 @@ import numpy as np
 
 from drslamd.slam import se2
 from drslamd.slam.optimizer.banded import claims
-from drslamd.slam.optimizer.banded.explanation import explain
+from drslamd.slam.optimizer.banded.band_factor import BandFactor
+from drslamd.slam.optimizer.banded.explanation import Explanation, explain
 from drslamd.slam.optimizer.banded.lapses.known_lapses import still_freed
 from drslamd.slam.optimizer.banded.lapses.stretches import under
 from drslamd.slam.optimizer.banded.misfit import contradicted
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import FIRST_LEVEL, raised
+from drslamd.slam.optimizer.banded.pairs import narrowing
 from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
-from drslamd.slam.se2 import Array
+from drslamd.slam.se2 import Array, Index
 
 SETTLED = 1e-7
 """m and rad: the last step of a solution that is the same, to a tenth of it, from wherever it was
@@ -37,6 +39,7 @@ def solve(
     marginals: tuple[int, ...] = (),
     most: int = 30,
     tolerance: float = TOLERANCE,
+    known: Array | None = None,
 ) -> Solution:
     """The solution as configured; where odometry cannot have been so, with what it deserves.
 
@@ -49,14 +52,14 @@ def solve(
         marginals: poses whose joint covariance is wanted.
         most: bound on steps.
         tolerance: see `newton_descent.TOLERANCE`.
+        known: `Solution.shares` that hold still.
     """
-    equations, known = Equations(problem), len(problem.freed)
+    equations, before = Equations(problem), len(problem.freed)
     start = start or Calibration.zero(problem.pairs, len(problem.priors.scale))
     # who was solved before is most often where he was, but for a second of driving
     nominal = descend(equations, start, most, tolerance, is_near=problem.fitted is not None)
     explained = explain(equations, nominal, most, tolerance)
-    equations, point = explained.equations, explained.point
-    problem = equations.problem
+    equations, point, problem = explained.equations, explained.point, explained.equations.problem
     poses: Array = point.poses.copy()
     poses[:, 2] = se2.wrap(poses[:, 2])
     scatter = claims.scatter_of(problem, point)
@@ -64,7 +67,7 @@ def solve(
     wanted = np.array(marginals, dtype=int)
     joint, spread, biases = claims.covariances(feared, point, scatter, wanted)
     freed = still_freed(problem, point)
-    is_same = len(freed) == len(problem.freed) == known
+    is_same = len(freed) == len(problem.freed) == before
     doubted = tuple(one for one in freed if not one.is_settled)
     late = FIRST_LEVEL * under(problem, doubted, after_s=np.inf)
     # nobody goes on from a solution with other stretches freed as from one that is as modelled
@@ -79,6 +82,7 @@ def solve(
         converged=nominal.converged,
         scatter=scatter,
         joint=joint,
+        shares=_shares(explained, joint, wanted, known),
         spread=spread,
         bias_sigmas=biases,
         odometry_level=np.maximum(explained.level, news),
@@ -89,3 +93,22 @@ def solve(
         doubted=claims.still_doubted(problem.doubted, point.calibration, spread),
         freed=freed,
     )
+
+
+def _shares(
+    explained: Explanation, joint: Array, wanted: Index, known: Array | None = None
+) -> Array:
+    """See `Solution.shares`: where all is as modelled."""
+    equations, point, ratio = explained.equations, explained.point, explained.ratio
+    if ratio is None or not narrowing.may_narrow(equations.problem, len(wanted)):
+        return np.ones((0, 0))
+    if known is not None:
+        return known
+    factor = BandFactor.of(equations.weighed(point))
+    seen = factor and narrowing.seen_noise(equations, point, factor, ratio)
+    if not seen:
+        return np.ones((0, 0))
+    problem = equations.problem
+    feared = raised(problem, seen.feared[problem.odometry.robot], point)
+    narrow = claims.covariances(Equations(feared, like=equations), point, seen.scatter, wanted)[0]
+    return narrowing.shares(point.poses[wanted], joint, narrow)

@@ -48,6 +48,7 @@ class Explanation:
         other: the solution of another explanation, when nobody can tell which is right.
         level: (m,) sigmas of odometry over what is configured, as far as it was seen.
         feared: (m,) variances likewise, as far as it must be feared; lately: of the last seconds.
+        ratio: (robots,) s / g of odometry where all is as modelled, else None.
     """
 
     equations: Equations
@@ -56,6 +57,7 @@ class Explanation:
     level: Array
     feared: Array
     lately: Array
+    ratio: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -161,7 +163,7 @@ def _fits(equations: Equations, point: Point, most: float = FEW_OUTLIERS) -> boo
 def _as_is(equations: Equations, point: Point, ratio: Array) -> Explanation:
     robot = equations.problem.odometry.robot
     feared = np.maximum(ratio, 1.0)[robot]
-    return Explanation(equations, point, None, np.ones(len(robot)), feared, feared)
+    return Explanation(equations, point, None, np.ones(len(robot)), feared, feared, ratio)
 
 
 def _checked(equations: Equations, point: Point) -> _Check:

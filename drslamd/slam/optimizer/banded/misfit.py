@@ -137,6 +137,14 @@ def squares_of(problem: Problem, point: Point) -> Array:
     return problem.odometry.squares(point.link)
 
 
+def squares_of_ranges(problem: Problem, point: Point) -> Array:
+    """(pairs,) e' W e of the ranges of each, as far as they are believed."""
+    ranges, error = problem.ranges, point.sight.error
+    cut = point.threshold[ranges.pair] * ranges.sigma
+    squares = (error / ranges.sigma) ** 2 / (1 + (error / cut) ** 2)
+    return np.bincount(ranges.pair, squares, problem.pairs)
+
+
 def outliers(problem: Problem, point: Point) -> NDArray[np.bool_]:
     """(n,) which of the ranges are far off the solution."""
     ranges = problem.ranges

@@ -247,9 +247,9 @@ def _solved(equations: Equations, variance: Array, near: Point) -> tuple[Point, 
 
 
 def raised(problem: Problem, variance: Array, near: Point) -> Problem:
-    """The problem with odometry that is believed less, to be solved from a point near by."""
+    """The problem with odometry that is believed otherwise, to be solved from a point near by."""
     odometry = problem.odometry
-    floor = (variance - 1)[:, None] * FLOOR
+    floor = np.maximum(variance - 1, 0.0)[:, None] * FLOOR
     covariance = odometry.covariance * variance[:, None, None] + floor[:, :, None] * np.eye(3)
     believed = replace(odometry, covariance=covariance)
     return replace(problem, initial=near.poses, odometry=believed)

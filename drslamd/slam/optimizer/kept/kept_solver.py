@@ -7,7 +7,8 @@ solved yet, a matrix that does not lead there, or a model that is not one of wha
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem
 from drslamd.slam.optimizer.banded.misfit import lately_wrong
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import raised
+from drslamd.slam.optimizer.banded.pairs import narrowing
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.kept import kept_claims, kept_factor, quick_check
@@ -37,6 +39,9 @@ MOVED = 0.12
 """Of log variance: what is claimed of the head holds as long as what is feared of each robot moved
 less, and half of it for pairs in the mean. A sigma goes with the fourth root, so it is off by 3 %
 at most; what is feared of a whole robot is a guess that scatters by some percent itself."""
+
+GROWN = 1.1
+"""Times as many links as when shares of pairs were found."""
 
 FEW = 400
 """Poses: a smaller problem is solved anew in the time of what is done beside a kept factor."""
@@ -78,6 +83,31 @@ class Sureness:
 
 
 @dataclass(frozen=True)
+class KeptShares:
+    """What is left of the covariances of pairs (`banded.pairs.narrowing`), some seconds ago. It
+    moves slowly, and to find it takes longer than a second that is kept.
+
+    Attributes:
+        robots: of whose last poses; links: of odometry, so many.
+        left: (k, k), or of none.
+    """
+
+    robots: tuple[int, ...]
+    links: int
+    left: Array
+
+    @staticmethod
+    def of(team: TeamProblem, last: tuple[int, ...], left: Array) -> KeptShares:
+        """Of the poses `last`, one of each robot."""
+        robots = tuple(team.problem.robot[list(last)].tolist())
+        return KeptShares(robots, len(team.problem.odometry), left)
+
+    def hold(self, now: KeptShares) -> bool:
+        """Are they those of the same robots, which have not driven much further since?"""
+        return self.robots == now.robots and now.links <= GROWN * self.links
+
+
+@dataclass(frozen=True)
 class Kept:
     """What the next solution begins with.
 
@@ -86,6 +116,7 @@ class Kept:
         sure: when that was made.
         variances: of the mountings, see `mountings.variances`, of when `downwards` was made.
         checked: of odometry, made anew as the way grows.
+        shares: of pairs, likewise.
     """
 
     downwards: KeptFactor
@@ -93,6 +124,7 @@ class Kept:
     sure: Sureness
     variances: Array
     checked: Freedom
+    shares: KeptShares
 
 
 def solve(
@@ -110,7 +142,16 @@ def solve(
             found = _solved(team, last, tolerance, before)
             if found is not None:
                 return found
-    return banded_solver.solve(team.problem, team.start, last, tolerance=tolerance), None
+    shares = kept.shares if isinstance(kept, Kept) else kept
+    known = shares if isinstance(shares, KeptShares) and shares.hold(_none(team, last)) else None
+    left = known.left if known else None
+    solution = banded_solver.solve(team.problem, team.start, last, tolerance=tolerance, known=left)
+    return solution, known or KeptShares.of(team, last, solution.shares)
+
+
+def _none(team: TeamProblem, last: tuple[int, ...]) -> KeptShares:
+    """Nothing is known of them."""
+    return KeptShares.of(team, last, np.ones((0, 0)))
 
 
 def _solved(
@@ -147,8 +188,47 @@ def _solved(
     if joint is None or spread is None or downwards is None or held is None:
         return None
     since = kept.sure if kept and known else sure
-    after = Kept(downwards, held, since, variances, checked)
-    return _said(equations, point, scatter, sure.feared, joint, *spread), after
+    shares = _shares(team, last, kept, JustSolved(equations, point, current, ratio, joint))
+    after = Kept(downwards, held, since, variances, checked, shares)
+    said = _said(equations, point, scatter, sure.feared, joint, *spread)
+    return replace(said, shares=shares.left), after
+
+
+class JustSolved(NamedTuple):
+    """A solution.
+
+    Attributes:
+        matrix: that led there; ratio: (robots,) s / g of odometry.
+        joint: (3 k, 3 k) covariance of the poses that are wanted, as it is claimed.
+    """
+
+    equations: Equations
+    point: Point
+    matrix: Current
+    ratio: Array
+    joint: Array
+
+
+def _shares(
+    team: TeamProblem, last: tuple[int, ...], kept: Kept | None, seen: JustSolved
+) -> KeptShares:
+    """See `Solution.shares`."""
+    problem, point = team.problem, seen.point
+    nothing = _none(team, last)
+    if kept is not None and kept.shares.hold(nothing):
+        return kept.shares
+    if not narrowing.may_narrow(problem, len(last)):
+        return nothing
+    noise = narrowing.seen_noise(seen.equations, point, seen.matrix, seen.ratio)
+    if noise is None:
+        return nothing
+    believed = Sureness.of(team, noise.scatter, noise.feared).believed(problem, point)
+    claimed = _matrix(None, believed, team.pairs, with_blocks=False)
+    wanted = np.array(last, dtype=int)
+    joint = None if claimed is None else kept_claims.kept_covariance(claimed, wanted)
+    if joint is None:
+        return nothing
+    return replace(nothing, left=narrowing.shares(point.poses[wanted], seen.joint, joint))
 
 
 def _matrix(

@@ -24,6 +24,7 @@ from drslamd.slam.optimizer.banded.misfit import (
     outlier_share,
     outliers,
     runs,
+    squares_of_ranges,
 )
 from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
@@ -144,6 +145,13 @@ def errs(sigmas: Array, pair: Array | None = None) -> tuple[Problem, Point]:
 def test_a_range_is_an_outlier_beyond_two_and_a_half_sigmas(times: float) -> None:
     problem, point = errs(np.array([0.0, times * 2.5, 0.0]))
     assert outliers(problem, point).tolist() == [False, abs(times) > 1, False]
+
+
+def test_squares_of_ranges_are_those_of_each_pair_as_far_as_they_are_believed() -> None:
+    problem, point = errs(np.array([1.0, -2.0, 0.0, 8.0]), np.array([0, 0, 1, 1]))
+    far = point.threshold
+    right = [1 / (1 + far[0] ** -2) + 4 / (1 + 4 * far[0] ** -2), 64 / (1 + 64 * far[1] ** -2), 0.0]
+    assert squares_of_ranges(problem, point) == pytest.approx(right)
 
 
 def test_shares_of_outliers_are_those_of_each_pair() -> None:

@@ -340,6 +340,13 @@ def test_raised_links_have_more_noise_and_at_least_some() -> None:
     assert np.array_equal(believed.odometry.covariance[rest], problem.odometry.covariance[rest])
 
 
+def test_links_that_are_believed_more_have_less_noise_and_no_more_than_that() -> None:
+    problem = a_team(1)[0]
+    variance = np.full(len(problem.odometry), 0.1)
+    believed = raised(problem, variance, nominal(problem))
+    assert np.allclose(believed.odometry.covariance, 0.1 * problem.odometry.covariance, rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("ratio", "level"),
     [

@@ -15,6 +15,7 @@ from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.optimizer.banded import banded_optimizer
 from drslamd.slam.optimizer.banded.banded_solver import SETTLED
+from drslamd.slam.optimizer.banded.pairs import narrowing
 from drslamd.slam.optimizer.kept import kept_solver, quick_check
 
 NEAR_M, NEAR_SIGMA = 1e-4, 1.03
@@ -61,7 +62,7 @@ def driven(
         numbers, graph, group, previous = job.args
         problem = banded_optimizer.build_problem(graph, group, previous, numbers)
         right = banded_optimizer.solved(problem, group, tolerance=SETTLED)
-        yield Second(found, right, found.kept is None)
+        yield Second(found, right, not isinstance(found.kept, kept_solver.Kept))
         team.back.on_solution(found)
         for chain, entry in said(second, team.entries()):
             team.back.insert(chain, entry)
@@ -152,3 +153,44 @@ def test_a_small_problem_is_solved_anew(
     # each robot makes one more
     monkeypatch.setattr(kept_solver, "FEW", poses + 3 + more)
     assert next(seconds).began_anew is is_anew
+
+
+def test_shares_of_pairs_hold_until_a_tenth_of_the_way_is_new_and_for_the_same_robots() -> None:
+    found = kept_solver.KeptShares((0, 3), 100, np.ones((2, 2)))
+    for robots, links, holds in (
+        ((0, 3), 110, True),
+        ((0, 3), 111, False),
+        ((0, 4), 100, False),
+        ((0, 3, 4), 100, False),
+    ):
+        assert found.hold(kept_solver.KeptShares(robots, links, np.ones((0, 0)))) is holds
+
+
+def test_shares_that_were_kept_are_those_that_are_found_anew() -> None:
+    """From the matrix that was kept, and by the solver that keeps nothing."""
+    for second in list(driven(MetTeam(3, 40, 10), 4))[2:]:
+        assert isinstance(second.found.kept, kept_solver.Kept)
+        found, right = second.found.narrower, second.right.narrower
+        for pair in right.keys() | found.keys():
+            assert found.get(pair, 1.0) == pytest.approx(right.get(pair, 1.0), rel=0.06)
+
+
+@pytest.mark.parametrize("few", [0, 10_000])
+def test_shares_are_not_found_each_second(few: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kept_solver, "FEW", few)
+    times = []
+    seen_noise = narrowing.seen_noise
+
+    def counted(*args: Any) -> narrowing.SeenNoise | None:
+        times.append(0)
+        return seen_noise(*args)
+
+    team = MetTeam(3, 40, 10)
+    for _ in range(4):
+        job: Any = team.back.begin(team.living)
+        team.back.on_solution(job())
+        for chain, entry in team.entries():
+            team.back.insert(chain, entry)
+        monkeypatch.setattr(narrowing, "seen_noise", counted)
+    # (the first second has nothing kept; the fourth is 7 % further than the first)
+    assert len(times) <= 1

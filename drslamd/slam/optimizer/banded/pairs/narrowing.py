@@ -1,0 +1,122 @@
+"""By how much two robots are surer of each other than what is configured lets them claim.
+
+The noise of a pair's ranges is held at that of the others, and that at what is configured, so much
+as a handful of independent ranges would say; likewise the odometry of each robot (`misfit.DOUBT`).
+With that noise the same system is taken apart once more, and each pair gets one factor, by which
+its covariance is smaller in the mean of all directions. It is never above 1: what is wrong beyond
+what is configured is for the covariances of all. Constants of sensors are feared as configured,
+since few ranges tell of them.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from drslamd.slam.optimizer.banded.band_factor import Solver
+from drslamd.slam.optimizer.banded.misfit import squares_of_ranges
+from drslamd.slam.optimizer.banded.normal_equations import Equations
+from drslamd.slam.optimizer.banded.pairs.expected_squares import expected_squares
+from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.problem import Problem
+from drslamd.slam.se2 import Array
+
+ALIKE = 1.7
+"""Ranges, one a second, whose squares say as much as one: squares of errors resemble those of their
+neighbours by the square of what the errors do (0.64 exp(-t / 2.5 s), see `RangeModel`)."""
+PRIOR_RANGES = 5 * ALIKE
+"""That say what is configured, which leaves that uncertain by a third."""
+LEAST_FEARED = 0.1
+"""Of the variance of odometry that is configured: so much is feared however well it fits."""
+LEAST_SHARE = 0.2
+"""Of a covariance that is left at least."""
+MOST_POSES = 12
+"""Of which pairs are narrowed: in a larger team each is seen from many sides, and what its ranges
+scatter is in the covariances already."""
+
+
+class SeenNoise(NamedTuple):
+    """How wrong sensors are, as far as that was seen.
+
+    Attributes:
+        scatter: (pairs,) sigma of ranges over the configured one.
+        feared: (robots,) variance of odometry over the configured one.
+    """
+
+    scatter: Array
+    feared: Array
+
+
+def may_narrow(problem: Problem, poses: int) -> bool:
+    """Are there pairs, not too many of them, and nobody whose wheels may stand or spin?"""
+    return 1 < poses <= MOST_POSES and not problem.freed
+
+
+def seen_noise(
+    equations: Equations, point: Point, factor: Solver, ratio: Array
+) -> SeenNoise | None:
+    """None where the matrix gives no solution.
+
+    Args:
+        factor: see `expected_squares`.
+        ratio: (robots,) s / g of odometry, see `misfit`.
+    """
+    expected = expected_squares(equations, point, factor)
+    if expected is None:
+        return None
+    variance = held_variances(squares_of_ranges(equations.problem, point), expected)
+    return SeenNoise(np.sqrt(variance), np.maximum(ratio, LEAST_FEARED))
+
+
+def held_variances(squares: Array, expected: Array) -> Array:
+    """(pairs,) variances of ranges over the configured one, and one sigma more of what is uncertain
+    of that: nothing is narrowed on the word of a few ranges.
+
+    Args:
+        squares: (pairs,) of what is left of ranges, by their weights.
+        expected: (pairs,) the same where they are as wrong as configured.
+    """
+    rest, expected_rest = squares.sum() - squares, expected.sum() - expected
+    others = (PRIOR_RANGES + rest) / (PRIOR_RANGES + expected_rest)
+    likeliest = (PRIOR_RANGES * others + squares) / (PRIOR_RANGES + expected)
+    unsure = np.sqrt(2 * ALIKE / (PRIOR_RANGES + expected.sum()))
+    return np.asarray((1 + unsure) * likeliest)
+
+
+def shares(poses: Array, claimed: Array, seen: Array) -> Array:
+    """(k, k) what is left of the covariance of each two of k poses in each other, 1 at most.
+
+    Args:
+        poses: (k, 3) w_T_k.
+        claimed, seen: (3 k, 3 k) joint covariances as they are claimed, and with the noise that
+            was seen.
+    """
+    count = len(poses)
+    out = np.ones((count, count))
+    i, j = np.triu_indices(count, 1)
+    if not len(i):
+        return out
+    across = np.zeros((len(i), 3, 6))
+    across[:, :, :3], across[:, :, 3:] = -np.eye(3), np.eye(3)
+    across[:, 0, 2], across[:, 1, 2] = (poses[j] - poses[i])[:, 1], -(poses[j] - poses[i])[:, 0]
+    at = (3 * np.stack([i, j], axis=1)[:, :, None] + np.arange(3)).reshape(-1, 6)
+    wide, narrow = (
+        across @ joint[at[:, :, None], at[:, None, :]] @ np.swapaxes(across, 1, 2)
+        for joint in (claimed, seen)
+    )
+    left = np.einsum("kii->k", np.linalg.solve(wide, narrow)) / 3
+    out[i, j] = out[j, i] = np.clip(left, LEAST_SHARE, 1.0)
+    return out
+
+
+def narrower(robots: list[int], left: Array) -> dict[tuple[int, int], float]:
+    """What is left of the covariances of pairs a < b, where that is not all of it.
+
+    Args:
+        left: see `shares`, or of none.
+    """
+    at = {robot: k for k, robot in enumerate(robots)} if len(left) else {}
+    found = {(a, b): float(left[at[a], at[b]]) for a, b in combinations(sorted(at), 2)}
+    return {pair: share for pair, share in found.items() if share < 1.0}
