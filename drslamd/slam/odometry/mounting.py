@@ -13,6 +13,7 @@ the front and once from the back of the robot. Ranges do not tell which.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 
@@ -51,25 +52,6 @@ class Repair(NamedTuple):
     cross: float = 0.0
     bend: float = 0.0
 
-    def path(self, poses: Array, half_track_m: float) -> Array:
-        """(k, 3) of a 10 Hz track o_T_i, as they should have been, from the first of them on.
-
-        Args:
-            half_track_m: only where `cross` is not 0.
-        """
-        step = se2.between(poses[:-1], poses[1:])
-        turn = se2.wrap(step[:, 2])
-        along = se2.rotate(-turn / 2, step[:, :2])
-        way = along[:, 0] / _chord(turn)
-        cross = self.cross * np.array([half_track_m, 1 / half_track_m if self.cross else 0.0])
-        d = self.way * way + cross[0] * turn
-        t = self.turn * turn + cross[1] * way + self.bend * np.abs(way)
-        chord = np.stack([d * _chord(t), self.way * along[:, 1]], axis=-1)
-        heading = poses[0, 2] + np.append(0.0, np.cumsum(t))
-        moved = np.cumsum(se2.rotate(heading[:-1] + t / 2, chord), axis=0)
-        place = np.concatenate([poses[:1, :2], poses[0, :2] + moved])
-        return np.column_stack([place, heading])
-
     def variants(self) -> tuple[Repair, ...]:
         """The same, way and turn a little more or less; of what has no factor only itself."""
         if self.fault not in LEARNED:
@@ -80,6 +62,29 @@ class Repair(NamedTuple):
             for way in factors
             for turn in factors
         )
+
+
+def paths(repairs: Sequence[Repair], poses: Array, half_track_m: float) -> Array:
+    """(r, k, 3) of a 10 Hz track o_T_i, as each repair (r) has it, from its first pose on.
+
+    Args:
+        half_track_m: only where `cross` is not 0.
+    """
+    step = se2.between(poses[:-1], poses[1:])
+    turn = se2.wrap(step[:, 2])
+    along = se2.rotate(-turn / 2, step[:, :2])
+    gone = along[:, 0] / _chord(turn)
+    way, turned, cross, bend = np.array([repair[1:] for repair in repairs]).T[..., None]
+    by_turn = cross * half_track_m
+    by_way = np.divide(cross, half_track_m, out=np.zeros_like(cross), where=cross != 0)
+    d = way * gone + by_turn * turn
+    t = turned * turn + by_way * gone + bend * np.abs(gone)
+    chord = np.stack([d * _chord(t), way * along[:, 1]], axis=-1)
+    out = np.empty((len(repairs), len(poses), 3))
+    out[:, 0], out[:, 1:, 2] = poses[0], poses[0, 2] + np.cumsum(t, axis=1)
+    moved = np.cumsum(se2.rotate(out[:, :-1, 2] + t / 2, chord), axis=1)
+    out[:, 1:, :2] = poses[0, :2] + moved
+    return out
 
 
 def _chord(turn: Array) -> Array:

@@ -6,7 +6,7 @@ that the robots would have had if the wheels of one of them were mounted otherwi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from drslamd.conventions import SECOND_US
 from drslamd.slam import se2
+from drslamd.slam.odometry import mounting
 from drslamd.slam.odometry.mounting import (
     AS_CONFIGURED,
     COARSE_SCALES,
@@ -103,17 +104,28 @@ class WindowTrack:
         poses = end.track.at_time(np.arange(first, last + 1))
         return WindowTrack(poses, at - first, reference - first, end.data.model.half_track_m)
 
-    def repaired(self, repair: Repair) -> Array | None:
-        """(n, 3) poses at the measurements, seen from that at the reference time; None where the
+    def repaired(self, repairs: Collection[Repair]) -> dict[Repair, Array]:
+        """(n, 3) poses at the measurements, seen from that at the reference time; none where the
         wheels cannot be mounted so, or nothing is known of the way."""
-        if repair.cross and not self.half_track_m > 0:
-            return None
-        path = repair.path(self.poses, self.half_track_m)
-        at = np.append(self.at, self.reference)
-        places = np.arange(len(path))
-        poses = np.stack([np.interp(at, places, column) for column in path.T], axis=-1)
-        seen = se2.between(poses[-1], poses[:-1])
-        return seen if np.isfinite(seen).all() else None
+        possible = [repair for repair in repairs if self.half_track_m > 0 or not repair.cross]
+        if not possible:
+            return {}
+        paths = mounting.paths(possible, self.poses, self.half_track_m)
+        poses = _at_places(paths, np.append(self.at, self.reference))
+        seen = se2.between(poses[:, -1:], poses[:, :-1])
+        each = zip(possible, seen, strict=True)
+        return {repair: found for repair, found in each if np.isfinite(found).all()}
+
+
+def _at_places(paths: Array, at: Array) -> Array:
+    """(r, n, 3) paths (r, k, 3) at places (n,) in them, straight between two."""
+    last = paths.shape[1] - 1
+    at = np.clip(at, 0, last)
+    low = at.astype(np.int64)
+    here, beyond = paths[:, low], paths[:, np.minimum(low + 1, last)]
+    share = (at - low)[:, None]
+    # (what follows a pose may be unknown)
+    return np.where(share == 0, here, (beyond - here) * share + here)
 
 
 @dataclass(frozen=True)
@@ -155,11 +167,11 @@ class Question:
         delta: float,
     ) -> None:
         """Fill in what some of the cases cost, all of them at once."""
-        a = {repair: self.a.repaired(repair) for repair in {cases[place].a for place in places}}
-        b = {repair: self.b.repaired(repair) for repair in {cases[place].b for place in places}}
+        a = self.a.repaired({cases[place].a for place in places})
+        b = self.b.repaired({cases[place].b for place in places})
         possible = {}
         for place in places:
-            a_poses, b_poses = a[cases[place].a], b[cases[place].b]
+            a_poses, b_poses = a.get(cases[place].a), b.get(cases[place].b)
             if a_poses is not None and b_poses is not None:
                 possible[place] = replace(self.window, a_poses=a_poses, b_poses=b_poses)
         noises = [noise] * len(possible)

@@ -116,15 +116,23 @@ def odometry_covariance(twist: Array, moment: Array, before: Index) -> Array:
     near = far.copy()
     # of two measurements before the reference time the first is the farther one; after it the
     # noise is another, and the last is
-    for row, split in enumerate(before.tolist()):
-        near[row, :, :3, :split] = moment[row, ..., :split]
-        far[row, :, :3, split:] = moment[row, ..., split:]
+    splits = _where_split(before)
+    for split, rows in splits:
+        near[rows, :, :3, :split] = moment[rows, ..., :split]
+        far[rows, :, :3, split:] = moment[rows, ..., split:]
     lower = far.reshape(k, -1, n).transpose(0, 2, 1) @ near.reshape(k, -1, n)
-    for row, split in enumerate(before.tolist()):
+    for split, rows in splits:
         if split < n:
-            across = constant[row, :, split:].T @ constant[row, :, :split]
-            lower[row, split:, :split] = across
+            beyond, here = constant[rows, :, split:], constant[rows, :, :split]
+            lower[rows, split:, :split] = beyond.transpose(0, 2, 1) @ here
     return np.asarray(lower)
+
+
+def _where_split(before: Index) -> list[tuple[int, slice | Index]]:
+    """The values of `before` (k,), and which rows have each."""
+    if (before == before[0]).all():
+        return [(int(before[0]), slice(None))]
+    return [(split, np.flatnonzero(before == split)) for split in np.unique(before).tolist()]
 
 
 class WindowNoise:

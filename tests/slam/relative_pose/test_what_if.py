@@ -13,6 +13,7 @@ from slam_scenes import EXACT, NOISE, Array, product
 from drslamd.conventions import GRID_US, SECOND_US, Chain
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import Keyframe
+from drslamd.slam.odometry import mounting
 from drslamd.slam.odometry.mounting import (
     AS_CONFIGURED,
     COARSE_SCALES,
@@ -36,6 +37,7 @@ from drslamd.slam.relative_pose.what_if import (
     OUTPOSTS,
     Case,
     Question,
+    WindowTrack,
     ask,
     variants,
 )
@@ -210,13 +212,21 @@ def test_where_a_track_has_a_hole_nothing_fits() -> None:
     assert np.isfinite(pair.question.costs((Case(),), PAIR_NOISE, DELTA)).all()
 
 
+def test_a_hole_beside_a_measurement_is_no_hole_of_its_own() -> None:
+    """Where a measurement falls on a pose, what follows that may be unknown."""
+    poses = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.2, 0.0, 0.0], [np.nan] * 3])
+    ends = (WindowTrack(poses, np.array([0.5, last]), 1.0, HALF_M) for last in (2.0, 2.001))
+    known, unknown = (end.repaired([AS_CONFIGURED]) for end in ends)
+    assert known[AS_CONFIGURED] == pytest.approx(np.array([[-0.05, 0, 0], [0.1, 0, 0]]))
+    assert not unknown
+
+
 def test_as_configured_a_window_is_what_it_was() -> None:
     pair = seen()
     question, window = pair.question, pair.request.window
     for stretch, poses in ((question.a, window.a_poses), (question.b, window.b_poses)):
-        repaired = stretch.repaired(AS_CONFIGURED)
-        assert repaired is not None
-        assert np.allclose(repaired, poses, atol=1e-9)
+        repaired = stretch.repaired([AS_CONFIGURED])
+        assert np.allclose(repaired[AS_CONFIGURED], poses, atol=1e-9)
         assert len(stretch.at) == len(window.t)
     assert question.window is window
     assert question.b.half_track_m == HALF_M
@@ -228,8 +238,8 @@ def test_the_whole_track_is_repaired_and_not_only_its_places_in_the_window(scale
     repair = Repair(TRACKS[0].fault, turn=scale)
     question = seen().question
     poses = question.a.poses
-    path, repaired = repair.path(poses, HALF_M), question.a.repaired(repair)
-    assert repaired is not None
+    (path,) = mounting.paths([repair], poses, HALF_M)
+    repaired = question.a.repaired([MIRRORED, repair])[repair]
     at, reference = question.a.at, question.a.reference
     for k in (0, len(at) // 2, len(at) - 1):
         there = [np.interp(at[k], np.arange(len(path)), column) for column in path.T]
