@@ -57,6 +57,17 @@ def _is_of_terminals(error: OSError) -> bool:
     return isinstance(error.__context__, termios.error)
 
 
+def _come(descriptor: int) -> bytes | None:
+    """What has come: None of a silent line, nothing at all of one that was pulled.
+
+    Both read alike, so only then it is asked which of them it is: that takes as long as reading.
+    """
+    data = os.read(descriptor, READ_BYTES)
+    if data or has_bytes(descriptor):
+        return data or os.read(descriptor, READ_BYTES)
+    return None
+
+
 class SerialPort:
     """Feeds what it reads, and each change of its state, into `deliver`.
 
@@ -142,9 +153,7 @@ class SerialPort:
         """A round has come, and perhaps something to read."""
         assert self._line is not None
         assert self._rounds is not None
-        # reading would not tell a silent line from one that was pulled
-        is_silent = not has_bytes(self._line.fileno())
-        if not is_silent and self._read() and self._rounds.has_time():
+        if self._read() and self._rounds.has_time():
             self._rounds.join(self._on_round)
         elif not self._lost.is_set():
             asyncio.get_running_loop().add_reader(self._line.fileno(), self._on_bytes)
@@ -154,11 +163,13 @@ class SerialPort:
         assert self._line is not None
         self.reads += 1
         try:
-            data = os.read(self._line.fileno(), READ_BYTES)
+            data = _come(self._line.fileno())
         except BlockingIOError:
             return False
         except OSError as error:
             self._lose(error)
+            return False
+        if data is None:
             return False
         if not data:
             self._lose(OSError(errno.EIO, os.strerror(errno.EIO)))

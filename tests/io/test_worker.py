@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import threading
 import time
+import weakref
 from collections.abc import Callable
 
 import pytest
@@ -157,3 +159,26 @@ def test_who_waits_for_nothing_is_not_stuck(monkeypatch: pytest.MonkeyPatch) -> 
         worker.stop()
 
     asyncio.run(run())
+
+
+def test_while_it_works_garbage_is_not_looked_for_in_what_was_there_before() -> None:
+    gc.collect()
+    left = Ring()
+    left.itself = left
+    is_there, during = weakref.ref(left), []
+    del left
+
+    def look() -> None:
+        gc.collect()
+        during.append(is_there() is not None)
+
+    with_worker(lambda worker, done: worker.submit(look, done), 1)
+    assert during == [True]
+    gc.collect()
+    assert is_there() is None
+
+
+class Ring:
+    """Garbage that only a look for it finds."""
+
+    itself: Ring
