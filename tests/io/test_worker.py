@@ -162,17 +162,21 @@ def test_who_waits_for_nothing_is_not_stuck(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_while_it_works_garbage_is_not_looked_for_in_what_was_there_before() -> None:
-    gc.collect()
-    left = Ring()
-    left.itself = left
-    is_there, during = weakref.ref(left), []
-    del left
+    during = []
 
     def look() -> None:
         gc.collect()
         during.append(is_there() is not None)
 
-    with_worker(lambda worker, done: worker.submit(look, done), 1)
+    gc.disable()  # or it might be found before
+    try:
+        left = Ring()
+        left.itself = left
+        is_there = weakref.ref(left)
+        del left
+        with_worker(lambda worker, done: worker.submit(look, done), 1)
+    finally:
+        gc.enable()
     assert during == [True]
     gc.collect()
     assert is_there() is None
