@@ -154,7 +154,7 @@ def _network(robot: Robot, utime: int) -> dict[str, Any]:
 
 
 def _peers(robot: Robot, utime: int) -> dict[str, Any]:
-    own_hash, peers = robot.back.digest(), sorted(robot.team.everybody.items())
+    own_hash, peers = robot.back.said_digest(), sorted(robot.team.everybody.items())
     return {str(k): _peer(robot, peer, utime, own_hash) for k, peer in peers}
 
 
@@ -194,7 +194,7 @@ def _graph(robot: Robot) -> dict[str, Any]:
         "group": sorted({s.robot for s in robot.back.group if not is_node(s.robot)}),
         "keyframes": {
             str(k): len(c.keyframes)
-            for k, c in robot.back.graph.view.chains.items()
+            for k, c in robot.back.looked_at.chains.items()
             if not is_node(k)
         },
         "modules": point_report.modules(robot),

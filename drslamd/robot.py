@@ -161,6 +161,8 @@ class Robot:
     def handle(self, event: Event) -> list[Effect]:
         """Take one event; what follows from it."""
         effects, outbox = self._handlers[type(event)](event), self.outbox
+        if self.back.is_looking:
+            self.timers.hurry(self.modules.optimize, event.utime)
         if not effects or self.memory.is_listening(event.utime):
             return [e for e in effects if not isinstance(e, Send)]
         return [e for e in effects if not isinstance(e, Send) or outbox.passes(e, event.utime)]

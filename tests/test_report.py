@@ -301,6 +301,7 @@ def test_of_the_graph_the_group_its_keyframes_and_what_was_learned_are_said() ->
         frames = tuple(Keyframe(10 * k, 0, k, 0, 0) for k in range(count))
         scene.hear(peer, GraphEntry(0, keyframes=frames))
     back = scene.robot.back
+    back.looked_at = back.graph.view
     back.group = {Segment(4, 1, 0), Segment(1, 1, 0), Segment(1, 1, 2)}
     back.estimate = TeamEstimate(Segment(1, 1, 0), {}, iterations=7, converged=False)
     assert section(scene, "graph") == {

@@ -75,3 +75,20 @@ def test_a_clock_that_stands_still_takes_nothing_twice() -> None:
     timers = started()
     assert timers.take_due(T0 + 100) == [often]
     assert timers.take_due(T0 + 100) == []
+
+
+def test_an_action_that_is_hurried_goes_on_at_once_and_its_rounds_are_what_they_were() -> None:
+    timers = started(often=100, seldom=250)
+    timers.hurry(seldom, T0 + 30)
+    assert timers.next == T0 + 30
+    assert timers.take_due(T0 + 31) == [seldom]
+    assert timers.next == T0 + 100
+    assert timers.take_due(T0 + 250) == [often, seldom]
+
+
+def test_an_action_that_is_due_and_hurried_is_taken_once_and_what_is_overdue_stays_so() -> None:
+    timers = started(often=100, seldom=250)
+    timers.hurry(often, T0 + 120)
+    assert timers.next == T0 + 100
+    assert timers.take_due(T0 + 130) == [often]
+    assert timers.next == T0 + 200

@@ -129,7 +129,7 @@ class PeersAround:
         """A clock minus ours, where it is not heard."""
         if robot in self._team.peers:
             return 0
-        shifts = self._back.graph.view.shifts
+        shifts = self._back.looked_at.shifts
         return round((shifts.get(robot, 0.0) - shifts.get(self._own, 0.0)) * GRID_US)
 
     def seen(self, leg: Leg, added: Packed, utime: int) -> Neighbours:

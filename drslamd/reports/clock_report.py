@@ -35,7 +35,7 @@ def clock(robot: Robot, chain: Chain, utime: int) -> dict[str, Any]:
 def _measured(robot: Robot, chain: Chain, utime: int) -> dict[str, Any]:
     """As ranges and closures tell of a robot that is no longer heard."""
     graph, own = robot.back.graph, robot.own.robot
-    shifts = graph.view.shifts
+    shifts = robot.back.looked_at.shifts
     is_held = chain.robot in graph.chains and graph.chains[chain.robot].chain == chain
     if not is_held or not {own, chain.robot} <= set(shifts):
         return {"source": "unknown", "readings": []}

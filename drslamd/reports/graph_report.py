@@ -19,6 +19,7 @@ from drslamd.robot import Robot
 from drslamd.slam import se2, settings
 from drslamd.slam.graph import standing_points, team_frame
 from drslamd.slam.graph.estimate import TeamEstimate
+from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem, build_problem
@@ -66,9 +67,9 @@ def graph(robot: Robot, utime: int) -> dict[str, Any]:
 
 
 def _problem(robot: Robot, estimate: TeamEstimate) -> TeamProblem | None:
-    """What module 3 would solve now, its poses as they are known; None when what joined the group
-    was withdrawn since."""
-    held = robot.back.graph
+    """What module 3 saw last, its poses as they are known; None when what joined the group was
+    withdrawn since."""
+    held = PoseGraph.of(robot.back.looked_at)
     connected = [group for group in team_frame.groups(held) if estimate.frame in group]
     members, points = standing_points.with_points(
         estimate.frame, connected[0] if connected else set(), held
@@ -94,7 +95,7 @@ def _tables(team: TeamProblem, robot: Robot) -> dict[str, Any]:
     edges = problem.odometry
     is_robot = problem.robot < FIRST_NODE
     to_robots = is_robot[ranges.i] & is_robot[ranges.j]
-    closures = factors.closures(robot.back.graph, places)
+    closures = factors.closures(PoseGraph.of(robot.back.looked_at), places)
     closures = closures.chosen(is_robot[closures.i] & is_robot[closures.j])
     odometry = BetweenFactors(edges.i, edges.j, corrected(edges, team.start), edges.covariance)
     return {
@@ -126,9 +127,8 @@ def _odometry(team: TeamProblem, robot: Robot) -> Array:
     out = np.zeros_like(team.problem.initial)
     for chain in team.chains:
         place = team.places.place[chain.robot]
-        out[place[place >= 0]] = robot.back.graph.view.chains[chain.robot].keyframes.poses[
-            place >= 0
-        ]
+        keyframes = robot.back.looked_at.chains[chain.robot].keyframes
+        out[place[place >= 0]] = keyframes.poses[place >= 0]
     out[:, 2] = se2.wrap(out[:, 2])
     return out
 

@@ -28,6 +28,9 @@ URGENT = 1e-4
 """Share of its cost that a move must bring for the next one to follow as soon as it is our turn:
 when a team has just met, and for some moves after each closure that says something new."""
 
+AT_ONCE = 30
+"""Work (`Thinning.steps`) on the view of the graph in one go, about 5 ms: all of a small team. Of
+fifty robots there are a thousand pairs, and nobody would read sensors for a fifth of a second."""
 
 PATIENCE = 3
 """Solutions in a row that did not converge: the first ones of a large team may need as many."""
@@ -51,6 +54,8 @@ class BackEnd:
         beside: starts of peers whose group is solved while we are in none: we were in it once.
         onlooked: the estimate of that group.
         exchange: of public poses, with `rbcd`.
+        looked_at: the graph as module 3 saw it last, at first empty: whoever else asks shall not
+            cost a look.
     """
 
     def __init__(self, config: Config, own: Chain, tuning: Tuning = DEFAULTS) -> None:
@@ -69,8 +74,9 @@ class BackEnd:
         self._is_beside = False
         self._inserted = 0
         self._known = _Known()
-        self._looked_at: GraphView | None = None
-        """By module 3, last."""
+        self._looks_for: _Known | None = None
+        """The job for which the graph is being looked at."""
+        self.looked_at = self.graph.view
         self._digested: tuple[GraphView, set[int], int] | None = None
         """What was digested last, and what came of it."""
         self._not_converged = 0
@@ -88,7 +94,7 @@ class BackEnd:
         """The same of the graph as module 3 looked at it last: what is said each second shall not
         cost a look of its own, and without news it is the same. Whoever else looks, to answer a
         question, changes nothing of what is said."""
-        view = self._looked_at or self.graph.view
+        view = self.looked_at
         known = self._digested
         if known is None or known[0] is not view or known[1] != self._grouped:
             known = self._digested = view, self._grouped, view.digest(self._grouped)
@@ -113,7 +119,8 @@ class BackEnd:
     def begin(
         self, present: set[int], talking: Set[int] = frozenset(), utime: int = 0
     ) -> Job | None:
-        """Begin to renew the estimate; None when nothing is new or connected.
+        """Begin to renew the estimate; None when nothing is new or connected, or while the graph
+        is too large to be looked at in one go (`is_looking`).
 
         An estimate that is not final is renewed without any news: then all who hold the same
         come to the same, whatever each of them solved before. With `rbcd` it has to be our turn
@@ -123,6 +130,37 @@ class BackEnd:
             present: robots that live.
             talking: those of them that hear us as we hear them.
         """
+        now = self._begun(present, talking, utime)
+        graph = self.graph.look(AT_ONCE) if now else None
+        if now is None or graph is None:
+            return None
+        self.looked_at, self._looks_for = graph.view, None
+        chain = graph.view.chains.get(self._own.robot)
+        if chain is None:
+            self._known = now
+            return None
+        current = Segment(*self._own, int(chain.keyframes.segment[-1]))
+        group = self._group(current, graph, present)
+        if group is None:
+            self._known = now
+            return None
+        same = self.exchange.held(group.frame.chain)
+        job = self._optimizer.job(graph, group, self._beginning(), same)
+        if job is None:
+            self.exchange.wait(utime)
+            return None
+        self._known = now
+        return job
+
+    @property
+    def is_looking(self) -> bool:
+        """Is the graph being looked at, and `begin` to be called again at once?"""
+        return self._looks_for is not None
+
+    def _begun(self, present: set[int], talking: Set[int], utime: int) -> _Known | None:
+        """What the job knows that is due, if one is; the graph may be looked at for it already."""
+        if self._looks_for is not None:
+            return self._looks_for
         now = _Known(self._inserted, frozenset(present), self.exchange.news)
         solved = self.estimate or self.onlooked
         if now == self._known and (solved is None or solved.is_final):
@@ -130,34 +168,25 @@ class BackEnd:
             return None
         if self._takes_turns and not self.exchange.begin(self._neighbours(talking), utime):
             return None
-        self._looked_at = self.graph.view
-        chain = self._looked_at.chains.get(self._own.robot)
-        if chain is None:
-            self._known = now
-            return None
-        current = Segment(*self._own, int(chain.keyframes.segment[-1]))
-        members = team_frame.group_of(current, self.graph, self._looks_back)
+        self._looks_for = now
+        return now
+
+    def _group(self, current: Segment, graph: PoseGraph, present: set[int]) -> Group | None:
+        """What is connected to us, or to whom we were once; then there is no estimate."""
+        members = team_frame.group_of(current, graph, self._looks_back)
         if not members and self.beside:
-            members = team_frame.group_with(self.beside, self.graph)
+            members = team_frame.group_with(self.beside, graph)
         points: frozenset[Segment] = frozenset()
         if self._looks_back:
-            members, points = standing_points.with_points(current, members, self.graph)
+            members, points = standing_points.with_points(current, members, graph)
         everything = members | points
         self._is_beside = not self._is_in(everything)
         self.group = set() if self._is_beside else everything
         gauge = team_frame.gauge_segment(members, present)
         if gauge is None:
             self.estimate = self.onlooked = None
-            self._known = now
             return None
-        same = self.exchange.held(gauge.chain)
-        group = Group(members, gauge, points)
-        job = self._optimizer.job(self.graph, group, self._beginning(), same)
-        if job is None:
-            self.exchange.wait(utime)
-            return None
-        self._known = now
-        return job
+        return Group(members, gauge, points)
 
     def _is_in(self, group: set[Segment]) -> bool:
         return any(segment.chain == self._own for segment in group)

@@ -54,6 +54,7 @@ def told(scene: RobotScene, peer: Chain, shift: int) -> None:
     at = (0.0, 0.0)
     ranges = tuple(RangeMeasurement(k.n, peer, k.n + shift, at, at, 5.0, 0.1) for k in keyframes)
     back.insert(own, GraphEntry(0, keyframes=keyframes, ranges=ranges))
+    back.looked_at = back.graph.view
 
 
 def test_a_robot_that_is_no_longer_heard_is_known_by_what_was_measured() -> None:

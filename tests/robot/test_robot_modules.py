@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pair_scenes import BESIDE, asked_at, estimate_of
 from robot_scenes import RobotScene, sends, solves
-from slam_scenes import NOISE
+from slam_scenes import NOISE, closure
 
 from drslamd.conventions import GRID_US, Chain, Segment
 from drslamd.events import Effect, JobDone, Solve
@@ -251,6 +251,23 @@ def test_module_3_runs_once_at_a_time_and_rests_too(
     ended(scene, solve, took_us)
     assert scene.robot.back.estimate is estimate
     assert bool(solves(scene.tick(1), OPTIMIZER)) is goes_on
+
+
+def test_while_the_graph_takes_more_than_one_look_the_robot_is_woken_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = RobotScene()
+    for robot, closures in ((0, (closure(0, 10, Chain(1, 1), 10, BESIDE),)), (1, ()), (2, ())):
+        frames = (Keyframe(10, 0, 0, 0, 0),)
+        entry = GraphEntry(0, keyframes=frames, closures=closures)
+        scene.robot.back.insert(Chain(robot, 1), entry)
+    monkeypatch.setattr("drslamd.slam.back_end.AT_ONCE", 1)
+    effects, woken = scene.tick(), 0
+    while not solves(effects, OPTIMIZER):
+        assert scene.robot.next_tick == scene.utime
+        effects, woken = scene.tick(0.001), woken + 1
+    assert woken > 2
+    assert scene.robot.next_tick > scene.utime + 50_000
 
 
 def test_module_3_is_told_who_lives_and_whom_we_can_talk_to(

@@ -339,6 +339,46 @@ def test_what_is_solved_is_thinned_and_what_was_said_is_held() -> None:
     assert len(back.graph.view.chains[0].keyframes) < 600
 
 
+# a graph that is too large to be looked at in one go
+
+
+def test_a_large_graph_is_looked_at_slice_by_slice_and_a_small_one_at_once(
+    team: SmallTeam, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (whole, of_whole), (sliced, of_slices) = back_end(team), back_end(team)
+    assert begin(whole) is not None
+    assert not whole.is_looking
+    monkeypatch.setattr("drslamd.slam.back_end.AT_ONCE", 1)
+    run, slices = begin(sliced), 1
+    while run is None:
+        assert sliced.is_looking
+        assert sliced.looked_at.chains == {}
+        run, slices = begin(sliced), slices + 1
+    assert not sliced.is_looking
+    assert slices > 3
+    assert of_slices.groups == of_whole.groups
+    assert sliced.looked_at.digest(EVERYBODY) == whole.looked_at.digest(EVERYBODY)
+    sliced.on_solution(run())
+    assert begin(sliced) is None
+
+
+def test_what_came_while_it_was_looked_at_is_news_for_the_next_job(
+    team: SmallTeam, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    back, _ = settled(team)
+    back.insert(team.chains[0], GraphEntry(900, keyframes=keyframes([990], np.zeros((1, 3)))))
+    monkeypatch.setattr("drslamd.slam.back_end.AT_ONCE", 1)
+    assert begin(back) is None
+    back.insert(team.chains[0], GraphEntry(901, keyframes=keyframes([999], np.zeros((1, 3)))))
+    while (run := begin(back)) is None:
+        assert back.is_looking
+    assert back.looked_at.chains[0].keyframes.n[-1] == 990
+    back.on_solution(run())
+    while (run := begin(back)) is None:
+        assert back.is_looking
+    assert back.looked_at.chains[0].keyframes.n[-1] == 999
+
+
 # a robot that was in a group before this start
 
 

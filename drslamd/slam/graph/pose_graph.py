@@ -15,13 +15,15 @@ from drslamd.conventions import Chain, is_node
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import Chapter, GraphEntry, Keyframe
 from drslamd.slam.graph.pair_data import PairData
-from drslamd.slam.graph.thinning.graph_view import GraphView, Thinning
+from drslamd.slam.graph.thinning.graph_view import GraphView, Steps, Thinning
 from drslamd.slam.graph.thinning.time_cells import RECENT_S
 
 MAX_NODES = 256
 """Modules without a robot; a radio cell holds 64, and a team drives through some cells."""
 MAX_PLACES = 512
 """Where one of them stood: whoever carries it about all day comes to less."""
+ALL = 2**31
+"""Work: more than any view is."""
 
 
 class PoseGraph:
@@ -42,24 +44,62 @@ class PoseGraph:
         self.pairs: dict[tuple[int, int], PairData] = {}
         self._thinning = Thinning(recent_s)
         self._view: GraphView | None = None
+        self._steps: Steps | None = None
+        """Of the view that is being made."""
+        self._waiting: list[tuple[Chain, GraphEntry]] = []
+        """What came meanwhile."""
         self._forgets = recent_s <= RECENT_S
         """What chapters leave out is needed where times are recent for longer than usual."""
 
     @property
     def view(self) -> GraphView:
         """What module 3 solves: old times thinned, and the same for all who hold the same."""
-        if self._view is None:
-            self._view = self._thinning.view(self.chains, self.nodes, self.usable())
+        while self._view is None:
+            self.look(ALL)
         return self._view
+
+    def look(self, most: float) -> PoseGraph | None:
+        """The view and nothing else (see `frozen`), or None where it takes longer: then ask again.
+
+        It is of what was there when it was begun; what is inserted meanwhile waits for its end.
+
+        Args:
+            most: work, as `Thinning.steps` counts it, after which it is left for later.
+        """
+        if self._view is not None:
+            return self.frozen()
+        if self._steps is None:
+            self._steps = self._thinning.steps(self.chains, self.nodes, self.usable())
+        try:
+            while most > 0:
+                most -= next(self._steps)
+        except StopIteration as end:
+            view: GraphView = end.value
+        else:
+            return None
+        self._steps, self._view = None, view
+        still = self.frozen()
+        waiting, self._waiting = self._waiting, []
+        for origin, entry in waiting:
+            self.insert(origin, entry)
+        return still
 
     def frozen(self) -> PoseGraph:
         """The view as it is now and nothing else, for a thread that is not ours."""
+        return PoseGraph.of(self.view)
+
+    @staticmethod
+    def of(view: GraphView) -> PoseGraph:
+        """A view and nothing else."""
         still = PoseGraph()
-        still._view = self.view
+        still._view = view
         return still
 
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
         """Take one entry of a robot's log."""
+        if self._steps is not None:
+            self._waiting.append((origin, entry))
+            return
         self._view = None
         data = self.chains.get(origin.robot)
         if data is not None and origin.epoch < data.chain.epoch:

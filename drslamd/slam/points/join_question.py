@@ -56,6 +56,9 @@ class Passerby(NamedTuple):
 
 def points_told(graph: PoseGraph, chain: Chain) -> set[Segment]:
     """What a robot has told that it stands, in its current segment."""
+    said = (pair.closures for pair in graph.pairs.values() if pair.a == chain)
+    if not any(closures.tells_place_only.any() for closures in said):
+        return set()  # as most often: nobody needs to look at the whole graph for that
     return {
         joint.b
         for joint in team_frame.joints(graph)

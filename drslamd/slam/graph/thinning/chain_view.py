@@ -274,9 +274,14 @@ class _Made:
 
 
 class ChainThinning:
-    """Views of one chain; parts in which nothing has changed are not made again."""
+    """Views of one chain; parts in which nothing has changed are not made again.
+
+    Attributes:
+        made: how many parts the last view took.
+    """
 
     def __init__(self) -> None:
+        self.made = 0
         self._made: dict[Kind, _Made] = {}
         self._old = OldParts([])
 
@@ -286,7 +291,7 @@ class ChainThinning:
         Args:
             step, recent: see `time_cells.stretches`.
         """
-        parts = []
+        parts, self.made = [], 0
         for stretch in reversed(with_edge(stretches(step, recent))):
             rows = data.keyframes.between(stretch.first, stretch.end)
             if rows.start < rows.stop:
@@ -313,5 +318,6 @@ class ChainThinning:
         if made is None or not is_same:
             made = _Made(thinned(stretch, rows, after, gyro), 0, edge, span)
             self._made[stretch.kind] = made
+            self.made += 1
         made.changes = data.changes
         return made.part

@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from hashlib import blake2b
 from itertools import islice
 
 from drslamd.conventions import Chain, Segment, is_node
 from drslamd.slam.graph import clocks
 from drslamd.slam.graph.chain_data import ChainData
+from drslamd.slam.graph.clocks import Ahead
 from drslamd.slam.graph.pair_data import PairData
 from drslamd.slam.graph.tables import KeyframeTable
 from drslamd.slam.graph.thinning.chain_view import ChainThinning, ChainView
 from drslamd.slam.graph.thinning.joints import Joint, joints_of
 from drslamd.slam.graph.thinning.pair_view import PairThinning, PairView
 from drslamd.slam.graph.thinning.rounding import as_digested
-from drslamd.slam.graph.thinning.thinned_pairs import thinned_pairs
+from drslamd.slam.graph.thinning.thinned_pairs import (
+    PairPart,
+    Unthinned,
+    chains_of,
+    thinned_pairs,
+)
 from drslamd.slam.graph.thinning.time_cells import ages, recent_s
+
+AT_ONCE = 48
+"""Stretches of pairs that are thinned together."""
+
+Begun = tuple[list[Unthinned], Callable[[list[PairPart]], PairView]]
+"""See `PairThinning.begin`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,16 +41,13 @@ class GraphView:
             among them, at a time before all others.
         pairs: whose both chains are there, in the order of their robots.
         shifts: clock of each robot minus that of the first of its team, samples.
+        joints: of all segments that are joined.
     """
 
     chains: Mapping[int, ChainView]
     pairs: list[PairView]
     shifts: Mapping[int, float]
-
-    @cached_property
-    def joints(self) -> list[Joint]:
-        """Of all segments that are joined."""
-        return joints_of(self.chains, self.pairs)
+    joints: list[Joint]
 
     def segment(self, segment: Segment) -> KeyframeTable:
         """The keyframes of a segment that stay."""
@@ -61,6 +69,9 @@ class GraphView:
         return int.from_bytes(h.digest(), "big", signed=True)
 
 
+Steps = Generator[float, None, GraphView]
+
+
 class Thinning:
     """Makes the view of what is held, again and again; what is old is rarely made anew."""
 
@@ -73,13 +84,14 @@ class Thinning:
         self._chains: dict[Chain, ChainThinning] = {}
         self._pairs: dict[tuple[Chain, Chain], PairThinning] = {}
 
-    def view(
+    def steps(
         self,
         chains: Mapping[int, ChainData],
         nodes: Mapping[int, ChainData],
         pairs: list[PairData],
-    ) -> GraphView:
-        """The graph as it is now.
+    ) -> Steps:
+        """The graph as it is now, after some steps between which nothing of it may change; each
+        says how much work it was, in what one pair of the team is in a second (about 0.2 ms).
 
         Args:
             chains: all that are held, by robot; nodes: likewise of modules that no robot carries;
@@ -87,35 +99,54 @@ class Thinning:
         """
         known = {robot: data for robot, data in sorted(chains.items()) if len(data.keyframes)}
         newest = {robot: int(data.keyframes.rows[-1, 0]) for robot, data in known.items()}
-        clocked = [pair for pair in pairs if not is_node(pair.b.robot)]
-        ahead = {(pair.a.robot, pair.b.robot): pair.ahead() for pair in clocked}
-        teams = clocks.shifts(set(chains), {k: found for k, found in ahead.items() if found})
-        steps, recent = ages(newest, teams), recent_s(len(chains), self._recent_s)
+        ahead: dict[tuple[int, int], Ahead] = {}
+        for pair in pairs:
+            found = None if is_node(pair.b.robot) else pair.ahead()
+            if found is not None:
+                ahead[pair.a.robot, pair.b.robot] = found
+            yield 0.1
+        teams = clocks.shifts(set(chains), ahead)
+        age, recent = ages(newest, teams), recent_s(len(chains), self._recent_s)
         known |= nodes
-        steps |= dict.fromkeys(nodes, 0)
+        age |= dict.fromkeys(nodes, 0)
         before, self._chains, views = self._chains, {}, {}
         for robot, data in known.items():
             thinning = before.get(data.chain) or ChainThinning()
             self._chains[data.chain] = thinning
-            views[robot] = thinning.view(data, steps[robot], recent)
-        return GraphView(
-            chains=views,
-            pairs=self._views_of_pairs(known, pairs, views),
-            shifts=dict.fromkeys(nodes, 0.0)
-            | {robot: shift for team in teams for robot, shift in team.items()},
-        )
-
-    def _views_of_pairs(
-        self, chains: Mapping[int, ChainData], pairs: list[PairData], views: Mapping[int, ChainView]
-    ) -> list[PairView]:
-        before, self._pairs = self._pairs, {}
-        begun = []
+            views[robot] = thinning.view(data, age[robot], recent)
+            yield 1 + thinning.made
+        before_pairs, self._pairs = self._pairs, {}
+        begun: list[Begun] = []
         for pair in pairs:
             a, b = pair.a.robot, pair.b.robot
-            if a not in views or b not in views:
-                continue
-            thinning = before.get((pair.a, pair.b)) or PairThinning()
-            self._pairs[pair.a, pair.b] = thinning
-            begun.append(thinning.begin(pair, chains[b], views[a], views[b]))
-        parts = iter(thinned_pairs([part for said, _ in begun for part in said], views))
-        return [finish(list(islice(parts, len(said)))) for said, finish in begun]
+            if a in views and b in views:
+                of_pair = before_pairs.get((pair.a, pair.b)) or PairThinning()
+                self._pairs[pair.a, pair.b] = of_pair
+                begun.append(of_pair.begin(pair, known[b], views[a], views[b]))
+                yield 0.5
+        of_pairs, joints = [], []
+        team = chains_of([part for said, _ in begun for part in said], views)
+        yield len(views) / 2
+        for some in _batches(begun):
+            thinned = thinned_pairs([part for said, _ in some for part in said], team)
+            parts = iter(thinned)
+            made = [finish(list(islice(parts, len(said)))) for said, finish in some]
+            of_pairs += made
+            joints += joints_of(views, made)
+            yield len(thinned) / 2
+        shifts = {robot: shift for table in teams for robot, shift in table.items()}
+        return GraphView(views, of_pairs, dict.fromkeys(nodes, 0.0) | shifts, joints)
+
+
+def _batches(begun: list[Begun]) -> Iterator[list[Begun]]:
+    """Some pairs after the other."""
+    some: list[Begun] = []
+    parts = 0
+    for each in begun:
+        some.append(each)
+        parts += len(each[0])
+        if parts >= AT_ONCE:
+            yield some
+            some, parts = [], 0
+    if some:
+        yield some

@@ -102,11 +102,15 @@ class Between(NamedTuple):
         return Between(self.chains, self.part[which], self.a.chosen(which), self.b.chosen(which))
 
 
-def thinned_pairs(said: list[Unthinned], views: Mapping[int, ChainView]) -> list[PairPart]:
-    """A part for each of what was said."""
+def chains_of(said: list[Unthinned], views: Mapping[int, ChainView]) -> TeamChains:
+    """All that is needed of the chains of a team to thin what was said."""
+    return TeamChains(views, _spans(said))
+
+
+def thinned_pairs(said: list[Unthinned], chains: TeamChains) -> list[PairPart]:
+    """A part for each of what was said; `chains` are of that and perhaps of more."""
     if not said:
         return []
-    chains = TeamChains(views, _spans(said))
     owners, peers = (
         chains.numbers(robots) for robots in ([s.a for s in said], [s.b for s in said])
     )

@@ -336,3 +336,34 @@ def _segments(graph: PoseGraph, chain: Chain, n: np.ndarray) -> list[int | None]
     keyframes_held = graph.chains[chain.robot].keyframes
     at, there = keyframes_held.find(n)
     return [int(keyframes_held.segment[k]) if t else None for k, t in zip(at, there, strict=True)]
+
+
+# a view that is made in slices
+
+
+@pytest.mark.parametrize("most", [0.5, 7])
+def test_what_comes_while_a_view_is_made_is_in_the_next_one(most: float) -> None:
+    """In slices of any size it is the view that is made at once of what was there before."""
+    entries = logs(3, 900, DRIVES)
+    known, late = entries[:-40], entries[-40:]
+    sliced, before, after = graph_of(known), graph_of(known), graph_of(entries)
+    made, slices, left = None, 0, iter(late)
+    while made is None:
+        made, slices = sliced.look(most), slices + 1
+        if (said := next(left, None)) is not None:
+            sliced.insert(*said)
+    for said in left:
+        sliced.insert(*said)
+    assert slices > 2
+    assert differences(parts_of(made.view), parts_of(before.view)) == []
+    assert differences(parts_of(sliced.view), parts_of(after.view)) == []
+    assert differences(parts_of(before.view), parts_of(after.view)) != []
+
+
+def test_who_needs_a_view_that_is_being_made_gets_one_of_all_that_is_held() -> None:
+    entries = logs(3, 900, DRIVES)
+    sliced, whole = graph_of(entries[:-1]), graph_of(entries)
+    assert sliced.look(0.5) is None
+    sliced.insert(*entries[-1])
+    assert differences(parts_of(sliced.view), parts_of(whole.view)) == []
+    assert differences(parts_of(sliced.frozen().view), parts_of(whole.view)) == []

@@ -9,7 +9,13 @@ from slam_scenes import keyframes, range_item
 from drslamd.conventions import Chain
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
-from drslamd.slam.graph.thinning.thinned_pairs import NOTHING, PairPart, Unthinned, thinned_pairs
+from drslamd.slam.graph.thinning.thinned_pairs import (
+    NOTHING,
+    PairPart,
+    Unthinned,
+    chains_of,
+    thinned_pairs,
+)
 
 
 def said_and_graph() -> tuple[list[Unthinned], PoseGraph]:
@@ -29,25 +35,32 @@ def said_and_graph() -> tuple[list[Unthinned], PoseGraph]:
     return out, graph
 
 
+def thinned(said: list[Unthinned], graph: PoseGraph) -> list[PairPart]:
+    """By chains of nothing else."""
+    return thinned_pairs(said, chains_of(said, graph.view.chains))
+
+
 def bits(part: PairPart) -> tuple[bytes, ...]:
     return part.ranges.rows.tobytes(), part.moves.tobytes(), part.closures.rows.tobytes()
 
 
 def test_what_becomes_of_a_pair_does_not_depend_on_the_others() -> None:
     said, graph = said_and_graph()
-    views = graph.view.chains
-    together = thinned_pairs(said, views)
+    together = thinned(said, graph)
     assert len(together) == len(said) == 6
     for one, part in zip(said, together, strict=True):
-        (alone,) = thinned_pairs([one], views)
+        (alone,) = thinned([one], graph)
         assert bits(alone) == bits(part)
         assert 0 < len(part.ranges) <= len(one.ranges)
         assert 0 < len(part.closures) <= len(one.closures)
     assert any(len(part.ranges) < len(one.ranges) for one, part in zip(said, together, strict=True))
-    for one, part in zip(reversed(said), thinned_pairs(said[::-1], views), strict=True):
-        (alone,) = thinned_pairs([one], views)
+    for one, part in zip(reversed(said), thinned(said[::-1], graph), strict=True):
+        (alone,) = thinned([one], graph)
         assert bits(alone) == bits(part)
-    assert thinned_pairs([], views) == []
+    assert thinned([], graph) == []
+    # nor on what else there is of the chains
+    of_all = thinned_pairs(said[:1], chains_of(said, graph.view.chains))
+    assert bits(of_all[0]) == bits(together[0])
 
 
 def test_what_names_keyframes_that_nobody_holds_waits() -> None:
@@ -57,17 +70,15 @@ def test_what_names_keyframes_that_nobody_holds_waits() -> None:
     late = one.ranges.copy()
     late.rows[:, :3] += [1e6, 0, 1e6]
     named = int(late.b_n.min()), int(late.b_n.max())
-    (none,) = thinned_pairs(
-        [Unthinned(one.a, one.b, late, NOTHING.closures, named)], graph.view.chains
-    )
+    (none,) = thinned([Unthinned(one.a, one.b, late, NOTHING.closures, named)], graph)
     assert (len(none.ranges), len(none.moves), len(none.closures)) == (0, 0, 0)
     both = [Unthinned(one.a, one.b, late, NOTHING.closures, named), one]
-    assert len(thinned_pairs(both, graph.view.chains)[1].ranges) > 0
+    assert len(thinned(both, graph)[1].ranges) > 0
 
 
 def test_a_digest_sees_each_of_what_a_part_holds_and_nothing_of_an_empty_one() -> None:
     said, graph = said_and_graph()
-    part = thinned_pairs(said[:1], graph.view.chains)[0]
+    part = thinned(said[:1], graph)[0]
     moved = part.moves.copy()
     moved[np.flatnonzero(moved.reshape(len(moved), -1).any(axis=1))[0]] += 1e-3
     others = [
