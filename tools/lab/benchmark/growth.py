@@ -18,6 +18,7 @@ from drslamd.slam.graph.measurements import (
     RangeMeasurement,
 )
 from lab.benchmark import timing
+from lab.benchmark.met_team import begun
 from lab.benchmark.rows import Row
 from lab.play import virtual_team
 from lab.recordings import world
@@ -112,8 +113,8 @@ class _Drive:
 def _update(back: BackEnd) -> float:
     """ms of CPU for all that a robot does each second with the graph that it holds."""
     started = timing.now_ms()
-    back.digest()
-    job = back.begin(set(range(ROBOTS)))
+    job = begun(back, set(range(ROBOTS)))
+    back.said_digest()
     if job is not None:
         back.on_solution(job())
     return timing.now_ms() - started

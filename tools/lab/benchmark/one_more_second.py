@@ -18,7 +18,7 @@ from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.optimizer.banded import banded_optimizer
 from drslamd.slam.optimizer.banded.banded_solver import SETTLED
 from lab.benchmark import timing
-from lab.benchmark.met_team import MetTeam
+from lab.benchmark.met_team import MetTeam, begun
 from lab.benchmark.rows import Peer, Row
 
 TIMES_LESS = {3: 1.8, 10: 5.0, 20: 8.0, 50: 22.0, 100: 35.0}
@@ -97,8 +97,8 @@ def measured(robots: int, after_s: int, seconds: int = SECONDS, paired: int | No
     beside = set(np.linspace(FIRST, FIRST + seconds - 1, paired + 1, dtype=int)[1:].tolist())
     for second in range(FIRST + seconds):
         began = timing.now_ms()
-        team.back.digest()
-        job: Any = team.back.begin(team.living)
+        job = begun(team.back, team.living)
+        team.back.said_digest()
         stated = timing.now_ms()
         found = job()
         solved = timing.now_ms()

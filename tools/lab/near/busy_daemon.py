@@ -25,6 +25,7 @@ from drslamd.sensors.samples import Motion
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from lab.benchmark import growth
+from lab.benchmark.met_team import begun
 
 SECONDS = 40
 NEIGHBOURS = 14
@@ -42,7 +43,7 @@ def team(robots: int, own: Chain) -> tuple[BackEnd, Any]:
         for k, chain in enumerate(chains):
             seen = chains[: k + 1 + NEIGHBOURS]
             back.insert(chain, growth._entry(rng, second, chain, seen, truth, odometry))
-    return back, back.begin(set(range(robots)))
+    return back, begun(back, set(range(robots)))
 
 
 def known_here(estimate: TeamEstimate, own: Chain, n: int) -> TeamEstimate:

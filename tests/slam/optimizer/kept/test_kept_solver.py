@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pytest
-from lab.benchmark.met_team import MetTeam
+from lab.benchmark.met_team import MetTeam, begun
 
 from drslamd.conventions import Chain
 from drslamd.slam.graph.estimate import TeamEstimate
@@ -56,7 +55,7 @@ def driven(
         said: what of the entries of a second is heard then.
     """
     for second in range(seconds):
-        job: Any = team.back.begin(team.living)
+        job = begun(team.back, team.living)
         assert job is not None
         found: TeamEstimate = job()
         numbers, graph, group, previous = job.args
