@@ -32,7 +32,7 @@ def test_everything_is_looked_after_from_the_sensors_to_the_budget() -> None:
     scene = RobotScene()
     keys = [key for key, _ in conditions(scene.robot, scene.utime)]
     team = [key for key in keys if key.startswith("team.")]
-    of_poses = ["pose", "doubt", "odometry", "partners", "mounting"]
+    of_poses = ["pose", "doubt", "odometry", "sight", "partners", "mounting"]
     turns = ["gyro", "wheels.slip", "wheels.track"]
     hardware = ["uwb", "wheels", *turns, "network", "sleep"]
     rest = ["site", "load", "budget", "state"]

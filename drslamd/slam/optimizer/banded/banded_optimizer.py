@@ -286,6 +286,8 @@ def solved(
         chain.robot: Trajectory(chain, n[mine[chain.robot]], poses[mine[chain.robot]])
         for chain in team.chains
     }
+    blocked = frozenset(compress(team.pairs, solution.blocked))
+    is_as_configured = bool((solution.odometry_level <= 1).all())
     points = frozenset(s.robot for s in group.points) - {s.robot for s in group.members}
     turn = _named(list(mine), learned.turn, spread.turn)
     yaw = _named(list(mine), learned.yaw, spread.yaw)
@@ -311,6 +313,7 @@ def solved(
         late_level=_latest(team, solution.late_level),
         lapses=tuple(lapse_of(team.problem, list(mine), one) for one in solution.freed),
         contradicted=frozenset(compress(team.pairs, solution.contradicted)),
+        blocked=blocked,
         is_explained=solution.is_explained,
         cost=solution.cost,
         iterations=solution.iterations,
@@ -318,7 +321,7 @@ def solved(
         converged=solution.converged or team.is_known,
         settled=team.is_known,
         fitted={robot: int(team.problem.n[mine[robot][-1]]) for robot in mine},
-        is_as_modelled=solution.is_explained and bool((solution.odometry_level <= 1).all()),
+        is_as_modelled=solution.is_explained and not blocked and is_as_configured,
         kept=kept,
     )
 

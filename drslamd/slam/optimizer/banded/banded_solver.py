@@ -17,7 +17,7 @@ from drslamd.slam.optimizer.banded import claims
 from drslamd.slam.optimizer.banded.explanation import explain
 from drslamd.slam.optimizer.banded.lapses.known_lapses import still_freed
 from drslamd.slam.optimizer.banded.lapses.stretches import under
-from drslamd.slam.optimizer.banded.misfit import contradicted
+from drslamd.slam.optimizer.banded.misfit import blocked, contradicted
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import FIRST_LEVEL, raised
@@ -86,6 +86,7 @@ def solve(
         late_level=np.maximum(np.sqrt(explained.lately), late),
         is_explained=explained.other is None,
         contradicted=contradicted(problem, point),
+        blocked=blocked(problem, point),
         doubted=claims.still_doubted(problem.doubted, point.calibration, spread),
         freed=freed,
     )

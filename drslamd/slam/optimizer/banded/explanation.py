@@ -9,7 +9,7 @@ odometry that was worse for a while (`odometry_levels`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from drslamd.slam.optimizer.banded.common_level import ASKS, TAILS, CommonLevel,
 from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.lapses.known_lapses import settled
 from drslamd.slam.optimizer.banded.misfit import (
+    FEW_OUTLIERS,
     Run,
     guessed_misfit,
     misfit,
@@ -26,8 +27,9 @@ from drslamd.slam.optimizer.banded.misfit import (
     runs,
 )
 from drslamd.slam.optimizer.banded.mountings import Scores
+from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.banded.odometry_levels import FEW_OUTLIERS, STANDS_OUT, TARGET
+from drslamd.slam.optimizer.banded.odometry_levels import STANDS_OUT, TARGET
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.se2 import Array
 
@@ -85,15 +87,15 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
     """
     equations, nominal = settled(equations, nominal, most, tolerance)
     check = _checked(equations, nominal)
-    is_fine = check.is_passed() and not check.scores.ask()
+    fits = check.is_passed() and not check.scores.ask() and _fits(equations, nominal)
     common = _in_common(equations, nominal, check, most, tolerance)
     if common is not None and not check.scores.ask():
         return _commonly(equations, common)
-    if common is None and not (is_fine and _fits(equations, nominal)):
+    if common is None and not fits:
         lapse = _by_lapse(equations, nominal, most, tolerance)
         if lapse is not None:
             return lapse
-    if is_fine:
+    if fits:
         return _as_is(equations, nominal, check.ratio)
     bases = [(equations, nominal, check)]
     if check.scores.ask():
@@ -110,8 +112,11 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
             bases.insert(0, (mounted, better, again))
         if common is not None:
             return _commonly(equations, common)
-        if check.is_passed() and not check.scores.ask_alone():
-            return _as_is(equations, nominal, check.ratio)
+    sight = _by_sight(equations, nominal, most, tolerance)
+    if sight is not None:
+        return sight
+    if check.is_passed() and not check.scores.ask_alone():
+        return _as_is(equations, nominal, check.ratio)
     for base, point, said in bases:
         levels = odometry_levels.levelled(base, point, said.ratio, said.runs, most, tolerance)
         seen = np.sqrt(levels.seen)
@@ -130,6 +135,24 @@ def _by_lapse(
         return None
     check = _checked(found.equations, found.point)
     return _as_is(found.equations, found.point, check.ratio) if check.is_passed() else None
+
+
+def _by_sight(
+    equations: Equations, nominal: Point, most: int, tolerance: float
+) -> Explanation | None:
+    """Sight was blocked for long, if that explains all: then hardly a range is too short, and
+    wheels are as configured."""
+    if _fits(equations, nominal):
+        return None
+    problem, found = equations.problem, []
+    for start in (nominal.poses, problem.initial):
+        blocked = Equations(replace(problem, initial=start, is_blocked=True), like=equations)
+        found.append((blocked, descend(blocked, nominal.calibration, most, tolerance)))
+    better, point = min(found, key=lambda one: one[0].cost(one[1], nominal.threshold))
+    if not point.converged or not _fits(better, point):
+        return None
+    check = _checked(better, point)
+    return _as_is(better, point, check.ratio) if check.is_passed() else None
 
 
 def _in_common(

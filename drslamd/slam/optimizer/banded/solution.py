@@ -26,6 +26,7 @@ class Solution:
         freed: stretches along which wheels stood or spun.
         is_explained: is the model, with these levels, one of what was measured?
         contradicted: (pairs,) whose ranges of late do not fit.
+        blocked: (pairs,) between which sight was blocked.
     """
 
     poses: Array
@@ -42,5 +43,6 @@ class Solution:
     late_level: Array = field(default_factory=lambda: np.zeros(0))
     is_explained: bool = True
     contradicted: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    blocked: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     doubted: Doubted = field(default_factory=lambda: Doubted.none(0))
     freed: tuple[Freed, ...] = ()
