@@ -144,3 +144,10 @@ def test_what_was_learned_of_the_wheels_corrects_odometry() -> None:
     assert team.correction(4) == Correction(scale=0.1, yaw=0.02, turn=0.3)
     assert team.correction(9) == Correction(scale=-0.2)
     assert team.correction(7) == Correction()
+
+
+def test_who_is_out_of_sight_is_named_from_either_side() -> None:
+    estimate = replace(a_team(), blocked=frozenset({(0, 2), (2, 7)}))
+    assert estimate.out_of_sight(2) == {0, 7}
+    assert estimate.out_of_sight(0) == {2}
+    assert estimate.out_of_sight(1) == frozenset()

@@ -17,7 +17,7 @@ from drslamd.slam.optimizer.banded import claims
 from drslamd.slam.optimizer.banded.explanation import explain
 from drslamd.slam.optimizer.banded.lapses.known_lapses import still_freed
 from drslamd.slam.optimizer.banded.lapses.stretches import under
-from drslamd.slam.optimizer.banded.misfit import blocked, contradicted
+from drslamd.slam.optimizer.banded.misfit import blocked, contradicted, many_wrong
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import FIRST_LEVEL, raised
@@ -69,6 +69,9 @@ def solve(
     late = FIRST_LEVEL * under(problem, doubted, after_s=np.inf)
     # nobody goes on from a solution with other stretches freed as from one that is as modelled
     news = FIRST_LEVEL * under(problem, doubted if is_same else problem.freed)
+    level = np.maximum(explained.level, news)
+    is_as_configured = not problem.is_blocked and bool((level <= 1).all())
+    is_fit = explained.other is None and not many_wrong(problem, point)
     if explained.other is not None:
         joint += claims.disagreement(point, explained.other, wanted)
     return Solution(
@@ -76,15 +79,16 @@ def solve(
         point.calibration,
         cost=equations.cost(point, point.threshold),
         iterations=nominal.steps,
-        converged=nominal.converged,
+        converged=nominal.converged or problem.is_blocked,
         scatter=scatter,
         joint=joint,
         spread=spread,
         bias_sigmas=biases,
-        odometry_level=np.maximum(explained.level, news),
+        odometry_level=level,
         feared_level=np.maximum(np.sqrt(explained.feared), news),
         late_level=np.maximum(np.sqrt(explained.lately), late),
         is_explained=explained.other is None,
+        is_as_modelled=is_as_configured and is_fit,
         contradicted=contradicted(problem, point),
         blocked=blocked(problem, point),
         doubted=claims.still_doubted(problem.doubted, point.calibration, spread),

@@ -22,6 +22,7 @@ from drslamd.slam.optimizer.banded.misfit import (
     FEW_OUTLIERS,
     Run,
     guessed_misfit,
+    many_wrong,
     misfit,
     outlier_share,
     runs,
@@ -31,12 +32,16 @@ from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import STANDS_OUT, TARGET
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array
 
 SUSPICIOUS = 3.0
 """Guessed s / g above which it is computed."""
 MANY_OUTLIERS = 2 * FEW_OUTLIERS
 """Of the ranges of any pair: slip has half of that at first, so it is not what leaves more."""
+NOT_WHEELS = 5
+"""Ranges of a pair, one a second, since all was as modelled: wheels that stood or spun are found
+sooner, and until they are, ranges of theirs may all seem too long."""
 MUCH = 100.0
 """Of cost: a mounting that takes away so much is right, though something else is wrong as well."""
 
@@ -142,17 +147,27 @@ def _by_sight(
 ) -> Explanation | None:
     """Sight was blocked for long, if that explains all: then hardly a range is too short, and
     wheels are as configured."""
-    if _fits(equations, nominal):
+    problem = equations.problem
+    if not many_wrong(problem, nominal) or _is_new(problem):
         return None
-    problem, found = equations.problem, []
-    for start in (nominal.poses, problem.initial):
-        blocked = Equations(replace(problem, initial=start, is_blocked=True), like=equations)
-        found.append((blocked, descend(blocked, nominal.calibration, most, tolerance)))
-    better, point = min(found, key=lambda one: one[0].cost(one[1], nominal.threshold))
+    blocked = replace(problem, initial=nominal.poses, is_blocked=True)
+    better = Equations(blocked, like=equations)
+    # it is far from here: a solution that was bent until the ranges fit leads astray
+    point = descend(better, nominal.calibration, 2 * most, tolerance)
     if not point.converged or not _fits(better, point):
         return None
     check = _checked(better, point)
     return _as_is(better, point, check.ratio) if check.is_passed() else None
+
+
+def _is_new(problem: Problem) -> bool:
+    """Was all as modelled so late that wheels may be the cause of what is not?"""
+    ranges = problem.ranges
+    if problem.fitted is None:
+        return False
+    ends = problem.n[np.stack([ranges.i, ranges.j], axis=-1)]
+    since = (ends > problem.fitted[ranges.robots]).any(axis=1)
+    return bool(np.bincount(ranges.pair, since, problem.pairs).max() < NOT_WHEELS)
 
 
 def _in_common(

@@ -35,6 +35,10 @@ FEW_OUTLIERS = 0.06
 """Of the ranges of any pair, when odometry alone was at fault; 0.08 to 0.21 where ranges were."""
 OUTLIER_SIGMAS = 2.5
 """Of what a range was sent with: beyond it, it is an outlier."""
+FEWEST_WRONG = 3
+"""Outliers of a pair; fewer are bursts, however few ranges there are."""
+BLOCKED_SHARE = 0.15
+"""Of a pair between which sight was blocked; others come to 0.13 where ranges of some are."""
 RUN = 4
 """Outliers of one pair that follow each other, at one a second; bursts are shorter."""
 OF_RUN = 0.8
@@ -160,6 +164,13 @@ def outlier_share(problem: Problem, point: Point) -> Array:
     return share(problem, outliers(problem, point))
 
 
+def many_wrong(problem: Problem, point: Point) -> bool:
+    """Are more of the ranges of any pair outliers than bursts are?"""
+    wrong = outliers(problem, point)
+    count = np.bincount(problem.ranges.pair, wrong, problem.pairs)
+    return bool(((count >= FEWEST_WRONG) & (share(problem, wrong) >= FEW_OUTLIERS)).any())
+
+
 def share(problem: Problem, which: NDArray[np.bool_]) -> Array:
     """(pairs,) how many of the ranges of each pair are among those (n,); none of no ranges."""
     pair = problem.ranges.pair
@@ -197,7 +208,7 @@ def contradicted(problem: Problem, point: Point) -> NDArray[np.bool_]:
 
 def blocked(problem: Problem, point: Point) -> NDArray[np.bool_]:
     """(pairs,) of whose ranges many are too long, where that explains what was measured."""
-    far = share(problem, too_long(problem, point)) >= FEW_OUTLIERS
+    far = share(problem, too_long(problem, point)) >= BLOCKED_SHARE
     return far if problem.is_blocked else np.zeros(problem.pairs, dtype=bool)
 
 

@@ -18,12 +18,16 @@ from drslamd.slam.optimizer.banded.misfit import (
     RUN,
     Misfit,
     Run,
+    blocked,
     contradicted,
     guessed_misfit,
+    many_wrong,
     misfit,
     outlier_share,
     outliers,
     runs,
+    sigmas_off,
+    too_long,
 )
 from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
@@ -150,6 +154,36 @@ def test_shares_of_outliers_are_those_of_each_pair() -> None:
     pair = np.array([0, 0, 1, 1, 0, 0])
     problem, point = errs(np.array([9.0, 0, 9, 9, 0, 0]), pair)
     assert outlier_share(problem, point).tolist() == [0.25, 1.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "good", "expected"),
+    [(2, 10, False), (3, 10, True), (3, 46, True), (3, 48, False), (0, 5, False)],
+)
+def test_many_ranges_are_wrong_where_more_of_a_pair_are_than_bursts_are(
+    wrong: int, good: int, expected: bool
+) -> None:
+    """At least three, and six of a hundred: 3 of 49 and not 3 of 51."""
+    assert many_wrong(*errs(np.array([9.0] * wrong + [0.0] * good))) is expected
+
+
+def test_ranges_that_are_too_long_are_none_the_other_way() -> None:
+    problem, point = errs(np.array([2.4, 2.6, -2.6, 0.0]))
+    assert too_long(problem, point).tolist() == [False, True, False, False]
+    # a problem in which sight is blocked does not count them as wrong
+    blocked_too = replace(problem, is_blocked=True)
+    assert outliers(problem, point).tolist() == [False, True, True, False]
+    assert outliers(blocked_too, point).tolist() == [False, False, True, False]
+    assert sigmas_off(blocked_too, point) == pytest.approx([0.0, 0.0, 2.6, 0.0])
+
+
+def test_pairs_with_many_ranges_that_are_too_long_are_blocked_where_that_explains_them() -> None:
+    """Three of 20 of one, and two of 20 of another that also has some that are too short."""
+    pair, sigmas = np.repeat([0, 1], 20), np.zeros(40)
+    sigmas[[0, 5, 9, 20, 30]], sigmas[[25, 35]] = 9.0, -9.0
+    problem, point = errs(sigmas, pair)
+    assert blocked(problem, point).tolist() == [False] * 3
+    assert blocked(replace(problem, is_blocked=True), point).tolist() == [True, False, False]
 
 
 # runs
