@@ -74,10 +74,6 @@ class _Gap(NamedTuple):
     def is_far(self) -> bool:
         return abs(self.metres) > FAR_SIGMAS * self.sigma
 
-    @property
-    def is_long(self) -> bool:
-        return self.is_far and self.metres > 0
-
     def if_moved(self, way: Array) -> _Gap:
         """The same if we were elsewhere, by a way (2,) in w."""
         apart = self.distance * self.sight - way
@@ -166,9 +162,6 @@ class RangeWatch:
             gap = self._off(estimate, own, partner, utime, ours)
             if gap is not None:
                 gaps[robot] = gap
-        # where sight is known to be blocked a range that is too long says nothing
-        hidden = estimate.out_of_sight(own.data.chain.robot) if estimate else frozenset()
-        gaps = {r: gap for r, gap in gaps.items() if not (r in hidden and gap.is_long)}
         self.off = {r: self.off.get(r, 0) + 1 if gap.is_far else 0 for r, gap in gaps.items()}
         slipping = {r for r in gaps if estimate is not None and estimate.is_slipping(r)}
         far_m = [abs(g.metres) for r, g in gaps.items() if g.is_far and r not in slipping]

@@ -59,12 +59,10 @@ class _Model(NamedTuple):
     Attributes:
         mountings: that are not as configured, of which kind and of whom.
         is_worse: is odometry feared to be much worse, of somebody who is not in doubt for that?
-        is_blocked: was sight blocked between any?
     """
 
     mountings: frozenset[tuple[str, int]] = frozenset()
     is_worse: bool = False
-    is_blocked: bool = False
 
     @staticmethod
     def of(estimate: TeamEstimate) -> _Model:
@@ -72,12 +70,11 @@ class _Model(NamedTuple):
         mountings = frozenset(tracks | {("antenna", robot) for robot in estimate.antenna_m})
         levels = estimate.odometry_level.items()
         feared = [level for robot, level in levels if not estimate.is_slipping(robot)]
-        is_worse = max(feared, default=1.0) >= MUCH_WORSE
-        return _Model(mountings, is_worse, bool(estimate.blocked))
+        return _Model(mountings, max(feared, default=1.0) >= MUCH_WORSE)
 
     def is_new(self, before: _Model) -> bool:
         """Does it explain what the one before could not?"""
-        is_wider = self.is_worse > before.is_worse or self.is_blocked > before.is_blocked
+        is_wider = self.is_worse and not before.is_worse
         return is_wider or bool(self.mountings - before.mountings)
 
 

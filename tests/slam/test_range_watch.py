@@ -390,24 +390,6 @@ def test_a_partner_that_is_known_to_slip_makes_no_gap_of_ours(
     assert scene.watch.gap_m == pytest.approx(0.0 if is_theirs else 2.0, abs=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("metres", "blocked", "says"),
-    [
-        (2.0, {(OWN, PARTNER)}, {}),
-        (-2.0, {(OWN, PARTNER)}, {PARTNER: 1}),
-        (0.0, {(OWN, PARTNER)}, {PARTNER: 0}),
-        (2.0, {(OWN, TWIN)}, {PARTNER: 1}),
-    ],
-)
-def test_a_range_that_is_too_long_says_nothing_where_sight_is_known_to_be_blocked(
-    metres: float, blocked: set[tuple[int, int]], says: dict[int, int]
-) -> None:
-    scene = Scene()
-    scene.hear(measured(between() + metres, 0.0, SIGMA), NEWEST - 8, NEWEST + 1)
-    assert scene.look(replace(solved(), blocked=frozenset(blocked))) == says
-    assert (scene.watch.gap_m > 0) is (1 in says.values())
-
-
 def test_a_gap_that_was_doubt_is_feared_for_some_seconds() -> None:
     scene = Scene()
     scene.hear(measured(between() + 2.0, 0.0, SIGMA), NEWEST - 8, NEWEST + 1)

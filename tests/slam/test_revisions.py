@@ -140,14 +140,6 @@ def test_what_was_claimed_under_another_model_counts_again_when_this_one_is_give
     assert boldness(before, explained, replace(again, is_explained=False)) == 1.0
 
 
-def test_what_was_claimed_before_sight_was_known_to_be_blocked_says_nothing_of_now() -> None:
-    hidden = frozenset({(0, 1)})
-    before, moved = solution([0, 10]), solution([0, 10, 20], 3.0)
-    assert boldness(before, replace(moved, blocked=hidden)) == 1.0
-    assert boldness(replace(before, blocked=hidden), replace(moved, blocked=hidden)) > 1.0
-    assert boldness(replace(before, blocked=hidden), moved) > 1.0
-
-
 def test_what_is_moved_under_the_model_that_is_believed_now_counts_beside_older_claims() -> None:
     before, claimed = solution([0, 10]), worse(solution([0, 10, 20]), MUCH_WORSE)
     moved = worse(solution([0, 10, 20, 30], 3.0), MUCH_WORSE)
