@@ -281,10 +281,8 @@ def solved(
     learned, spread, doubted = solution.calibration, solution.spread, solution.doubted
     assert spread is not None
     n, poses = team.problem.n, solution.poses
-    paths = {
-        chain.robot: Trajectory(chain, n[mine[chain.robot]], poses[mine[chain.robot]])
-        for chain in team.chains
-    }
+    each = ((chain, mine[chain.robot]) for chain in team.chains)
+    paths = {chain.robot: Trajectory(chain, n[rows], poses[rows]) for chain, rows in each}
     points = frozenset(s.robot for s in group.points) - {s.robot for s in group.members}
     turn = _named(list(mine), learned.turn, spread.turn)
     yaw = _named(list(mine), learned.yaw, spread.yaw)

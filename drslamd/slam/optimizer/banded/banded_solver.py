@@ -14,7 +14,7 @@ import numpy as np
 
 from drslamd.slam import se2
 from drslamd.slam.optimizer.banded import claims
-from drslamd.slam.optimizer.banded.explanation import explain
+from drslamd.slam.optimizer.banded.explanation import Explanation, explain
 from drslamd.slam.optimizer.banded.lapses.known_lapses import still_freed
 from drslamd.slam.optimizer.banded.lapses.stretches import under
 from drslamd.slam.optimizer.banded.misfit import blocked, contradicted, many_wrong
@@ -57,8 +57,6 @@ def solve(
     explained = explain(equations, nominal, most, tolerance)
     equations, point = explained.equations, explained.point
     problem = equations.problem
-    poses: Array = point.poses.copy()
-    poses[:, 2] = se2.wrap(poses[:, 2])
     scatter = claims.scatter_of(problem, point)
     feared = Equations(raised(problem, explained.feared, point), like=equations)
     wanted = np.array(marginals, dtype=int)
@@ -70,12 +68,10 @@ def solve(
     # nobody goes on from a solution with other stretches freed as from one that is as modelled
     news = FIRST_LEVEL * under(problem, doubted if is_same else problem.freed)
     level = np.maximum(explained.level, news)
-    is_as_configured = not problem.is_blocked and bool((level <= 1).all())
-    is_fit = explained.other is None and not many_wrong(problem, point)
     if explained.other is not None:
         joint += claims.disagreement(point, explained.other, wanted)
     return Solution(
-        poses,
+        np.column_stack([point.poses[:, :2], se2.wrap(point.poses[:, 2])]),
         point.calibration,
         cost=equations.cost(point, point.threshold),
         iterations=nominal.steps,
@@ -88,9 +84,20 @@ def solve(
         feared_level=np.maximum(np.sqrt(explained.feared), news),
         late_level=np.maximum(np.sqrt(explained.lately), late),
         is_explained=explained.other is None,
-        is_as_modelled=is_as_configured and is_fit,
+        is_as_modelled=_is_as_modelled(explained, level),
         contradicted=contradicted(problem, point),
         blocked=blocked(problem, point),
         doubted=claims.still_doubted(problem.doubted, point.calibration, spread),
         freed=freed,
     )
+
+
+def _is_as_modelled(explained: Explanation, level: Array) -> bool:
+    """
+    Args:
+        level: (m,) sigmas of odometry over what is configured.
+    """
+    problem = explained.equations.problem
+    if explained.other is not None or problem.is_blocked or (level > 1).any():
+        return False
+    return not many_wrong(problem, explained.point)
