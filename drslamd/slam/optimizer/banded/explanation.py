@@ -22,6 +22,7 @@ from drslamd.slam.optimizer.banded.misfit import (
     FEW_OUTLIERS,
     Run,
     guessed_misfit,
+    has_passed,
     many_wrong,
     misfit,
     outlier_share,
@@ -145,8 +146,8 @@ def _by_lapse(
 def _by_sight(
     equations: Equations, nominal: Point, most: int, tolerance: float
 ) -> Explanation | None:
-    """Sight was blocked for long, if that explains all: then hardly a range is too short, and
-    wheels are as configured."""
+    """Sight was blocked for long, if that explains all: then hardly a range is too short, wheels
+    are as configured, and somewhere sight is free again."""
     problem = equations.problem
     if not many_wrong(problem, nominal) or _is_new(problem):
         return None
@@ -154,7 +155,7 @@ def _by_sight(
     better = Equations(blocked, like=equations)
     # it is far from here: a solution that was bent until the ranges fit leads astray
     point = descend(better, nominal.calibration, 2 * most, tolerance)
-    if not point.converged or not _fits(better, point):
+    if not point.converged or not _fits(better, point) or not has_passed(blocked, point):
         return None
     check = _checked(better, point)
     return _as_is(better, point, check.ratio) if check.is_passed() else None

@@ -35,8 +35,6 @@ FEW_OUTLIERS = 0.06
 """Of the ranges of any pair, when odometry alone was at fault; 0.08 to 0.21 where ranges were."""
 OUTLIER_SIGMAS = 2.5
 """Of what a range was sent with: beyond it, it is an outlier."""
-FEWEST_WRONG = 3
-"""Outliers of a pair; fewer are bursts, however few ranges there are."""
 BLOCKED_SHARE = 0.15
 """Of a pair between which sight was blocked; others come to 0.13 where ranges of some are."""
 RUN = 4
@@ -165,10 +163,34 @@ def outlier_share(problem: Problem, point: Point) -> Array:
 
 
 def many_wrong(problem: Problem, point: Point) -> bool:
-    """Are more of the ranges of any pair outliers than bursts are?"""
+    """Are many ranges of any pair outliers, and some of them for longer than bursts last?"""
     wrong = outliers(problem, point)
-    count = np.bincount(problem.ranges.pair, wrong, problem.pairs)
-    return bool(((count >= FEWEST_WRONG) & (share(problem, wrong) >= FEW_OUTLIERS)).any())
+    many = share(problem, wrong) >= FEW_OUTLIERS
+    if not many.any():
+        return False
+    pair, is_wrong, count = _stretches(problem, wrong)
+    return bool((many[pair] & is_wrong & (count >= RUN)).any())
+
+
+def has_passed(problem: Problem, point: Point) -> bool:
+    """Were ranges of any pair too long for longer than bursts last, and do they fit again since?
+    Where wheels stood or spun they do not."""
+    pair, is_long, count = _stretches(problem, too_long(problem, point))
+    lasted = count >= RUN
+    is_next = pair[1:] == pair[:-1]
+    return bool((is_next & is_long[:-1] & lasted[:-1] & lasted[1:]).any())
+
+
+def _stretches(
+    problem: Problem, which: NDArray[np.bool_]
+) -> tuple[Index, NDArray[np.bool_], Index]:
+    """(k,) of which pair each stretch of ranges is that are alike, are they among those (n,), and
+    how many there are; pair by pair in the order of time."""
+    ranges = problem.ranges
+    order = np.lexsort((np.maximum(ranges.i, ranges.j), ranges.pair))
+    pair, flagged = ranges.pair[order], which[order]
+    begins = np.flatnonzero(np.diff(2 * pair + flagged, prepend=-1))
+    return pair[begins], flagged[begins], np.diff(begins, append=len(order))
 
 
 def share(problem: Problem, which: NDArray[np.bool_]) -> Array:

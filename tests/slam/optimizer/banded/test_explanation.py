@@ -622,7 +622,8 @@ def test_who_stood_all_the_time_does_not_hide_that_the_others_have_driven() -> N
 
 
 @pytest.mark.parametrize(
-    ("name", "verdict"), [("many_wrong", False), ("_fits", False), ("_checked", None)]
+    ("name", "verdict"),
+    [("many_wrong", False), ("_fits", False), ("has_passed", False), ("_checked", None)],
 )
 def test_sight_must_leave_hardly_a_range_too_short_and_nobody_at_fault(
     name: str, verdict: bool | None, monkeypatch: pytest.MonkeyPatch

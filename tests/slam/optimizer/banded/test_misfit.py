@@ -21,6 +21,7 @@ from drslamd.slam.optimizer.banded.misfit import (
     blocked,
     contradicted,
     guessed_misfit,
+    has_passed,
     many_wrong,
     misfit,
     outlier_share,
@@ -158,13 +159,40 @@ def test_shares_of_outliers_are_those_of_each_pair() -> None:
 
 @pytest.mark.parametrize(
     ("wrong", "good", "expected"),
-    [(2, 10, False), (3, 10, True), (3, 46, True), (3, 48, False), (0, 5, False)],
+    [(3, 10, False), (4, 10, True), (4, 62, True), (4, 63, False), (0, 5, False)],
 )
 def test_many_ranges_are_wrong_where_more_of_a_pair_are_than_bursts_are(
     wrong: int, good: int, expected: bool
 ) -> None:
-    """At least three, and six of a hundred: 3 of 49 and not 3 of 51."""
+    """Four one after the other, and six of a hundred: 4 of 66 and not 4 of 67."""
     assert many_wrong(*errs(np.array([9.0] * wrong + [0.0] * good))) is expected
+
+
+def test_bursts_are_many_ranges_and_not_for_long() -> None:
+    assert not many_wrong(*errs(np.array([9.0, 9, 9, 0] * 8)))
+    # nor is what lies at the end of one pair and at the beginning of the next
+    pair = np.repeat([0, 1], 6)
+    sigmas = np.array([0.0, 0, 0, 0, 9, 9, 9, 9, 0, 0, 0, 0])
+    assert not many_wrong(*errs(sigmas, pair))
+    assert many_wrong(*errs(sigmas, np.zeros(12, dtype=int)))
+
+
+@pytest.mark.parametrize(
+    ("ranges", "expected"),
+    [
+        ("ooooxxxxoooo", True),
+        ("xxxxoooo", True),
+        ("oooxxxoooo", False),
+        ("ooooxxxxooo", False),
+        ("ooooooxxxxx", False),
+        ("ooooxxxxoxxxx", False),
+        ("oooossssoooo", False),
+    ],
+)
+def test_sight_was_blocked_where_it_is_free_again(ranges: str, expected: bool) -> None:
+    """Too long `x`, too short `s`."""
+    sigmas = np.array([{"x": 9.0, "s": -9.0}.get(c, 0.0) for c in ranges])
+    assert has_passed(*errs(sigmas)) is expected
 
 
 def test_ranges_that_are_too_long_are_none_the_other_way() -> None:
