@@ -3,8 +3,9 @@
 A solution as configured is asked three questions: does odometry fit, do ranges fit now, does some
 track or antenna ask to be another one? Most often all is well. Else odometry that was worse all
 along is tried (`common_level`), then wheels that stood or spun (`lapses`), then mountings
-(`mountings`), which explain a fault for good and must explain more than such odometry, and then
-odometry that was worse for a while (`odometry_levels`).
+(`mountings`), which explain a fault for good and must explain more than such odometry, then sight
+that was blocked (`Problem.is_blocked`), and then odometry that was worse for a while
+(`odometry_levels`).
 """
 
 from __future__ import annotations
