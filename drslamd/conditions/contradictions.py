@@ -135,6 +135,17 @@ def named_robot(number: int) -> str:
     return f"module {number - FIRST_NODE}" if is_node(number) else str(number)
 
 
+def sight(robots: Iterable[int]) -> str | None:
+    """One sentence on robots that are often out of sight; None while there are none."""
+    named = " and ".join(named_robot(robot) for robot in sorted(robots))
+    if not named:
+        return None
+    return (
+        f"many ranges to robot {named} are too long: sight between is blocked now and then; such "
+        "ranges count for little; mount antennas higher, or drive where the robots see each other"
+    )
+
+
 def partners(robots: Iterable[int]) -> str | None:
     """One sentence on other robots to whom ranges do not fit; None while there are none."""
     named = " and ".join(named_robot(robot) for robot in sorted(robots))

@@ -82,6 +82,7 @@ def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
     doubt = where.doubt
     yield "doubt", contradictions.doubt(doubt)
     yield "odometry", contradictions.odometry(_is_worse(robot)) if not doubt else None
+    yield "sight", contradictions.sight(_out_of_sight(robot))
     yield "partners", contradictions.partners(_doubted_partners(robot) if not doubt else ())
     yield "mounting", _mountings(robot)
     site = robot.standing.site()
@@ -133,6 +134,11 @@ def _load(robot: Stages, utime: int) -> str | None:
 def _doubted_partners(robot: Stages) -> Iterable[int]:
     front = robot.front
     return doubted_partners(front.own.robot, robot.back.estimate, front.watch.doubted)
+
+
+def _out_of_sight(robot: Stages) -> Iterable[int]:
+    estimate = robot.back.estimate
+    return estimate.out_of_sight(robot.front.own.robot) if estimate else ()
 
 
 def _is_worse(robot: Stages) -> bool:

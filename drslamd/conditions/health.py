@@ -37,6 +37,7 @@ CAUSES_FIRST = (
     "load",
     "doubt",
     "odometry",
+    "sight",
     "partners",
     "pose",
     "site",

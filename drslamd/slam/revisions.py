@@ -10,6 +10,7 @@ now: our own pose, and those of all pairs of robots in each other.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
 from itertools import combinations
 from typing import NamedTuple
 
@@ -57,11 +58,11 @@ class _Model(NamedTuple):
 
     Attributes:
         mountings: that are not as configured, of which kind and of whom.
-        level: of the worst odometry that is feared and not in doubt.
+        is_worse: is odometry feared to be much worse, of somebody who is not in doubt for that?
     """
 
     mountings: frozenset[tuple[str, int]] = frozenset()
-    level: float = 1.0
+    is_worse: bool = False
 
     @staticmethod
     def of(estimate: TeamEstimate) -> _Model:
@@ -69,22 +70,30 @@ class _Model(NamedTuple):
         mountings = frozenset(tracks | {("antenna", robot) for robot in estimate.antenna_m})
         levels = estimate.odometry_level.items()
         feared = [level for robot, level in levels if not estimate.is_slipping(robot)]
-        return _Model(mountings, max(feared, default=1.0))
+        return _Model(mountings, max(feared, default=1.0) >= MUCH_WORSE)
 
     def is_new(self, before: _Model) -> bool:
         """Does it explain what the one before could not?"""
-        is_wider = self.level >= MUCH_WORSE > before.level
+        is_wider = self.is_worse and not before.is_worse
         return is_wider or bool(self.mountings - before.mountings)
+
+
+class _Moves(NamedTuple):
+    """How far claims that were made under a model have been moved at most."""
+
+    model: _Model
+    sizes: dict[Whose, float]
 
 
 class Revisions:
     """Of one robot's own pose, and of all pairs."""
 
     def __init__(self) -> None:
-        self._claims: deque[tuple[float, _Claim]] = deque(maxlen=MOST_CLAIMS)
-        self._moves: deque[tuple[float, dict[Whose, float]]] = deque(maxlen=MOST_CLAIMS)
+        self._claims: deque[tuple[float, _Model, _Claim]] = deque(maxlen=MOST_CLAIMS)
+        self._moves: deque[tuple[float, list[_Moves]]] = deque(maxlen=MOST_CLAIMS)
         self._own = -1
         self._model = _Model()
+        """Of the last solution that explains what was measured."""
 
     @property
     def boldness(self) -> float:
@@ -95,7 +104,7 @@ class Revisions:
     @property
     def of_pairs(self) -> dict[tuple[int, int], float]:
         """Likewise of pairs a < b, where it is above 1."""
-        pairs = {whose for _, moves in self._moves for whose in moves if len(whose) == 2}
+        pairs = {whose for moves in self._counting() for whose in moves if len(whose) == 2}
         found = {(pair[0], pair[1]): self._boldness(pair) for pair in pairs}
         return {pair: bold for pair, bold in found.items() if bold > 1.0}
 
@@ -110,8 +119,14 @@ class Revisions:
 
     def _moved(self, whose: Whose) -> float:
         """The farthest move of late, over what is allowed."""
-        most = max((moves.get(whose, 0.0) for _, moves in self._moves), default=0.0)
+        most = max((moves.get(whose, 0.0) for moves in self._counting()), default=0.0)
         return most / (ALLOWED if len(whose) == 1 else ALLOWED_OF_PAIRS)
+
+    def _counting(self) -> Iterator[dict[Whose, float]]:
+        """What was claimed under a model that could not explain what this one does says nothing
+        against this one: not before it is given up again."""
+        for _, kinds in self._moves:
+            yield from (moves.sizes for moves in kinds if not self._model.is_new(moves.model))
 
     def on_solution(self, estimate: TeamEstimate, robot: int) -> None:
         """Module 3 has answered.
@@ -125,16 +140,16 @@ class Revisions:
             return
         self._own, now = robot, float(solved.n[-1])
         model = _Model.of(estimate)
-        if model.is_new(self._model) and estimate.is_explained:
-            # what was claimed under another one says nothing against this
-            self._claims.clear()
-            self._moves.clear()
-        self._model = model
+        if estimate.is_explained:
+            self._model = model
         for remembered in (self._claims, self._moves):
             while remembered and remembered[0][0] < now - REMEMBERED:
                 remembered.popleft()
-        self._moves.append((now, _moved([claim for _, claim in self._claims], estimate)))
-        self._claims.append((now, _claim(estimate, robot)))
+        by_model: dict[_Model, list[_Claim]] = {}
+        for _, claimed_under, claim in self._claims:
+            by_model.setdefault(claimed_under, []).append(claim)
+        self._moves.append((now, [_Moves(k, _moved(c, estimate)) for k, c in by_model.items()]))
+        self._claims.append((now, model, _claim(estimate, robot)))
 
 
 def _claim(estimate: TeamEstimate, own: int) -> _Claim:

@@ -192,6 +192,14 @@ def test_a_pose_that_was_moved_is_told_as_what_lies_behind() -> None:
     )
 
 
+def test_robots_that_are_often_out_of_sight_are_named_in_order() -> None:
+    assert contradictions.sight([]) is None
+    assert contradictions.sight(frozenset({9, 2})) == (
+        "many ranges to robot 2 and 9 are too long: sight between is blocked now and then; such "
+        "ranges count for little; mount antennas higher, or drive where the robots see each other"
+    )
+
+
 def test_partners_in_doubt_are_named_in_order() -> None:
     assert contradictions.partners([]) is None
     assert contradictions.partners({7}) == (

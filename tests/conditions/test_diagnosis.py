@@ -32,12 +32,21 @@ def test_everything_is_looked_after_from_the_sensors_to_the_budget() -> None:
     scene = RobotScene()
     keys = [key for key, _ in conditions(scene.robot, scene.utime)]
     team = [key for key in keys if key.startswith("team.")]
-    of_poses = ["pose", "doubt", "odometry", "partners", "mounting"]
+    of_poses = ["pose", "doubt", "odometry", "sight", "partners", "mounting"]
     turns = ["gyro", "wheels.slip", "wheels.track"]
     hardware = ["uwb", "wheels", *turns, "network", "sleep"]
     rest = ["site", "load", "budget", "state"]
     assert keys == [*hardware, *team, *of_poses, *rest]
     assert len(team) >= 4
+
+
+def test_who_is_out_of_sight_is_told() -> None:
+    scene = RobotScene()
+    own = scene.robot.front.own.robot
+    assert said(scene, "sight") is None
+    estimate = TeamEstimate(Segment(own, 1, 0), {}, blocked=frozenset({(own, own + 1)}))
+    scene.robot.back.estimate = estimate
+    assert str(said(scene, "sight")).startswith(f"many ranges to robot {own + 1} are too long")
 
 
 # ports and what is plugged in

@@ -125,6 +125,28 @@ def test_nor_does_what_was_claimed_before_odometry_was_known_to_be_much_worse(
     assert boldness(claimed, replace(moved, late_level={3: MUCH_WORSE})) > 1.0
 
 
+def worse(estimate: TeamEstimate, level: float) -> TeamEstimate:
+    """With odometry that is feared to be so many times worse."""
+    return replace(estimate, odometry_level={0: level})
+
+
+def test_what_was_claimed_under_another_model_counts_again_when_this_one_is_given_up() -> None:
+    before, moved = solution([0, 10]), solution([0, 10, 20], 3.0)
+    explained, again = worse(moved, MUCH_WORSE), solution([0, 10, 20, 30], 3.0)
+    assert boldness(before, moved) == pytest.approx(30.0**2 / 3 / ALLOWED)
+    assert boldness(before, moved, explained) == 1.0
+    assert boldness(before, moved, explained, again) == pytest.approx(30.0**2 / 3 / ALLOWED)
+    # one that explains nothing does not take the place of one that did
+    assert boldness(before, explained, replace(again, is_explained=False)) == 1.0
+
+
+def test_what_is_moved_under_the_model_that_is_believed_now_counts_beside_older_claims() -> None:
+    before, claimed = solution([0, 10]), worse(solution([0, 10, 20]), MUCH_WORSE)
+    moved = worse(solution([0, 10, 20, 30], 3.0), MUCH_WORSE)
+    assert boldness(before, moved) == 1.0
+    assert boldness(before, claimed, moved) > 1.0
+
+
 # pairs
 
 

@@ -9,7 +9,7 @@ from drslamd.machine.finding import Finding
 
 
 def robots_in_doubt(patient: Patient) -> Iterator[Finding]:
-    yield from patient.told("doubt", "doubt", "odometry", "partners")
+    yield from patient.told("doubt", "doubt", "odometry", "sight", "partners")
     for robot, peer in patient.now["peers"].items():
         if peer["alive"] and peer["pose"] in ("doubtful", "stale"):
             yield warning(

@@ -107,6 +107,7 @@ class TeamEstimate:
         lapses: of everybody.
         fitted: by robot, the last keyframe of the last solution that was as modelled.
         contradicted: pairs whose ranges of late do not fit the rest.
+        blocked: pairs of whose ranges many are too long.
         boldness: by how much variances of pairs a < b that were claimed of late were too small
             (`revisions`), where they were.
         narrower: times `joint`, variances of pairs a < b in each other, where sensors were seen to
@@ -118,7 +119,7 @@ class TeamEstimate:
         nodes: by number, the places of modules that no robot carries.
         left: those of modules that stand elsewhere since, nobody knows where.
         points: what stands, and of which only the place is known: every node, and parked robots.
-        is_as_modelled: was it explained with odometry as it is configured?
+        is_as_modelled: was it explained with odometry as it is configured, and sight that was free?
         kept: what the solver keeps of it for the next one.
     """
 
@@ -140,6 +141,7 @@ class TeamEstimate:
     lapses: tuple[Lapse, ...] = ()
     fitted: dict[int, int] = field(default_factory=dict)
     contradicted: frozenset[tuple[int, int]] = frozenset()
+    blocked: frozenset[tuple[int, int]] = frozenset()
     boldness: dict[tuple[int, int], float] = field(default_factory=dict)
     narrower: dict[tuple[int, int], float] = field(default_factory=dict)
     is_explained: bool = True
@@ -221,6 +223,10 @@ class TeamEstimate:
         """Likewise where a pair is told as sure as it was seen to be, see `narrower`."""
         pair = (min(a, b), max(a, b))
         return max(self.boldness.get(pair, 0.0), self.narrower.get(pair, 1.0))
+
+    def out_of_sight(self, robot: int) -> frozenset[int]:
+        """To whom sight of a robot was blocked."""
+        return frozenset(b if a == robot else a for a, b in self.blocked if robot in (a, b))
 
     def is_slipping(self, robot: int) -> bool:
         """Was odometry of a robot much worse than configured in the last seconds?"""

@@ -18,6 +18,9 @@ from drslamd.slam.optimizer.sensor_priors import Calibration, Priors
 from drslamd.slam.range_model import LINKTRACK, RangeModel
 from drslamd.slam.se2 import Array, Index
 
+TOO_LONG = 0.2
+"""Of the cut: where sight is blocked for long a range that is too long by half a sigma counts for
+little already, so that the shortest ones hold the solution."""
 RIDGE = 1e-10
 """Added to correlations before they are inverted; nobody knows his correlations so well."""
 
@@ -265,6 +268,8 @@ class Problem:
         freed: of what odometry says.
         fitted: (robots,) keyframes until which all was as modelled not long ago; none where left
             out.
+        is_blocked: was sight blocked for long? A signal that went around something is too long and
+            never too short.
     """
 
     robot: Index
@@ -281,6 +286,16 @@ class Problem:
     model: RangeModel = LINKTRACK
     freed: tuple[Freed, ...] = ()
     fitted: Array | None = None
+    is_blocked: bool = False
+
+    def cuts(self, threshold: Array, error: Array) -> Array:
+        """(n,) sigmas beyond which each range loses weight.
+
+        Args:
+            threshold: (pairs,) of each pair; error: (n,) predicted minus measured.
+        """
+        cut = threshold[self.ranges.pair]
+        return np.where(error < 0, TOO_LONG * cut, cut) if self.is_blocked else cut
 
     @cached_property
     def ends(self) -> Index:

@@ -156,3 +156,10 @@ def test_a_pair_that_was_moved_too_far_is_no_narrower_whatever_its_sensors_say(
     team = replace(a_team(), boldness=boldness, narrower=narrower)
     assert team.narrow(2, 7) == team.narrow(7, 2) == times
     assert team.narrow(2, 3) == 1.0
+
+
+def test_who_is_out_of_sight_is_named_from_either_side() -> None:
+    estimate = replace(a_team(), blocked=frozenset({(0, 2), (2, 7)}))
+    assert estimate.out_of_sight(2) == {0, 7}
+    assert estimate.out_of_sight(0) == {2}
+    assert estimate.out_of_sight(1) == frozenset()

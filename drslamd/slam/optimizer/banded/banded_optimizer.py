@@ -256,10 +256,9 @@ def _begun(
 ) -> TeamEstimate:
     """State the problem and solve it: both take long where the team is large."""
     team = build_problem(graph, group, previous, numbers)
-    if previous is None:
-        return solved(team, group, solve=numbers.solve)
-    found = solved(team, group, solve=numbers.solve, kept=previous.kept)
-    return found if found.is_as_modelled else replace(found, fitted=previous.fitted)
+    kept, fitted = (previous.kept, previous.fitted) if previous else (None, {})
+    found = solved(team, group, solve=numbers.solve, kept=kept)
+    return found if found.is_as_modelled else replace(found, fitted=fitted)
 
 
 def solved(
@@ -282,10 +281,8 @@ def solved(
     learned, spread, doubted = solution.calibration, solution.spread, solution.doubted
     assert spread is not None
     n, poses = team.problem.n, solution.poses
-    paths = {
-        chain.robot: Trajectory(chain, n[mine[chain.robot]], poses[mine[chain.robot]])
-        for chain in team.chains
-    }
+    each = ((chain, mine[chain.robot]) for chain in team.chains)
+    paths = {chain.robot: Trajectory(chain, n[rows], poses[rows]) for chain, rows in each}
     points = frozenset(s.robot for s in group.points) - {s.robot for s in group.members}
     turn = _named(list(mine), learned.turn, spread.turn)
     yaw = _named(list(mine), learned.yaw, spread.yaw)
@@ -312,6 +309,7 @@ def solved(
         late_level=_latest(team, solution.late_level),
         lapses=tuple(lapse_of(team.problem, list(mine), one) for one in solution.freed),
         contradicted=frozenset(compress(team.pairs, solution.contradicted)),
+        blocked=frozenset(compress(team.pairs, solution.blocked)),
         is_explained=solution.is_explained,
         cost=solution.cost,
         iterations=solution.iterations,
@@ -319,7 +317,7 @@ def solved(
         converged=solution.converged or team.is_known,
         settled=team.is_known,
         fitted={robot: int(team.problem.n[mine[robot][-1]]) for robot in mine},
-        is_as_modelled=solution.is_explained and bool((solution.odometry_level <= 1).all()),
+        is_as_modelled=solution.is_as_modelled,
         kept=kept,
     )
 

@@ -18,7 +18,7 @@ from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.explanation import Explanation, explain
 from drslamd.slam.optimizer.banded.lapses.known_lapses import still_freed
 from drslamd.slam.optimizer.banded.lapses.stretches import under
-from drslamd.slam.optimizer.banded.misfit import contradicted
+from drslamd.slam.optimizer.banded.misfit import blocked, contradicted, many_wrong
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import FIRST_LEVEL, raised
@@ -60,8 +60,6 @@ def solve(
     nominal = descend(equations, start, most, tolerance, is_near=problem.fitted is not None)
     explained = explain(equations, nominal, most, tolerance)
     equations, point, problem = explained.equations, explained.point, explained.equations.problem
-    poses: Array = point.poses.copy()
-    poses[:, 2] = se2.wrap(poses[:, 2])
     scatter = claims.scatter_of(problem, point)
     feared = Equations(raised(problem, explained.feared, point), like=equations)
     wanted = np.array(marginals, dtype=int)
@@ -72,24 +70,27 @@ def solve(
     late = FIRST_LEVEL * under(problem, doubted, after_s=np.inf)
     # nobody goes on from a solution with other stretches freed as from one that is as modelled
     news = FIRST_LEVEL * under(problem, doubted if is_same else problem.freed)
+    level = np.maximum(explained.level, news)
     if explained.other is not None:
         joint += claims.disagreement(point, explained.other, wanted)
     return Solution(
-        poses,
+        np.column_stack([point.poses[:, :2], se2.wrap(point.poses[:, 2])]),
         point.calibration,
         cost=equations.cost(point, point.threshold),
         iterations=nominal.steps,
-        converged=nominal.converged,
+        converged=nominal.converged or problem.is_blocked,
         scatter=scatter,
         joint=joint,
         shares=_shares(explained, joint, wanted, known),
         spread=spread,
         bias_sigmas=biases,
-        odometry_level=np.maximum(explained.level, news),
+        odometry_level=level,
         feared_level=np.maximum(np.sqrt(explained.feared), news),
         late_level=np.maximum(np.sqrt(explained.lately), late),
         is_explained=explained.other is None,
+        is_as_modelled=_is_as_modelled(explained, level),
         contradicted=contradicted(problem, point),
+        blocked=blocked(problem, point),
         doubted=claims.still_doubted(problem.doubted, point.calibration, spread),
         freed=freed,
     )
@@ -112,3 +113,14 @@ def _shares(
     feared = raised(problem, seen.feared[problem.odometry.robot], point)
     narrow = claims.covariances(Equations(feared, like=equations), point, seen.scatter, wanted)[0]
     return narrowing.shares(point.poses[wanted], joint, narrow)
+
+
+def _is_as_modelled(explained: Explanation, level: Array) -> bool:
+    """
+    Args:
+        level: (m,) sigmas of odometry over what is configured.
+    """
+    problem = explained.equations.problem
+    if explained.other is not None or problem.is_blocked or (level > 1).any():
+        return False
+    return not many_wrong(problem, explained.point)

@@ -3,13 +3,14 @@
 A solution as configured is asked three questions: does odometry fit, do ranges fit now, does some
 track or antenna ask to be another one? Most often all is well. Else odometry that was worse all
 along is tried (`common_level`), then wheels that stood or spun (`lapses`), then mountings
-(`mountings`), which explain a fault for good and must explain more than such odometry, and then
-odometry that was worse for a while (`odometry_levels`).
+(`mountings`), which explain a fault for good and must explain more than such odometry, then sight
+that was blocked (`Problem.is_blocked`), and then odometry that was worse for a while
+(`odometry_levels`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,22 +20,30 @@ from drslamd.slam.optimizer.banded.common_level import ASKS, TAILS, CommonLevel,
 from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.lapses.known_lapses import settled
 from drslamd.slam.optimizer.banded.misfit import (
+    FEW_OUTLIERS,
     Run,
     guessed_misfit,
+    has_passed,
+    many_wrong,
     misfit,
     outlier_share,
     runs,
 )
 from drslamd.slam.optimizer.banded.mountings import Scores
+from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.banded.odometry_levels import FEW_OUTLIERS, STANDS_OUT, TARGET
+from drslamd.slam.optimizer.banded.odometry_levels import STANDS_OUT, TARGET
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array
 
 SUSPICIOUS = 3.0
 """Guessed s / g above which it is computed."""
 MANY_OUTLIERS = 2 * FEW_OUTLIERS
 """Of the ranges of any pair: slip has half of that at first, so it is not what leaves more."""
+NOT_WHEELS = 5
+"""Ranges of a pair, one a second, since all was as modelled: wheels that stood or spun are found
+sooner, and until they are, ranges of theirs may all seem too long."""
 MUCH = 100.0
 """Of cost: a mounting that takes away so much is right, though something else is wrong as well."""
 
@@ -87,15 +96,15 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
     """
     equations, nominal = settled(equations, nominal, most, tolerance)
     check = _checked(equations, nominal)
-    is_fine = check.is_passed() and not check.scores.ask()
+    fits = check.is_passed() and not check.scores.ask() and _fits(equations, nominal)
     common = _in_common(equations, nominal, check, most, tolerance)
     if common is not None and not check.scores.ask():
         return _commonly(equations, common)
-    if common is None and not (is_fine and _fits(equations, nominal)):
+    if common is None and not fits:
         lapse = _by_lapse(equations, nominal, most, tolerance)
         if lapse is not None:
             return lapse
-    if is_fine:
+    if fits:
         return _as_is(equations, nominal, check.ratio)
     bases = [(equations, nominal, check)]
     if check.scores.ask():
@@ -113,8 +122,11 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
             bases.insert(0, (mounted, better, again))
         if common is not None:
             return _commonly(equations, common)
-        if check.is_passed() and not check.scores.ask_alone():
-            return _as_is(equations, nominal, check.ratio)
+    sight = _by_sight(equations, nominal, most, tolerance)
+    if sight is not None:
+        return sight
+    if check.is_passed() and not check.scores.ask_alone():
+        return _as_is(equations, nominal, check.ratio)
     for base, point, said in bases:
         levels = odometry_levels.levelled(base, point, said.ratio, said.runs, most, tolerance)
         seen = np.sqrt(levels.seen)
@@ -133,6 +145,34 @@ def _by_lapse(
         return None
     check = _checked(found.equations, found.point)
     return _as_is(found.equations, found.point, check.ratio) if check.is_passed() else None
+
+
+def _by_sight(
+    equations: Equations, nominal: Point, most: int, tolerance: float
+) -> Explanation | None:
+    """Sight was blocked for long, if that explains all: then hardly a range is too short, wheels
+    are as configured, and somewhere sight is free again."""
+    problem = equations.problem
+    if not many_wrong(problem, nominal) or _is_new(problem):
+        return None
+    blocked = replace(problem, initial=nominal.poses, is_blocked=True)
+    better = Equations(blocked, like=equations)
+    # it is far from here: a solution that was bent until the ranges fit leads astray
+    point = descend(better, nominal.calibration, 2 * most, tolerance)
+    if not point.converged or not _fits(better, point) or not has_passed(blocked, point):
+        return None
+    check = _checked(better, point)
+    return _as_is(better, point, check.ratio) if check.is_passed() else None
+
+
+def _is_new(problem: Problem) -> bool:
+    """Was all as modelled so late that wheels may be the cause of what is not?"""
+    ranges = problem.ranges
+    if problem.fitted is None:
+        return False
+    ends = problem.n[np.stack([ranges.i, ranges.j], axis=-1)]
+    since = (ends > problem.fitted[ranges.robots]).any(axis=1)
+    return bool(np.bincount(ranges.pair, since, problem.pairs).max() < NOT_WHEELS)
 
 
 def _in_common(

@@ -66,7 +66,7 @@ def ranges_at(
     """
     factors = problem.ranges
     error, jacobian = point.sight.error, _range_jacobian(problem, point, antennas)
-    squared = (error / (point.threshold[factors.pair] * factors.sigma)) ** 2
+    squared = (error / (problem.cuts(point.threshold, error) * factors.sigma)) ** 2
     weight = 1 / (1 + squared) / factors.sigma**2
     # the second derivative makes the steps of an iteration shrink fast
     bent = weight * np.maximum((1 - squared) / (1 + squared), least)
@@ -83,7 +83,7 @@ def weighed_ranges(
     """
     factors = problem.ranges
     error, jacobian = point.sight.error, _range_jacobian(problem, point, antennas)
-    squared = (error / (point.threshold[factors.pair] * factors.sigma)) ** 2
+    squared = (error / (problem.cuts(point.threshold, error) * factors.sigma)) ** 2
     weight = 1 / (1 + squared) / (claims[factors.pair] * factors.sigma) ** 2
     return Linearised(jacobian, weight[:, None, None], (weight * error)[:, None])
 

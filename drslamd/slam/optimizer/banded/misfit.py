@@ -31,8 +31,12 @@ PROBES = 6
 """Rows of random signs that estimate g of a whole robot to some percent."""
 AT_ONCE = 1024
 """Links for which signs are drawn at once."""
+FEW_OUTLIERS = 0.06
+"""Of the ranges of any pair, when odometry alone was at fault; 0.08 to 0.21 where ranges were."""
 OUTLIER_SIGMAS = 2.5
 """Of what a range was sent with: beyond it, it is an outlier."""
+BLOCKED_SHARE = 0.15
+"""Of a pair between which sight was blocked; others come to 0.13 where ranges of some are."""
 RUN = 4
 """Outliers of one pair that follow each other, at one a second; bursts are shorter."""
 OF_RUN = 0.8
@@ -145,17 +149,63 @@ def squares_of_ranges(problem: Problem, point: Point) -> Array:
     return np.bincount(ranges.pair, squares, problem.pairs)
 
 
+def sigmas_off(problem: Problem, point: Point) -> Array:
+    """(n,) how far ranges are off the solution; too long ones of blocked sight are not."""
+    off = point.sight.error / problem.ranges.sigma
+    return np.maximum(off, 0.0) if problem.is_blocked else np.abs(off)
+
+
 def outliers(problem: Problem, point: Point) -> NDArray[np.bool_]:
     """(n,) which of the ranges are far off the solution."""
-    ranges = problem.ranges
-    return np.asarray(np.abs(point.sight.error) > OUTLIER_SIGMAS * ranges.sigma)
+    return np.asarray(sigmas_off(problem, point) > OUTLIER_SIGMAS)
+
+
+def too_long(problem: Problem, point: Point) -> NDArray[np.bool_]:
+    """(n,) which of the ranges are longer by far than the solution has them."""
+    return np.asarray(point.sight.error < -OUTLIER_SIGMAS * problem.ranges.sigma)
 
 
 def outlier_share(problem: Problem, point: Point) -> Array:
     """(pairs,) of the ranges of each pair; none of no ranges."""
+    return share(problem, outliers(problem, point))
+
+
+def many_wrong(problem: Problem, point: Point) -> bool:
+    """Are many ranges of any pair outliers, and some of them for longer than bursts last?"""
+    wrong = outliers(problem, point)
+    many = share(problem, wrong) >= FEW_OUTLIERS
+    if not many.any():
+        return False
+    pair, is_wrong, count = _stretches(problem, wrong)
+    return bool((many[pair] & is_wrong & (count >= RUN)).any())
+
+
+def has_passed(problem: Problem, point: Point) -> bool:
+    """Were ranges of any pair too long for longer than bursts last, and do they fit again since?
+    Where wheels stood or spun they do not."""
+    pair, is_long, count = _stretches(problem, too_long(problem, point))
+    lasted = count >= RUN
+    is_next = pair[1:] == pair[:-1]
+    return bool((is_next & is_long[:-1] & lasted[:-1] & lasted[1:]).any())
+
+
+def _stretches(
+    problem: Problem, which: NDArray[np.bool_]
+) -> tuple[Index, NDArray[np.bool_], Index]:
+    """(k,) of which pair each stretch of ranges is that are alike, are they among those (n,), and
+    how many there are; pair by pair in the order of time."""
+    ranges = problem.ranges
+    order = np.lexsort((np.maximum(ranges.i, ranges.j), ranges.pair))
+    pair, flagged = ranges.pair[order], which[order]
+    begins = np.flatnonzero(np.diff(2 * pair + flagged, prepend=-1))
+    return pair[begins], flagged[begins], np.diff(begins, append=len(order))
+
+
+def share(problem: Problem, which: NDArray[np.bool_]) -> Array:
+    """(pairs,) how many of the ranges of each pair are among those (n,); none of no ranges."""
     pair = problem.ranges.pair
     count = np.bincount(pair, minlength=problem.pairs)
-    return np.bincount(pair, outliers(problem, point), problem.pairs) / np.maximum(count, 1)
+    return np.bincount(pair, which, problem.pairs) / np.maximum(count, 1)
 
 
 @dataclass(frozen=True)
@@ -186,6 +236,12 @@ def contradicted(problem: Problem, point: Point) -> NDArray[np.bool_]:
     return found
 
 
+def blocked(problem: Problem, point: Point) -> NDArray[np.bool_]:
+    """(pairs,) of whose ranges many are too long, where that explains what was measured."""
+    far = share(problem, too_long(problem, point)) >= BLOCKED_SHARE
+    return far if problem.is_blocked else np.zeros(problem.pairs, dtype=bool)
+
+
 def lately_wrong(problem: Problem, point: Point) -> NDArray[np.bool_]:
     """(pairs,) of whose ranges of late many do not fit."""
     pair, n = problem.ranges.pair, problem.n[problem.ranges.i]
@@ -205,7 +261,7 @@ def runs(problem: Problem, point: Point) -> list[Run]:
         return []
     order = np.argsort(np.maximum(ranges.i, ranges.j), kind="stable")
     wrong = outliers(problem, point)
-    sigmas = np.abs(point.sight.error) / ranges.sigma
+    sigmas = sigmas_off(problem, point)
     robots = np.unique(problem.robot)
     found = []
     for pair in named:
@@ -231,7 +287,7 @@ def with_runs(problem: Problem, point: Point) -> Index:
     many = np.flatnonzero(count >= RUN)
     found[many] = outliers(problem, point)[_last(order, ends[many], RUN)].all(axis=1)
     many = np.flatnonzero(count >= LAST)
-    sigmas = np.abs(point.sight.error) / ranges.sigma
+    sigmas = sigmas_off(problem, point)
     last = np.minimum(sigmas[_last(order, ends[many], LAST)], CLIPPED)
     found[many] |= np.mean(last**2, axis=1) > MOST_SCATTER
     return np.flatnonzero(found)

@@ -83,7 +83,7 @@ class Equations:
         odometry, closures, ranges = problem.odometry, problem.closures, problem.ranges
         poses, calibration = point.poses, point.calibration
         moved = poses[problem.gauge] - problem.initial[problem.gauge]
-        c = threshold[ranges.pair]
+        c = problem.cuts(threshold, point.sight.error)
         return (
             odometry.cost(point.link)
             + closures.cost(pose_errors(poses, closures, closures.measured))

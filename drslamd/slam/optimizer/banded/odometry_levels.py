@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.misfit import (
+    FEW_OUTLIERS,
     Misfit,
     Run,
     misfit,
@@ -63,8 +64,6 @@ MOST_LEVEL = 40.0
 FLOOR = np.array([0.004, 0.004, 0.004]) ** 2
 """m^2 and rad^2 that a raised link has at least, over its level: who is stuck measures no way, and
 no way has no noise."""
-FEW_OUTLIERS = 0.06
-"""Of the ranges of any pair, when odometry alone was at fault; 0.08 to 0.21 where ranges were."""
 LONG_RUN = 30
 """Outliers of one pair; a wall is passed sooner."""
 

@@ -27,7 +27,9 @@ class Solution:
         doubted: whose mountings were let go.
         freed: stretches along which wheels stood or spun.
         is_explained: is the model, with these levels, one of what was measured?
+        is_as_modelled: is it the one that is configured?
         contradicted: (pairs,) whose ranges of late do not fit.
+        blocked: (pairs,) between which sight was blocked.
     """
 
     poses: Array
@@ -44,6 +46,8 @@ class Solution:
     feared_level: Array = field(default_factory=lambda: np.zeros(0))
     late_level: Array = field(default_factory=lambda: np.zeros(0))
     is_explained: bool = True
+    is_as_modelled: bool = True
     contradicted: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    blocked: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     doubted: Doubted = field(default_factory=lambda: Doubted.none(0))
     freed: tuple[Freed, ...] = ()

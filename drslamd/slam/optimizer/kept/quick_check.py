@@ -16,6 +16,7 @@ from drslamd.slam.optimizer.banded.common_level import ASKS
 from drslamd.slam.optimizer.banded.explanation import SUSPICIOUS
 from drslamd.slam.optimizer.banded.misfit import (
     guessed_misfit,
+    many_wrong,
     ratio_of,
     squares_of,
     with_runs,
@@ -78,7 +79,7 @@ def misfit_as_modelled(
     Args:
         variances: of the mountings, see `mountings.variances`; they may be of some seconds ago.
     """
-    if len(with_runs(problem, point)):
+    if len(with_runs(problem, point)) or many_wrong(problem, point):
         return None
     pull = mounting_pulls(problem, point)
     if mountings.scored(problem, pull, variances).ask():

@@ -208,10 +208,12 @@ def test_what_was_as_modelled_until_when_is_remembered_while_it_is_not(
 
     def worse(*args: Any, **named: Any) -> Solution:
         answer = solve(*args, **named)
-        return replace(answer, odometry_level=2 + answer.odometry_level)
+        return replace(answer, is_as_modelled=False)
 
     monkeypatch.setattr(banded_solver, "solve", worse)
     assert solved(team.graph, group, previous).fitted == {0: 5, 1: 7}
+    # a first solution that is not has nothing to remember
+    assert solved(team.graph, group).fitted == {}
 
 
 def test_a_lapse_is_named_by_its_robot_and_keyframes(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -252,6 +254,7 @@ def test_mountings_that_are_still_in_doubt_are_named_by_their_robots(
         level = 3.0 + team_problem_links(team, group)
         return replace(
             found,
+            blocked=np.array([False, True, False]),
             calibration=values,
             spread=spread,
             doubted=doubted,
@@ -263,6 +266,7 @@ def test_mountings_that_are_still_in_doubt_are_named_by_their_robots(
     estimate = solved(team.graph, group)
     assert estimate.turn == {1: Learned(0.2, 2.0), 2: Learned(0.3, 3.0)}
     assert estimate.antenna_m == {0: (Learned(0.0, 6.0), Learned(1.0, 7.0))}
+    assert estimate.blocked == {(0, 2)}
     # of the last link of each robot, as far as it must be feared
     assert estimate.odometry_level == {0: 13.0, 1: 14.0, 2: 15.0}
     # and what is as configured is not named

@@ -276,11 +276,11 @@ def test_a_stretch_along_which_wheels_were_right_is_freed_no_longer() -> None:
 
 
 def test_where_nobody_can_say_who_is_wrong_poses_stay_and_their_covariances_grow() -> None:
-    """The ranges of one pair a metre too long in the last ten seconds."""
+    """The ranges of one pair a metre too short in the last ten seconds."""
     problem, _ = team_problem(1, robots=4, count=45, closures=6)
     ranges, wanted = problem.ranges, np.arange(4 * 44, 4 * 45)
     wrong = (ranges.pair == 0) & (ranges.i >= 4 * 35)
-    problem = replace(problem, ranges=replace(ranges, measured=ranges.measured + wrong))
+    problem = replace(problem, ranges=replace(ranges, measured=ranges.measured - wrong))
     equations, nothing = Equations(problem), Calibration.zero(problem.pairs, 4)
     nominal = descend(equations, nothing, 60)
     solution = solve(problem, marginals=tuple(wanted), most=60)
@@ -294,7 +294,7 @@ def test_where_nobody_can_say_who_is_wrong_poses_stay_and_their_covariances_grow
     apart[:, 2] = np.angle(np.exp(1j * apart[:, 2]))
     plain, *_ = covariances(equations, nominal, solution.scatter, wanted)
     grown = solution.joint - plain - np.outer(apart, apart)
-    assert np.abs(apart).max() > 0.1
+    assert np.abs(apart).max() > 0.05
     assert np.linalg.eigvalsh(grown)[0] > -1e-6
 
 

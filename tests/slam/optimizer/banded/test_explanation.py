@@ -23,11 +23,12 @@ from slam_scenes import Array
 from drslamd.slam.optimizer.banded import common_level, explanation, mountings, odometry_levels
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.common_level import ASKS, TAILS, CommonLevel
-from drslamd.slam.optimizer.banded.explanation import MUCH, Explanation, explain
+from drslamd.slam.optimizer.banded.explanation import MUCH, NOT_WHEELS, Explanation, explain
 from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.misfit import (
     Misfit,
     Run,
+    blocked,
     guessed_misfit,
     misfit,
     outlier_share,
@@ -36,7 +37,7 @@ from drslamd.slam.optimizer.banded.misfit import (
 from drslamd.slam.optimizer.banded.mountings import TOGETHER, WORTH, Scores
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.banded.odometry_levels import TARGET, Levels, raised
+from drslamd.slam.optimizer.banded.odometry_levels import STANDS_OUT, TARGET, Levels, raised
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
@@ -76,6 +77,12 @@ def worst(point: Point, truth: Array) -> float:
 def nowhere(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wheels say nothing of where they may have stood or spun."""
     monkeypatch.setattr(lapse_search, "likely_stretches", lambda _: [])
+
+
+@pytest.fixture
+def in_sight(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody asks whether sight was blocked."""
+    monkeypatch.setattr(explanation, "many_wrong", lambda *_: False)
 
 
 # as configured
@@ -223,7 +230,7 @@ def test_of_poses_that_nothing_holds_nothing_is_asked() -> None:
 # odometry that was worse for a while
 
 
-@pytest.mark.usefixtures("nowhere")
+@pytest.mark.usefixtures("nowhere", "in_sight")
 @pytest.mark.parametrize(("times", "is_raised"), [(1.001, False), (0.999, True)])
 def test_a_robot_that_stands_out_is_believed_less(
     times: float, is_raised: bool, monkeypatch: pytest.MonkeyPatch
@@ -242,8 +249,8 @@ def test_a_robot_that_stands_out_is_believed_less(
         assert found.feared == pytest.approx(np.maximum(ratio, 1)[problem.odometry.robot])
 
 
-def beside(seed: int, first: int, metres: float = 1.0) -> Problem:
-    """From some second on the ranges of robots 0 and 1 are too long."""
+def beside(seed: int, first: int, metres: float) -> Problem:
+    """From some second on the ranges of robots 0 and 1 are too long, or too short."""
     problem, _ = a_team(seed)
     ranges = problem.ranges
     wrong = (ranges.pair == 0) & (ranges.i // ROBOTS >= first)
@@ -253,7 +260,7 @@ def beside(seed: int, first: int, metres: float = 1.0) -> Problem:
 @pytest.mark.parametrize(("count", "is_found"), [(3, False), (4, True)])
 def test_a_burst_is_not_looked_into_and_a_run_is(count: int, is_found: bool) -> None:
     """What is found is that nobody can say who is wrong: the poses stay, and there are others."""
-    problem = beside(1, COUNT - count)
+    problem = beside(1, COUNT - count, metres=-1.0)
     equations, point = Equations(problem), nominal(problem)
     found = explain(equations, point, 60, TOLERANCE)
     assert (found.other is not None) is is_found
@@ -572,5 +579,83 @@ def test_a_gain_is_what_the_cost_fell_by_where_ranges_lose_weight_as_before() ->
 
 
 def test_outliers_count_by_the_pair_that_has_most_of_them() -> None:
-    problem = beside(1, COUNT - 3)
+    problem = beside(1, COUNT - 3, metres=1.0)
     assert outlier_share(problem, nominal(problem)).argmax() == 0
+
+
+# sight that is blocked
+
+
+WALLS = {0: (5, 35), 1: (20, 45), 4: (10, 40), 5: (0, 20)}
+"""Pairs between which sight is blocked, from which second until when."""
+
+
+def around_walls(seed: int) -> tuple[Problem, Array]:
+    """Ranges are a metre too long there."""
+    problem, truth = a_team(seed)
+    ranges, second = problem.ranges, problem.ranges.i // ROBOTS
+    longer = ranges.measured.copy()
+    for pair, (since, until) in WALLS.items():
+        longer += (ranges.pair == pair) & (second >= since) & (second < until)
+    return replace(problem, ranges=replace(ranges, measured=longer)), truth
+
+
+@pytest.mark.parametrize("seed", [2, 7])
+def test_where_sight_was_blocked_that_explains_it_and_wheels_are_as_configured(seed: int) -> None:
+    problem, truth = around_walls(seed)
+    point = nominal(problem)
+    found = explained(problem, point)
+    assert found.equations.problem.is_blocked
+    assert found.other is None
+    assert (found.level == 1).all()
+    assert found.lately.max() < STANDS_OUT
+    assert worst(found.point, truth) < worst(point, truth) / 3
+    pairs = blocked(found.equations.problem, found.point)
+    assert np.flatnonzero(pairs).tolist() == list(WALLS)
+
+
+def test_one_pair_whose_ranges_are_too_short_is_out_of_no_sight() -> None:
+    found = explained(beside(1, 30, metres=-2.0))
+    assert not found.equations.problem.is_blocked
+    assert found.other is not None
+
+
+@pytest.mark.parametrize(("ranges", "is_asked"), [(NOT_WHEELS - 1, False), (NOT_WHEELS, True)])
+def test_what_began_just_now_may_be_wheels_until_they_had_time_to_show_it(
+    ranges: int, is_asked: bool
+) -> None:
+    problem, _ = around_walls(7)
+    newest = np.array([problem.n[problem.robot == robot].max() for robot in range(ROBOTS)])
+    problem = replace(problem, fitted=newest - 10 * ranges)
+    found = explained(problem, nominal(problem))
+    assert found.equations.problem.is_blocked is is_asked
+
+
+def test_who_stood_all_the_time_does_not_hide_that_the_others_have_driven() -> None:
+    problem, _ = around_walls(7)
+    newest = np.array([problem.n[problem.robot == robot].max() for robot in range(ROBOTS)])
+    parked = np.array([True, False, False, False])
+    problem = replace(problem, fitted=newest - np.where(parked, 0, 10 * NOT_WHEELS))
+    assert explained(problem, nominal(problem)).equations.problem.is_blocked
+
+
+@pytest.mark.parametrize(
+    ("name", "verdict"),
+    [("many_wrong", False), ("_fits", False), ("has_passed", False), ("_checked", None)],
+)
+def test_sight_must_leave_hardly_a_range_too_short_and_nobody_at_fault(
+    name: str, verdict: bool | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem, _ = around_walls(7)
+    point, was = nominal(problem), getattr(explanation, name)
+
+    def said(first: Any, *rest: Any) -> Any:
+        problem = getattr(first, "problem", first)
+        if name != "many_wrong" and not problem.is_blocked:
+            return was(first, *rest)
+        if verdict is None:
+            return replace(was(first, *rest), ratio=np.full(ROBOTS, STANDS_OUT + 1e-6))
+        return verdict
+
+    monkeypatch.setattr(explanation, name, said)
+    assert not explained(problem, point).equations.problem.is_blocked

@@ -148,14 +148,14 @@ def test_the_near_range_bias_is_that_of_the_model_of_the_problem() -> None:
     assert found == pytest.approx(np.exp(-PROBLEM.ranges.measured))
 
 
-def a_range(sigmas: float) -> linearised.Linearised:
+def a_range(sigmas: float, is_blocked: bool = False) -> linearised.Linearised:
     """One that is so many sigmas off, of a pair that loses weight at 2 sigmas."""
     ranges = PROBLEM.ranges.chosen(np.arange(len(PROBLEM.ranges)) == 4)
     # what is measured would be part of the near-range bias too
     known = replace(KNOWN, near_bias=np.zeros(1))
     error = of_ranges(replace(PROBLEM, ranges=ranges), POSES, known)
     ranges = replace(ranges, measured=ranges.measured + error - sigmas * ranges.sigma)
-    problem = replace(PROBLEM, ranges=ranges)
+    problem = replace(PROBLEM, ranges=ranges, is_blocked=is_blocked)
     return linearised.ranges_at(problem, point_at(problem, POSES, known, np.full(3, 2.0)))
 
 
@@ -169,6 +169,16 @@ def test_a_range_pulls_as_the_cost_of_cauchy_says(sigmas: float) -> None:
 
     expected = (cost(e + h) - cost(e - h)) / (4 * h)
     assert a_range(sigmas).pull[0, 0] == pytest.approx(expected, rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize(("sigmas", "cut"), [(1.7, 2.0), (0.3, 2.0), (-0.3, 0.4), (-9.0, 0.4)])
+def test_where_sight_is_blocked_ranges_that_are_too_long_lose_their_weight_sooner(
+    sigmas: float, cut: float
+) -> None:
+    """Predicted minus measured: one that is too long is off to the negative side."""
+    weight = 400 / (1 + (sigmas / cut) ** 2)
+    found = a_range(sigmas, is_blocked=True)
+    assert found.pull[0, 0] == pytest.approx(weight * 0.05 * sigmas, rel=1e-6)
 
 
 @pytest.mark.parametrize("sigmas", [0.0, 0.5, -1.7, 1.80, 1.82, -9.0])

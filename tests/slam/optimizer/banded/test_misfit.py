@@ -18,13 +18,18 @@ from drslamd.slam.optimizer.banded.misfit import (
     RUN,
     Misfit,
     Run,
+    blocked,
     contradicted,
     guessed_misfit,
+    has_passed,
+    many_wrong,
     misfit,
     outlier_share,
     outliers,
     runs,
+    sigmas_off,
     squares_of_ranges,
+    too_long,
 )
 from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
@@ -158,6 +163,63 @@ def test_shares_of_outliers_are_those_of_each_pair() -> None:
     pair = np.array([0, 0, 1, 1, 0, 0])
     problem, point = errs(np.array([9.0, 0, 9, 9, 0, 0]), pair)
     assert outlier_share(problem, point).tolist() == [0.25, 1.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "good", "expected"),
+    [(3, 10, False), (4, 10, True), (4, 62, True), (4, 63, False), (0, 5, False)],
+)
+def test_many_ranges_are_wrong_where_more_of_a_pair_are_than_bursts_are(
+    wrong: int, good: int, expected: bool
+) -> None:
+    """Four one after the other, and six of a hundred: 4 of 66 and not 4 of 67."""
+    assert many_wrong(*errs(np.array([9.0] * wrong + [0.0] * good))) is expected
+
+
+def test_bursts_are_many_ranges_and_not_for_long() -> None:
+    assert not many_wrong(*errs(np.array([9.0, 9, 9, 0] * 8)))
+    # nor is what lies at the end of one pair and at the beginning of the next
+    pair = np.repeat([0, 1], 6)
+    sigmas = np.array([0.0, 0, 0, 0, 9, 9, 9, 9, 0, 0, 0, 0])
+    assert not many_wrong(*errs(sigmas, pair))
+    assert many_wrong(*errs(sigmas, np.zeros(12, dtype=int)))
+
+
+@pytest.mark.parametrize(
+    ("ranges", "expected"),
+    [
+        ("ooooxxxxoooo", True),
+        ("xxxxoooo", True),
+        ("oooxxxoooo", False),
+        ("ooooxxxxooo", False),
+        ("ooooooxxxxx", False),
+        ("ooooxxxxoxxxx", False),
+        ("oooossssoooo", False),
+    ],
+)
+def test_sight_was_blocked_where_it_is_free_again(ranges: str, expected: bool) -> None:
+    """Too long `x`, too short `s`."""
+    sigmas = np.array([{"x": 9.0, "s": -9.0}.get(c, 0.0) for c in ranges])
+    assert has_passed(*errs(sigmas)) is expected
+
+
+def test_ranges_that_are_too_long_are_none_the_other_way() -> None:
+    problem, point = errs(np.array([2.4, 2.6, -2.6, 0.0]))
+    assert too_long(problem, point).tolist() == [False, True, False, False]
+    # a problem in which sight is blocked does not count them as wrong
+    blocked_too = replace(problem, is_blocked=True)
+    assert outliers(problem, point).tolist() == [False, True, True, False]
+    assert outliers(blocked_too, point).tolist() == [False, False, True, False]
+    assert sigmas_off(blocked_too, point) == pytest.approx([0.0, 0.0, 2.6, 0.0])
+
+
+def test_pairs_with_many_ranges_that_are_too_long_are_blocked_where_that_explains_them() -> None:
+    """Three of 20 of one, and two of 20 of another that also has some that are too short."""
+    pair, sigmas = np.repeat([0, 1], 20), np.zeros(40)
+    sigmas[[0, 5, 9, 20, 30]], sigmas[[25, 35]] = 9.0, -9.0
+    problem, point = errs(sigmas, pair)
+    assert blocked(problem, point).tolist() == [False] * 3
+    assert blocked(replace(problem, is_blocked=True), point).tolist() == [True, False, False]
 
 
 # runs

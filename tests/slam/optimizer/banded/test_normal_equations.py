@@ -88,6 +88,24 @@ def test_cost_and_gradient_are_those_of_the_dense_residuals(robots: int) -> None
     assert np.array_equal(again[order], found)
 
 
+def test_where_sight_is_blocked_the_gradient_is_that_of_the_cost_too() -> None:
+    problem = replace(small(3), is_blocked=True)
+    poses, calibration = somewhere(problem, 2)
+    equations, threshold = Equations(problem), THRESHOLD[:3]
+    gradient = equations.gradient(point_at(problem, poses, calibration, threshold))
+    assert equations.cost(point_at(problem, poses, calibration, threshold), threshold) < (
+        Equations(small(3)).cost(point_at(problem, poses, calibration, threshold), threshold)
+    )
+    for at in ((1, 0), (5, 1), (17, 2)):
+        step, costs = np.zeros_like(poses), []
+        step[at] = 1e-6
+        for moved in (poses - step, poses + step):
+            point = point_at(problem, moved, calibration, threshold)
+            costs.append(equations.cost(point, threshold))
+        slope = (costs[1] - costs[0]) / 4e-6
+        assert gradient[equations.layout.poses[at]] == pytest.approx(slope, rel=1e-4, abs=1e-3)
+
+
 @pytest.mark.parametrize("gauge", [0, 11])
 def test_the_gauge_is_held_where_it_was(gauge: int) -> None:
     problem = replace(small(2), gauge=gauge)

@@ -64,7 +64,9 @@ def test_pairs_of_which_many_ranges_are_wrong_are_named(share: float) -> None:
     assert found.tolist() == misfit.contradicted(problem, point).tolist()
 
 
-def test_a_misfit_is_told_where_all_is_as_modelled_and_not_where_it_is_not() -> None:
+def test_a_misfit_is_told_where_all_is_as_modelled_and_not_where_it_is_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     problem = a_problem()
     equations = Equations(problem)
     point = descend(equations, Calibration.zero(problem.pairs, 3), 40)
@@ -83,6 +85,9 @@ def test_a_misfit_is_told_where_all_is_as_modelled_and_not_where_it_is_not() -> 
     assert quick_check.misfit_as_modelled(problem, point, checked, left / 1e4) is None
     worse = replace(point, link=point.link * 4)
     assert quick_check.misfit_as_modelled(problem, worse, checked, left) is None
+    # ranges of which many are outliers
+    monkeypatch.setattr(quick_check, "many_wrong", lambda *_: True)
+    assert quick_check.misfit_as_modelled(problem, point, checked, left) is None
 
 
 @pytest.mark.parametrize(("off", "is_modelled"), [(0.001, False), (-0.001, True)])
