@@ -62,9 +62,8 @@ def solve(
     equations, point, problem = explained.equations, explained.point, explained.equations.problem
     scatter = claims.scatter_of(problem, point)
     feared = Equations(raised(problem, explained.feared, point), like=equations)
-    wanted = np.array(marginals, dtype=int)
+    wanted, freed = np.array(marginals, dtype=int), still_freed(problem, point)
     joint, spread, biases = claims.covariances(feared, point, scatter, wanted)
-    freed = still_freed(problem, point)
     is_same = len(freed) == len(problem.freed) == before
     doubted = tuple(one for one in freed if not one.is_settled)
     late = FIRST_LEVEL * under(problem, doubted, after_s=np.inf)
