@@ -182,9 +182,9 @@ def test_a_mounting_asks_beyond_thirty(score: float, asks: bool) -> None:
 
 
 @pytest.mark.parametrize(
-    ("score", "robots", "asks"), [(26, 3, False), (28, 3, True), (19, 2, True)]
+    ("score", "robots", "asks"), [(53, 3, False), (55, 3, True), (37, 2, True)]
 )
-def test_all_antennas_ask_together_beyond_nine_for_each_robot(
+def test_all_antennas_ask_together_beyond_eighteen_for_each_robot(
     score: float, robots: int, asks: bool
 ) -> None:
     found = Scores(np.zeros(robots), np.full(robots, 12.0), score)
