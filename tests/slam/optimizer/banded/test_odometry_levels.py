@@ -21,6 +21,7 @@ from slam_scenes import Array
 from drslamd.slam.optimizer.banded import odometry_levels
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.misfit import (
+    FEW_OUTLIERS,
     Misfit,
     Run,
     misfit,
@@ -31,7 +32,6 @@ from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import (
     BEFORE,
-    FEW_OUTLIERS,
     FIRST_LEVEL,
     FLOOR,
     LONG_RUN,
