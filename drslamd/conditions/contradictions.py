@@ -135,9 +135,13 @@ def named_robot(number: int) -> str:
     return f"module {number - FIRST_NODE}" if is_node(number) else str(number)
 
 
+def _listed(robots: Iterable[int]) -> str:
+    return " and ".join(named_robot(robot) for robot in sorted(robots))
+
+
 def sight(robots: Iterable[int]) -> str | None:
     """One sentence on robots that are often out of sight; None while there are none."""
-    named = " and ".join(named_robot(robot) for robot in sorted(robots))
+    named = _listed(robots)
     if not named:
         return None
     return (
@@ -148,7 +152,7 @@ def sight(robots: Iterable[int]) -> str | None:
 
 def partners(robots: Iterable[int]) -> str | None:
     """One sentence on other robots to whom ranges do not fit; None while there are none."""
-    named = " and ".join(named_robot(robot) for robot in sorted(robots))
+    named = _listed(robots)
     if not named:
         return None
     return (

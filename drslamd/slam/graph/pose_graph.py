@@ -47,7 +47,7 @@ class PoseGraph:
         self._steps: Steps | None = None
         """Of the view that is being made."""
         self._waiting: list[tuple[Chain, GraphEntry]] = []
-        """What came meanwhile."""
+        """What came meanwhile: of the ticks that follow each other until the view is made."""
         self._forgets = recent_s <= RECENT_S
         """What chapters leave out is needed where times are recent for longer than usual."""
 

@@ -167,8 +167,9 @@ class Question:
         delta: float,
     ) -> None:
         """Fill in what some of the cases cost, all of them at once."""
-        a = self.a.repaired({cases[place].a for place in places})
-        b = self.b.repaired({cases[place].b for place in places})
+        # in an order that is the same in every process
+        a = self.a.repaired(dict.fromkeys(cases[place].a for place in places))
+        b = self.b.repaired(dict.fromkeys(cases[place].b for place in places))
         possible = {}
         for place in places:
             a_poses, b_poses = a.get(cases[place].a), b.get(cases[place].b)
