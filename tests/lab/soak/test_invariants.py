@@ -34,6 +34,18 @@ def test_a_datagram_that_no_counter_knows_is_seen() -> None:
         team.run(5.0)
 
 
+def test_a_robot_that_runs_is_not_switched_on_a_second_time() -> None:
+    """Two faults of a mixture may each end with a start of the same robot."""
+    team, _ = bench()
+    team.run(1.0)
+    first = team.members[0]
+    team.switch_on(0)
+    assert team.members[0] is first
+    team.kill(first)
+    team.switch_on(0)
+    assert team.members[0] is not first
+
+
 def test_a_container_beyond_its_bound_is_seen() -> None:
     team, invariants = bench()
     team.run(1.0)

@@ -61,11 +61,13 @@ class Bench(Simulator):
     def disk(self, robot: int) -> Disk:
         return self._disks[robot]
 
-    def switch_on(self, robot: int) -> Member:
-        """A new start of a robot, with what its disk still says."""
+    def switch_on(self, robot: int) -> None:
+        """A new start of a robot, with what its disk still says; one that runs goes on running."""
+        if robot in self.members and self.members[robot].running:
+            return
         self.forget_ended()
         self.seen[robot] = deque(maxlen=REMEMBERED)
-        return self._begin(self.hardware[robot], self._disks[robot])
+        self._begin(self.hardware[robot], self._disks[robot])
 
     def double(self, robot: int) -> Member:
         """Another robot, with a copy of the disk of this one; it is none of `members`."""
