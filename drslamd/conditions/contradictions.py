@@ -12,7 +12,8 @@ from collections.abc import Iterable
 from drslamd.conventions import FIRST_NODE, is_node
 from drslamd.slam.doubt import Doubt, Reason
 from drslamd.slam.odometry.mounting import Fault, Repair
-from drslamd.slam.relative_pose.mounting_search import MountingSearch, is_learned
+from drslamd.slam.relative_pose.mounting_search import MountingSearch
+from drslamd.slam.relative_pose.what_if import is_learned
 
 CHECK = {
     Fault.MIRRORED: (

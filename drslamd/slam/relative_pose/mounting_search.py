@@ -19,11 +19,19 @@ import numpy as np
 
 from drslamd.conventions import SECOND_US
 from drslamd.slam.chi_squared import evidence
-from drslamd.slam.odometry.mounting import LEARNED, Fault
 from drslamd.slam.relative_pose import what_if
 from drslamd.slam.relative_pose.estimate import PairNoise, Verdict
 from drslamd.slam.relative_pose.range_fit import POOR_FIT
-from drslamd.slam.relative_pose.what_if import CASES, MIRROR, Case
+from drslamd.slam.relative_pose.what_if import (
+    BACKWARDS,
+    CASES,
+    MIRROR,
+    OUTPOSTS,
+    Case,
+    is_curve,
+    is_learned,
+    is_like,
+)
 from drslamd.slam.se2 import Array
 
 RECENT = 10
@@ -34,6 +42,10 @@ MOST = 7
 """Where so many do, no new closure is believed."""
 APART_US = 4 * SECOND_US
 """Between two windows that are asked; a window is up to a minute long."""
+MOST_SPARED = 4
+"""So many times as long is waited at most, twice as long each time, while one window has confirmed
+the pair and nothing disagrees. An answer then stands for those that were spared: windows that are
+`APART_US` apart share nearly all of their data."""
 EXCLUDED = 20.0
 """By how much chi-squared of the newest three windows must be worse where wheels run backwards. Of
 fifteen teams all are confirmed after 12 to 44 s (median 20 s), and of forty with wheels that run
@@ -72,23 +84,10 @@ SURE_FIT = 0.45
 """As `FITS`, of such a window: one with a burst of wrong ranges had 11 for the mirror image."""
 SLIGHTLY = -2.0
 """By how much a track, a scale or a curve may seem better in such a window: chance."""
+BY_CHANCE = 4.0
+"""Likewise the best of those that are asked first, for the others to be spared, once a window has
+confirmed the pair: two sigmas of the one number in which it differs."""
 _SAID = (Verdict.UNIQUE, Verdict.AMBIGUOUS, Verdict.POOR_FIT)
-
-
-def is_learned(case: Case) -> bool:
-    """Are these mistakes that module 3 learns?"""
-    return all(repair.fault in (Fault.NONE, *LEARNED) for repair in case)
-
-
-def is_curve(case: Case) -> bool:
-    """Is a wheel of one of the robots larger than the other?"""
-    return Fault.CURVE in (case.a.fault, case.b.fault)
-
-
-BACKWARDS = tuple(
-    place for place, case in enumerate(CASES) if place and not (is_learned(case) or is_curve(case))
-)
-"""Places of the cases of wheels that run backwards."""
 
 
 class _Answer(NamedTuple):
@@ -116,6 +115,7 @@ class MountingSearch:
         self._asked_at: int | None = None
         self._asked_quickly_at: int | None = None
         self._is_quick = False
+        self._most_spared = self._stands_for = 1
         self._recent: deque[float] = deque(maxlen=STEADY - 1)
         self._worst = 0.0
         """Evidence against wheels that run backwards: of late, and the least ever."""
@@ -134,7 +134,7 @@ class MountingSearch:
     def asked_first(self) -> Sequence[int]:
         """The places of those that may spare the others; none where windows disagree."""
         spares = self.found is None and self.poor < MANY
-        return what_if.OUTPOSTS if spares else ()
+        return OUTPOSTS if spares else ()
 
     @property
     def poor(self) -> int:
@@ -160,8 +160,10 @@ class MountingSearch:
         return self._is_due(utime, awaits) or self._is_quickly_due(utime, awaits)
 
     def _is_due(self, utime: int, awaits: bool) -> bool:
-        is_late = self._asked_at is None or utime - self._asked_at >= APART_US
-        is_doubtful = self.poor >= MANY or awaits or self.is_provisional
+        is_calm = self.poor < MANY and not awaits
+        apart_us = APART_US * (self._most_spared if is_calm else 1)
+        is_late = self._asked_at is None or utime - self._asked_at >= apart_us
+        is_doubtful = self.is_provisional or not is_calm
         is_open = self.found is None and not self._is_final and is_doubtful
         is_vague = self.found is not None and is_learned(self.found) and self.disagrees
         return is_late and (is_open or is_vague)
@@ -185,6 +187,8 @@ class MountingSearch:
         self._is_quick = not self._is_due(utime, awaits)
         self._asked_quickly_at = utime
         if not self._is_quick:
+            spans = 1 if self._asked_at is None else (utime - self._asked_at) // APART_US
+            self._stands_for = max(1, min(spans, self._most_spared))
             self._asked_at = utime
 
     @property
@@ -201,7 +205,8 @@ class MountingSearch:
         drove less, m."""
         if self._is_quick:
             return partial(_asked_quickly, question, noise, delta, self._enough)
-        return partial(_asked, question, self.cases, noise, delta, self.asked_first)
+        chance = BY_CHANCE if self.is_provisional else 0.0
+        return partial(question.answer, self.cases, noise, delta, self.asked_first, chance)
 
     def on_costs(self, costs: Array, measurements: int, is_mirror_told: bool) -> bool:
         """`what_if.Question.costs` of a window are known. Is another mounting believed than before?
@@ -218,7 +223,8 @@ class MountingSearch:
             self._worst = min(self._worst, found)
         if self._is_quick:
             return False
-        self._answers.append(_Answer(costs, measurements - 3))
+        self._answers.extend(self._stands_for * [_Answer(costs, measurements - 3)])
+        self._most_spared = min(2 * self._most_spared, MOST_SPARED) if self.is_provisional else 1
         if self.found is not None:
             return self._refine(self.found)
         if self.is_provisional and costs.min() <= costs[0] - EXCLUDED:
@@ -294,25 +300,20 @@ def against_backwards(chi2: Array, freedom: int) -> float:
     return least if best <= SURE_FIT * freedom else min(least, 0.0)
 
 
-def _asked(
-    question: what_if.Question,
-    cases: Sequence[Case],
-    noise: PairNoise,
-    delta: float,
-    first: Sequence[int],
-) -> tuple[Array, float]:
-    return question.costs(cases, noise, delta, first), question.way_m
-
-
 def _asked_quickly(
     question: what_if.Question, noise: PairNoise, delta: float, enough: float
 ) -> tuple[Array, float]:
-    """All cases only where there is enough evidence against wheels that run backwards."""
-    places = (0, *BACKWARDS)
+    """Of the cases so many as it takes to know whether this window alone confirms the pair."""
     costs = np.full(len(CASES), np.inf)
-    costs[list(places)] = question.costs([CASES[place] for place in places], noise, delta)
+
+    def ask(places: Sequence[int]) -> None:
+        costs[list(places)] = question.costs([CASES[place] for place in places], noise, delta)
+
+    ask((0, *BACKWARDS))
     if against_backwards(costs, len(question.window) - 3) >= enough:
-        costs = question.costs(CASES, noise, delta, what_if.OUTPOSTS)
+        ask(what_if.BESIDE)
+        if SLIGHTLY <= costs.min() - costs[0] < 0:
+            ask(what_if.BEYOND)
     return costs, question.way_m
 
 
@@ -339,12 +340,6 @@ def winner(chi2: Array, freedom: float) -> tuple[Case | None, bool]:
         # sight that is blocked looks like a curve, and hardly like wheels that run backwards
         fits = level <= FITS or not is_curve(case)
         return (case, True) if fits and worse[0] >= WRONG and others >= CLEAR else (None, False)
-    unlike = min(by for by, other in zip(worse, CASES, strict=True) if not _is_like(other, case))
+    unlike = min(by for by, other in zip(worse, CASES, strict=True) if not is_like(other, case))
     is_start = level <= FITS and worse[0] >= BETTER and unlike >= UNLIKE
     return (case, bool(others >= UNLIKE)) if is_start else (None, False)
-
-
-def _is_like(one: Case, other: Case) -> bool:
-    """Are the same robots wrong, by tracks or scales?"""
-    whose = [[repair.fault is not Fault.NONE for repair in case] for case in (one, other)]
-    return is_learned(one) and is_learned(other) and whose[0] == whose[1]

@@ -57,6 +57,8 @@ EXCLUDED_CHI2 = 20.0
 """A minimum this much worse than the best (2 log-likelihood) is no longer carried."""
 MOST_AT_ONCE = 16
 """Windows; of more, what is computed of them no longer stays in the caches."""
+MOST_CASES = 48
+"""Likewise where only the best of each is held against the full noise."""
 NEWEST = 3
 """So many last measurements may not lie off the rest: near the end of a window a burst and
 odometry that has just failed look alike."""
@@ -107,8 +109,8 @@ def least_chi2(windows: Sequence[Window], noises: Sequence[PairNoise], delta: fl
     Infinite where nothing fits.
     """
     found = np.full(len(windows), np.inf)
-    for first in range(0, len(windows), MOST_AT_ONCE):
-        at_once = slice(first, first + MOST_AT_ONCE)
+    for first in range(0, len(windows), MOST_CASES):
+        at_once = slice(first, first + MOST_CASES)
         stack = WindowStack.of(windows[at_once])
         fit = RangeFit.of(stack)
         descent = _descent(stack, fit, noises[at_once], delta)

@@ -25,6 +25,7 @@ from drslamd.slam.odometry.mounting import (
     SCALES,
     SIDES,
     TRACKS,
+    Fault,
     Repair,
 )
 from drslamd.slam.relative_pose import solver
@@ -73,6 +74,32 @@ def _is_outpost(case: Case) -> bool:
 OUTPOSTS = tuple(place for place, case in enumerate(CASES) if _is_outpost(case))
 """Places of the cases that a window is asked first. Where they find the configuration best, the
 others change no verdict on 120 teams, healthy and faulty, and half of the time is saved."""
+
+
+def is_learned(case: Case) -> bool:
+    """Are these mistakes that module 3 learns?"""
+    return all(repair.fault in (Fault.NONE, *LEARNED) for repair in case)
+
+
+def is_curve(case: Case) -> bool:
+    """Is a wheel of one of the robots larger than the other?"""
+    return Fault.CURVE in (case.a.fault, case.b.fault)
+
+
+def is_like(one: Case, other: Case) -> bool:
+    """Are the same robots wrong, by tracks or scales?"""
+    whose = [[repair.fault is not Fault.NONE for repair in case] for case in (one, other)]
+    return is_learned(one) and is_learned(other) and whose[0] == whose[1]
+
+
+BACKWARDS = tuple(
+    place for place, case in enumerate(CASES) if place and not (is_learned(case) or is_curve(case))
+)
+"""Places of the cases of wheels that run backwards."""
+BESIDE = tuple(place for place in OUTPOSTS if place and place not in BACKWARDS)
+"""Those of the other `OUTPOSTS`."""
+BEYOND = tuple(place for place in range(len(CASES)) if place not in OUTPOSTS)
+"""Those of all that are none."""
 
 
 def variants(found: Case) -> tuple[Case, ...]:
@@ -142,18 +169,34 @@ class Question:
         ways = (np.diff(stretch.poses[:, :2], axis=0) for stretch in (self.a, self.b))
         return min(float(np.nansum(np.hypot(*way.T))) for way in ways)
 
+    def answer(
+        self,
+        cases: Sequence[Case],
+        noise: PairNoise,
+        delta: float,
+        first: Sequence[int] = (),
+        chance: float = 0.0,
+    ) -> tuple[Array, float]:
+        """`costs`, and `way_m`."""
+        return self.costs(cases, noise, delta, first, chance), self.way_m
+
     def costs(
-        self, cases: Sequence[Case], noise: PairNoise, delta: float, first: Sequence[int] = ()
+        self,
+        cases: Sequence[Case],
+        noise: PairNoise,
+        delta: float,
+        first: Sequence[int] = (),
+        chance: float = 0.0,
     ) -> Array:
         """(cases,) chi-squared of the best pose under each of them, infinite where none fits.
 
         Args:
-            first: places in `cases`; where place 0 is the best of these, the others are not asked,
-                and as good as infinite.
+            first: places in `cases`; where none of these is better than place 0 by more than
+                chance, the others are not asked, and as good as infinite.
         """
         found = np.full(len(cases), np.inf)
         self._ask(found, cases, first or range(len(cases)), noise, delta)
-        if first and found.argmin() != 0:
+        if first and found.min() < found[0] - chance:
             others = [place for place in range(len(cases)) if place not in set(first)]
             self._ask(found, cases, others, noise, delta)
         return found

@@ -16,8 +16,8 @@ from drslamd.slam.odometry.mounting import COARSE_SCALES, CURVES, MIRRORED, SCAL
 from drslamd.slam.relative_pose.estimate import Verdict
 from drslamd.slam.relative_pose.mounting_search import (
     APART_US,
-    BACKWARDS,
     BETTER,
+    BY_CHANCE,
     CLEAR,
     EXCLUDED,
     FEWEST_ASKED,
@@ -26,10 +26,12 @@ from drslamd.slam.relative_pose.mounting_search import (
     MANY,
     MOST,
     MOST_ASKED,
+    MOST_SPARED,
     MUCH,
     QUICKLY_US,
     RECENT,
     SHARED,
+    SLIGHTLY,
     STEADILY,
     STEADY,
     SURE_FIT,
@@ -39,12 +41,19 @@ from drslamd.slam.relative_pose.mounting_search import (
     MountingSearch,
     against_backwards,
     is_as_configured,
-    is_curve,
-    is_learned,
     winner,
 )
 from drslamd.slam.relative_pose.range_fit import POOR_FIT
-from drslamd.slam.relative_pose.what_if import CASES, MIRROR, Case, variants
+from drslamd.slam.relative_pose.what_if import (
+    BACKWARDS,
+    CASES,
+    MIRROR,
+    OUTPOSTS,
+    Case,
+    is_curve,
+    is_learned,
+    variants,
+)
 
 FAR = 1e4
 """Chi-squared of what does not fit at all."""
@@ -547,6 +556,55 @@ def test_what_several_windows_say_finds_a_mistake_after_that() -> None:
     assert search.found == TRACK
 
 
+def calm() -> tuple[MountingSearch, int]:
+    """A window has confirmed it, and each that was asked since, until it is asked no less often;
+    and when the last of these was asked."""
+    search, utime, apart = sure(), APART_US, 1
+    while apart < MOST_SPARED:
+        # wheels that run backwards are hardly excluded by it
+        ask(search, {AS_IT_IS: GOOD, LEFT: GOOD + LITTLE})
+        apart = min(2 * apart, MOST_SPARED)
+        assert not search.is_due(utime + apart * APART_US - 1, False)
+        utime += apart * APART_US
+        assert search.is_due(utime, False)
+        search.begin(utime, False)
+    ask(search, {AS_IT_IS: GOOD, LEFT: GOOD + LITTLE})
+    return search, utime
+
+
+def test_who_was_confirmed_by_one_window_is_asked_less_often_while_nothing_disagrees() -> None:
+    search, utime = calm()
+    assert (search.is_confirmed, search.is_provisional) == (True, True)
+    assert not search.is_due(utime + MOST_SPARED * APART_US - 1, False)
+    assert search.is_due(utime + MOST_SPARED * APART_US, False)
+
+
+def test_and_as_often_as_before_as_soon_as_something_does() -> None:
+    search, utime = calm()
+    assert not search.is_due(utime + APART_US, False)
+    assert search.is_due(utime + APART_US, True)
+    for _ in range(MANY):
+        search.on_verdict(Verdict.POOR_FIT)
+    assert search.is_due(utime + APART_US, False)
+    unsure, utime = calm()
+    ask(unsure, {AS_IT_IS: GOOD + EXCLUDED + LITTLE, TRACK: GOOD})
+    assert not unsure.is_provisional
+    assert unsure.is_due(utime + APART_US, True)
+
+
+@pytest.mark.parametrize(("waited", "more"), [(1, 4), (2, 3), (3, 2), (4, 1), (9, 1)])
+def test_an_answer_stands_for_those_that_were_spared(waited: int, more: int) -> None:
+    """So who looks the same in a mirror is believed after as long as with all of them."""
+    search, utime = calm()
+    assert 1 + 2 + MOST_SPARED + 5 == MOST_ASKED
+    for apart in (waited, *[1] * more):
+        assert search.is_provisional
+        utime += apart * APART_US
+        search.begin(utime, True)
+        ask(search, {AS_IT_IS: GOOD, LEFT: GOOD + LITTLE})
+    assert (search.is_confirmed, search.is_provisional) == (True, False)
+
+
 class Asked:
     """A window that is asked: what each case costs, and which were asked."""
 
@@ -556,24 +614,48 @@ class Asked:
     def __init__(self, known: dict[Case, float]) -> None:
         self.known, self.asked = known, list[Case]()
 
-    def costs(self, cases: Any, noise: Any, delta: float, first: Any = ()) -> Array:
+    def costs(self, cases: Any, noise: Any, delta: float) -> Array:
         self.asked += cases
         return np.array([self.known.get(case, FAR) for case in cases])
 
+    def answer(self, cases: Any, noise: Any, delta: float, first: Any, chance: float) -> Any:
+        return first, chance
 
-@pytest.mark.parametrize(("mirrored", "asked"), [(BEST + 1, 6), (FAR, 6 + len(CASES))])
-def test_a_quick_question_is_whole_only_where_wheels_that_run_backwards_are_excluded(
-    mirrored: float, asked: int
+
+@pytest.mark.parametrize(
+    ("known", "asked"),
+    [
+        ({MIRROR: BEST + 1}, 1 + len(BACKWARDS)),
+        ({}, len(OUTPOSTS)),
+        ({TRACK: BEST + SLIGHTLY - LITTLE}, len(OUTPOSTS)),
+        ({TRACK: BEST + SLIGHTLY + LITTLE}, len(CASES)),
+        ({TRACK: BEST - LITTLE}, len(CASES)),
+    ],
+)
+def test_a_quick_question_asks_no_more_than_it_takes_to_know_whether_a_window_is_sure(
+    known: dict[Case, float], asked: int
 ) -> None:
-    search, question = MountingSearch(), Asked({AS_IT_IS: BEST, MIRROR: mirrored, TRACK: 1.0})
+    search, question = MountingSearch(), Asked({AS_IT_IS: BEST, **known})
     search.begin(0, True)
     search.begin(QUICKLY_US, True)
     found, way_m = search.question(cast(Any, question), cast(Any, None), 0.1)()
     assert (len(question.asked), way_m) == (asked, 5.0)
+    assert len(set(question.asked)) == asked
+    is_better = bool(known) and min(known.values()) < BEST + SLIGHTLY
     search.on_costs(found, FREE + 3, True)
-    assert not search.is_confirmed
+    assert search.is_confirmed is (MIRROR not in known and not is_better)
     # what was asked quickly decides nothing else
     assert not any(search.on_costs(costs({LEFT: FIT}), FREE, True) for _ in range(FEWEST_ASKED))
+
+
+@pytest.mark.parametrize(("is_sure", "chance"), [(False, 0.0), (True, BY_CHANCE)])
+def test_chance_spares_cases_only_once_a_window_has_confirmed_the_pair(
+    is_sure: bool, chance: float
+) -> None:
+    search = sure() if is_sure else MountingSearch()
+    search.begin(2 * APART_US, True)
+    question = cast(Any, Asked({}))
+    assert search.question(question, cast(Any, None), 0.1)() == (OUTPOSTS, chance)
 
 
 @pytest.mark.parametrize(

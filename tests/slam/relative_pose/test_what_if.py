@@ -189,6 +189,16 @@ def test_who_is_as_configured_is_asked_a_part_of_the_cases_only() -> None:
     assert costs[asked] == pytest.approx(seen().question.costs(CASES, PAIR_NOISE, DELTA)[asked])
 
 
+@pytest.mark.parametrize(("chance", "is_part"), [(-0.1, False), (0.1, True)])
+def test_so_is_who_is_otherwise_by_chance_only(chance: float, is_part: bool) -> None:
+    question = seen(b=TRACKS[1]).question
+    costs = question.costs(CASES, PAIR_NOISE, DELTA)
+    gain = costs[0] - costs[list(OUTPOSTS)].min()
+    assert gain > 20
+    asked = np.isfinite(question.costs(CASES, PAIR_NOISE, DELTA, OUTPOSTS, gain + chance))
+    assert np.flatnonzero(asked).tolist() == (list(OUTPOSTS) if is_part else [*range(len(CASES))])
+
+
 @pytest.mark.parametrize("true", [Case(b=SCALES[0]), Case(b=SCALES[-1]), Case(a=TRACKS[1])])
 def test_where_one_of_these_is_better_all_cases_are_asked(true: Case) -> None:
     costs = seen(*true).question.costs(CASES, PAIR_NOISE, DELTA, first=OUTPOSTS)
