@@ -29,6 +29,37 @@ class Finished:
 SWITCH_S = 0.0005
 """How long the thread computes on while the loop waits for the interpreter. Python's own 5 ms, for
 each of several waits of one event, would make a pose too old to steer by."""
+WHOLE_LOOK_S = 3600.0
+"""Between two looks for garbage through all that there is."""
+
+
+class GarbageLooks:
+    """What a look for garbage found in use is not looked through again for an hour.
+
+    All of it takes 30 to 90 ms with fifty robots, every few seconds, and meanwhile nobody reads
+    sensors; what is garbage is nearly always known by counting references.
+    """
+
+    def __init__(self) -> None:
+        self._whole_at = time.monotonic()
+
+    def begin(self) -> None:
+        """What is there by now stays."""
+        gc.freeze()
+        gc.callbacks.append(self._on_look)
+
+    def end(self) -> None:
+        gc.callbacks.remove(self._on_look)
+        gc.unfreeze()
+
+    def _on_look(self, phase: str, info: dict[str, int]) -> None:
+        if info["generation"] < 2:
+            return
+        if phase == "stop":
+            gc.freeze()
+        elif time.monotonic() >= self._whole_at + WHOLE_LOOK_S:
+            self._whole_at = time.monotonic()
+            gc.unfreeze()
 
 
 class Worker:
@@ -50,13 +81,13 @@ class Worker:
         self._queue: queue.SimpleQueue[tuple[Callable[[], Any], Callable[[Finished], None]] | None]
         self._queue = queue.SimpleQueue()
         self._loop: asyncio.AbstractEventLoop | None = None
+        self._looks = GarbageLooks()
 
     def start(self) -> None:
         """Begin to work for the running loop."""
         self._loop = asyncio.get_running_loop()
         sys.setswitchinterval(SWITCH_S)
-        # what is there by now stays: each look for garbage through all of it would take 40 ms
-        gc.freeze()
+        self._looks.begin()
         threading.Thread(target=self._work, name="worker", daemon=True).start()
 
     def submit(self, run: Callable[[], Any], done: Callable[[Finished], None]) -> None:
@@ -85,7 +116,7 @@ class Worker:
     def stop(self) -> None:
         """The thread ends after what it has been given; nobody waits for that."""
         self._queue.put(None)
-        gc.unfreeze()
+        self._looks.end()
 
     def _work(self) -> None:
         assert self._loop is not None

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import pytest
 
-from drslamd.io.worker import Finished, Worker
+from drslamd.io.worker import WHOLE_LOOK_S, Finished, GarbageLooks, Worker
 
 
 def test_the_worker_hands_back_results_and_exceptions_in_order() -> None:
@@ -170,8 +170,7 @@ def test_while_it_works_garbage_is_not_looked_for_in_what_was_there_before() -> 
 
     gc.disable()  # or it might be found before
     try:
-        left = Ring()
-        left.itself = left
+        left = ring()
         is_there = weakref.ref(left)
         del left
         with_worker(lambda worker, done: worker.submit(look, done), 1)
@@ -180,6 +179,36 @@ def test_while_it_works_garbage_is_not_looked_for_in_what_was_there_before() -> 
     assert during == [True]
     gc.collect()
     assert is_there() is None
+
+
+def test_what_a_look_found_in_use_is_looked_through_again_after_an_hour(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = [1000.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    looks = GarbageLooks()
+    gc.disable()
+    looks.begin()
+    try:
+        used = ring()
+        gc.collect()
+        was_used, never_used = weakref.ref(used), weakref.ref(ring())
+        del used
+        for passed, is_looked_through in ((0.0, False), (WHOLE_LOOK_S - 1, False), (1.0, True)):
+            now[0] += passed
+            gc.collect()
+            assert never_used() is None
+            assert (was_used() is None) is is_looked_through
+    finally:
+        looks.end()
+        gc.enable()
+    assert gc.get_freeze_count() == 0
+
+
+def ring() -> Ring:
+    made = Ring()
+    made.itself = made
+    return made
 
 
 class Ring:
