@@ -8,6 +8,7 @@ the nearest one that stayed.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from drslamd.conventions import GRID_HZ
 from drslamd.slam import se2
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.tables import KeyframeTable
+from drslamd.slam.graph.thinning.rounding import as_digested
 from drslamd.slam.graph.thinning.time_cells import Kind, Stretch, stretches, with_edge
 from drslamd.slam.graph.timed_rows import NEVER
 from drslamd.slam.odometry.gyro_noise import GyroNoise
@@ -82,6 +84,13 @@ class ChainPart:
     near: Index
     steps: Array
     links: ChainLinks
+
+    @cached_property
+    def digested(self) -> tuple[bytes, ...]:
+        """Keyframes that stay, and the columns of links that a digest takes."""
+        links = self.links
+        columns = self.held.rows[self.stays], links.measured, links.sums, links.by_turn
+        return tuple(map(as_digested, columns))
 
 
 def thinned(
@@ -221,6 +230,11 @@ class ChainView:
             np.concatenate([part.links.sums for part in self.parts]),
             np.concatenate([part.links.by_turn for part in self.parts]),
         )
+
+    def digested(self) -> bytes:
+        """All of it, as a digest takes it; what is old is remembered."""
+        columns = zip(*(part.digested for part in self.parts), strict=True)
+        return b"".join(part for column in columns for part in column)
 
     @property
     def recent_n(self) -> int:

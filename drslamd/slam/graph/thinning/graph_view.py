@@ -16,11 +16,11 @@ from drslamd.slam.graph.tables import KeyframeTable
 from drslamd.slam.graph.thinning.chain_view import ChainThinning, ChainView
 from drslamd.slam.graph.thinning.joints import Joint, joints_of
 from drslamd.slam.graph.thinning.pair_view import PairThinning, PairView
-from drslamd.slam.graph.thinning.rounding import as_digested
 from drslamd.slam.graph.thinning.thinned_pairs import (
     PairPart,
     Unthinned,
     chains_of,
+    digested,
     thinned_pairs,
 )
 from drslamd.slam.graph.thinning.time_cells import ages, recent_s
@@ -60,12 +60,10 @@ class GraphView:
         for robot, view in sorted(self.chains.items()):
             if robot in robots and not is_node(robot):
                 h.update(repr((view.chain, view.model.numbers())).encode())
-                links = view.links
-                for values in (view.keyframes.rows, links.measured, links.sums, links.by_turn):
-                    h.update(as_digested(values))
+                h.update(view.digested())
         for pair in self.pairs:
             if {pair.a.robot, pair.b.robot} <= robots:
-                h.update(b"".join(part.digest for part in pair.parts))
+                h.update(digested(pair.parts))
         return int.from_bytes(h.digest(), "big", signed=True)
 
 
@@ -114,7 +112,9 @@ class Thinning:
             thinning = before.get(data.chain) or ChainThinning()
             self._chains[data.chain] = thinning
             views[robot] = thinning.view(data, age[robot], recent)
-            yield 1 + thinning.made
+            # (remembered: so a digest of the whole takes no long)
+            views[robot].digested()
+            yield 2 + thinning.made
         before_pairs, self._pairs = self._pairs, {}
         begun: list[Begun] = []
         for pair in pairs:
@@ -133,7 +133,8 @@ class Thinning:
             made = [finish(list(islice(parts, len(said)))) for said, finish in some]
             of_pairs += made
             joints += joints_of(views, made)
-            yield len(thinned) / 2
+            digested(thinned)
+            yield 0.6 * len(thinned)
         shifts = {robot: shift for table in teams for robot, shift in table.items()}
         return GraphView(views, of_pairs, dict.fromkeys(nodes, 0.0) | shifts, joints)
 

@@ -8,7 +8,7 @@ others beside it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import blake2b
@@ -60,6 +60,11 @@ class PairPart:
         for values in (self.ranges.rows, moves, self.closures.rows):
             h.update(as_digested(values))
         return h.digest()
+
+
+def digested(parts: Iterable[PairPart]) -> bytes:
+    """All that they hold; it is remembered of each."""
+    return b"".join(part.digest for part in parts)
 
 
 NOTHING = PairPart(

@@ -16,6 +16,7 @@ from drslamd.slam.graph import team_frame
 from drslamd.slam.graph.chapters import PER_ENTRY
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.graph.thinning import chain_view, thinned_pairs
 from drslamd.slam.graph.thinning.graph_view import GraphView
 from drslamd.slam.optimizer.banded.banded_optimizer import build_problem
 
@@ -367,3 +368,12 @@ def test_who_needs_a_view_that_is_being_made_gets_one_of_all_that_is_held() -> N
     sliced.insert(*entries[-1])
     assert differences(parts_of(sliced.view), parts_of(whole.view)) == []
     assert differences(parts_of(sliced.frozen().view), parts_of(whole.view)) == []
+
+
+def test_all_that_a_digest_takes_long_for_is_done_while_the_view_is_made(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    view = graph_of(logs(3, 900, DRIVES)).view
+    for module in (chain_view, thinned_pairs):
+        monkeypatch.setattr(module, "as_digested", lambda values: pytest.fail("in one go"))
+    assert view.digest({0, 1, 2}) != view.digest({0, 1})
