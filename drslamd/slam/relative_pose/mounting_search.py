@@ -44,8 +44,8 @@ APART_US = 4 * SECOND_US
 """Between two windows that are asked; a window is up to a minute long."""
 MOST_SPARED = 4
 """So many times as long is waited at most, twice as long each time, while one window has confirmed
-the pair and nothing disagrees. An answer then stands for those that were spared: windows that are
-`APART_US` apart share nearly all of their data."""
+the pair and nothing seems better but by chance. An answer then stands for those that were spared:
+windows that are `APART_US` apart share nearly all of their data."""
 EXCLUDED = 20.0
 """By how much chi-squared of the newest three windows must be worse where wheels run backwards. Of
 fifteen teams all are confirmed after 12 to 44 s (median 20 s), and of forty with wheels that run
@@ -224,7 +224,8 @@ class MountingSearch:
         if self._is_quick:
             return False
         self._answers.extend(self._stands_for * [_Answer(costs, measurements - 3)])
-        self._most_spared = min(2 * self._most_spared, MOST_SPARED) if self.is_provisional else 1
+        is_calm = self.is_provisional and bool(costs.min() >= costs[0] - BY_CHANCE)
+        self._most_spared = min(2 * self._most_spared, MOST_SPARED) if is_calm else 1
         if self.found is not None:
             return self._refine(self.found)
         if self.is_provisional and costs.min() <= costs[0] - EXCLUDED:

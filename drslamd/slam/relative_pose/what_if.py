@@ -191,14 +191,18 @@ class Question:
         """(cases,) chi-squared of the best pose under each of them, infinite where none fits.
 
         Args:
-            first: places in `cases`; where none of these is better than place 0 by more than
-                chance, the others are not asked, and as good as infinite.
+            first: places in `cases`; where none of these is better than place 0, the others are
+                not asked, and as good as infinite; where one is, but by no more than `chance`, they
+                are as good as place 0.
         """
         found = np.full(len(cases), np.inf)
         self._ask(found, cases, first or range(len(cases)), noise, delta)
-        if first and found.min() < found[0] - chance:
+        if first and found.min() < found[0]:
             others = [place for place in range(len(cases)) if place not in set(first)]
-            self._ask(found, cases, others, noise, delta)
+            if found.min() < found[0] - chance:
+                self._ask(found, cases, others, noise, delta)
+            else:
+                found[others] = found[0]
         return found
 
     def _ask(

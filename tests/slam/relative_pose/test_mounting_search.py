@@ -654,8 +654,8 @@ def test_chance_spares_cases_only_once_a_window_has_confirmed_the_pair(
 ) -> None:
     search = sure() if is_sure else MountingSearch()
     search.begin(2 * APART_US, True)
-    question = cast(Any, Asked({}))
-    assert search.question(question, cast(Any, None), 0.1)() == (OUTPOSTS, chance)
+    told: Any = search.question(cast(Any, Asked({})), cast(Any, None), 0.1)()
+    assert told == (OUTPOSTS, chance)
 
 
 @pytest.mark.parametrize(
