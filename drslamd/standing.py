@@ -191,5 +191,7 @@ class Standing:
     def _doubt(self) -> Doubt | None:
         estimate, front = self._back.estimate, self._front
         watch = Partners(front.watch.looked_at, front.watch.doubted)
-        windows = front.partners_by_windows(estimate.trajectories if estimate else ())
-        return doubt_of(self._robot, estimate, watch, windows, self._back.revisions.boldness)
+        solved = estimate.trajectories if estimate else ()
+        windows, mountings = front.partners_by_windows(solved)
+        boldness = self._back.revisions.boldness
+        return doubt_of(self._robot, estimate, watch, windows, mountings, boldness)

@@ -16,7 +16,7 @@ from drslamd.slam.consistency.pair import PairTracker
 from drslamd.slam.graph.measurements import ClosureMeasurement, GraphEntry, Keyframe
 from drslamd.slam.odometry.mounting import SIDES
 from drslamd.slam.peer_in_range import PeerInRange
-from drslamd.slam.relative_pose.what_if import Case
+from drslamd.slam.relative_pose.mistakes.what_if import Case
 
 
 class Waiting(RobotScene):

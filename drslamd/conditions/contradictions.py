@@ -12,8 +12,8 @@ from collections.abc import Iterable
 from drslamd.conventions import FIRST_NODE, is_node
 from drslamd.slam.doubt import Doubt, Reason
 from drslamd.slam.odometry.mounting import Fault, Repair
-from drslamd.slam.relative_pose.mounting_search import MountingSearch
-from drslamd.slam.relative_pose.what_if import is_learned
+from drslamd.slam.relative_pose.mistakes.mounting_search import MountingSearch
+from drslamd.slam.relative_pose.mistakes.what_if import is_learned
 
 CHECK = {
     Fault.MIRRORED: (
@@ -93,6 +93,13 @@ def doubt(found: Doubt | None) -> str | None:
         return (
             f"the pose is doubtful: most ranges with robot {named} fit no motion that wheels of "
             "both measured; look at the wheels, or drive more slowly; is sight blocked?"
+        )
+    if found.reason is Reason.MOUNTINGS:
+        named = " and ".join(map(str, found.peers))
+        return (
+            f"the pose is doubtful: ranges with robot {named} would fit better if a track width or "
+            "counts per metre were others than configured; drive on, and it is learned, or measure "
+            "them with drslamd calibrate"
         )
     if found.reason is Reason.REVISIONS:
         return (

@@ -3,9 +3,10 @@
 Witnesses: odometry that must have been worse than configured, or longer than anybody mounts it
 (module 3); ranges of the last seconds that do not fit the solution (module 3); ranges of this very
 second that do not fit where both robots are said to be (`range_watch`); windows of which most do
-not fit whatever is known of the mountings (module 1); solutions that move what earlier ones claimed
-(`revisions`). A robot that all its partners contradict is
-doubtful, and they are not; of two robots alone nobody can tell, and both are.
+not fit whatever is known of the mountings (module 1); windows that another track or scale would
+fit better, while one window alone has confirmed the pair (module 1); solutions that move what
+earlier ones claimed (`revisions`). A robot that all its partners contradict is doubtful, and they
+are not; of two robots alone nobody can tell, and both are.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ class Reason(Enum):
     REVISIONS = "revisions"
     RANGES = "ranges"
     WINDOWS = "windows"
+    MOUNTINGS = "mountings"
 
 
 class Partners(NamedTuple):
@@ -69,12 +71,14 @@ def doubt_of(
     estimate: TeamEstimate | None,
     watch: Partners = NOBODY,
     windows: Partners = NOBODY,
+    mountings: Partners = NOBODY,
     boldness: float = 1.0,
 ) -> Doubt | None:
     """What speaks against the pose of a robot; None while nothing does.
 
     Args:
-        watch: peers by their ranges of this second; windows: by those of our pairs.
+        watch: peers by their ranges of this second; windows: by those of our pairs; mountings: by
+            what these would rather have.
         boldness: see `Revisions`.
     """
     if estimate is None:
@@ -87,7 +91,12 @@ def doubt_of(
     against = {b if a == robot else a for a, b in estimate.contradicted if robot in (a, b)}
     against |= {partner for partner in partners if _is_odd(partner, estimate)}
     solved = Partners(frozenset(partners), frozenset(against))
-    witnesses = ((Reason.RANGES, solved), (Reason.RANGES, watch), (Reason.WINDOWS, windows))
+    witnesses = (
+        (Reason.RANGES, solved),
+        (Reason.RANGES, watch),
+        (Reason.WINDOWS, windows),
+        (Reason.MOUNTINGS, mountings),
+    )
     for reason, found in witnesses:
         if found.all_contradict:
             return Doubt(robot, reason, tuple(sorted(found.wrong)))

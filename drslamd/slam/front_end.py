@@ -28,8 +28,8 @@ from drslamd.slam.points.point_tracker import Sensors
 from drslamd.slam.points.points import Points
 from drslamd.slam.range_model import RangeNoise
 from drslamd.slam.range_watch import Partner, RangeWatch
-from drslamd.slam.relative_pose import what_if
 from drslamd.slam.relative_pose.estimate import PairNoise, RelativePoseEstimate
+from drslamd.slam.relative_pose.mistakes import what_if
 from drslamd.slam.relative_pose.pair_end import PairEnd
 from drslamd.slam.relative_pose.range_buffer import RANGES_FRESH_US, RangeBuffers
 from drslamd.slam.relative_pose.range_sampler import RangeSampler
@@ -274,11 +274,14 @@ class FrontEnd:
             out.append(WhatIfJob(pair, found, run))
         return out
 
-    def partners_by_windows(self, solved: Collection[int]) -> Partners:
-        """Robots of our pairs that are in a solution, and those with whom windows disagree."""
-        pairs = {robot: pair for robot, pair in self.pairs.items() if robot in solved}
-        wrong = frozenset(robot for robot, pair in pairs.items() if pair.search.disagrees)
-        return Partners(frozenset(pairs), wrong)
+    def partners_by_windows(self, solved: Collection[int]) -> tuple[Partners, Partners]:
+        """Robots of our pairs that are in a solution, and those with whom windows disagree; and
+        those with whom another track or scale fits better."""
+        searches = {robot: pair.search for robot, pair in self.pairs.items() if robot in solved}
+        seen = frozenset(searches)
+        wrong = frozenset(robot for robot in seen if searches[robot].disagrees)
+        contested = frozenset(robot for robot in seen if searches[robot].is_contested)
+        return Partners(seen, wrong), Partners(seen, contested)
 
     def places_left(
         self, neighbours: list[PeerInRange], graph: PoseGraph, utime: int

@@ -8,8 +8,8 @@ from drslamd.conditions import contradictions
 from drslamd.slam.doubt import Doubt, Reason
 from drslamd.slam.odometry.mounting import CURVES, SIDES, Fault, Repair
 from drslamd.slam.relative_pose.estimate import Verdict
-from drslamd.slam.relative_pose.mounting_search import MOST, MountingSearch
-from drslamd.slam.relative_pose.what_if import MIRROR, Case
+from drslamd.slam.relative_pose.mistakes.mounting_search import MOST, MountingSearch
+from drslamd.slam.relative_pose.mistakes.what_if import MIRROR, Case
 
 
 def found(case: Case | None, is_clear: bool = True) -> MountingSearch:
@@ -183,6 +183,15 @@ def test_windows_that_fit_no_motion_are_told_with_their_robots(
     assert sentence.startswith(start)
     assert "look at the wheels" in sentence
     assert "is sight blocked?" in sentence
+
+
+def test_windows_that_another_track_would_fit_are_told_with_what_helps() -> None:
+    sentence = contradictions.doubt(Doubt(0, Reason.MOUNTINGS, (4,)))
+    assert sentence == (
+        "the pose is doubtful: ranges with robot 4 would fit better if a track width or counts per "
+        "metre were others than configured; drive on, and it is learned, or measure them with "
+        "drslamd calibrate"
+    )
 
 
 def test_a_pose_that_was_moved_is_told_as_what_lies_behind() -> None:

@@ -18,8 +18,8 @@ from drslamd.slam.doubt import Reason
 from drslamd.slam.front_end import WhatIfJob
 from drslamd.slam.graph.estimate import MUCH_WORSE, Learned
 from drslamd.slam.odometry.mounting import SIDES
-from drslamd.slam.relative_pose.mounting_search import FEWEST_ASKED
-from drslamd.slam.relative_pose.what_if import CASES, Case
+from drslamd.slam.relative_pose.mistakes.mounting_search import FEWEST_ASKED
+from drslamd.slam.relative_pose.mistakes.what_if import CASES, Case
 
 
 def localised(level: float = 1.0, contradicted: bool = False) -> RobotScene:

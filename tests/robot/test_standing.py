@@ -16,7 +16,7 @@ from drslamd.slam.doubt import Doubt, Reason
 from drslamd.slam.graph.estimate import MUCH_WORSE, Learned, PoseNow, Trajectory
 from drslamd.slam.range_watch import RangeWatch
 from drslamd.slam.relative_pose.estimate import Verdict
-from drslamd.slam.relative_pose.mounting_search import MOST
+from drslamd.slam.relative_pose.mistakes.mounting_search import MOST
 from drslamd.slam.revisions import ALLOWED
 from drslamd.standing import Standing
 

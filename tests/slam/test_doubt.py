@@ -105,6 +105,18 @@ def test_ranges_of_this_second_are_doubt_where_none_of_them_fits(
     assert found == (None if peers is None else Doubt(0, Reason.RANGES, peers))
 
 
+def test_windows_that_fit_no_motion_are_named_before_those_that_another_track_would_fit() -> None:
+    wrong = Partners(frozenset({1}), frozenset({1}))
+    found = doubt_of(0, team(), windows=wrong, mountings=wrong)
+    assert found == Doubt(0, Reason.WINDOWS, (1,))
+    assert doubt_of(0, team(), mountings=wrong) == Doubt(0, Reason.MOUNTINGS, (1,))
+
+
+def test_one_pair_that_is_as_configured_speaks_for_a_robot() -> None:
+    mountings = Partners(frozenset({1, 2}), frozenset({1}))
+    assert doubt_of(0, team(), mountings=mountings) is None
+
+
 def test_partners_are_doubted_by_what_was_solved_and_by_what_is_ranged_now() -> None:
     assert doubted_partners(0, team((0, 2), (1, 2)), frozenset({5})) == {2, 5}
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from front_scenes import SECONDS, FrontScene
+from mounting_costs import AS_IT_IS, TRACK, costs
 from pair_scenes import tracker
 from slam_scenes import product
 
@@ -16,8 +17,8 @@ from drslamd.slam.front_end import WhatIfJob
 from drslamd.slam.graph.estimate import Learned, TeamEstimate, Trajectory
 from drslamd.slam.odometry.mounting import TRACKS
 from drslamd.slam.relative_pose.estimate import Verdict
-from drslamd.slam.relative_pose.mounting_search import APART_US, MANY, MOST
-from drslamd.slam.relative_pose.what_if import CASES, Case, variants
+from drslamd.slam.relative_pose.mistakes.mounting_search import APART_US, MANY, MOST
+from drslamd.slam.relative_pose.mistakes.what_if import CASES, Case, variants
 
 
 def disagreeing(extra: str = "", windows: int = MANY) -> FrontScene:
@@ -92,15 +93,29 @@ def test_a_pair_that_waits_to_be_believed_is_asked_too() -> None:
 def test_partners_are_those_of_our_pairs_that_are_solved_and_windows_name_who_is_wrong() -> None:
     """Windows with robot 1 fit but for one too few, with 2 and 4 they do not; 4 is not solved."""
     front = FrontScene().front
-    assert front.partners_by_windows({0, 1}) == NOBODY
+    assert front.partners_by_windows({0, 1}) == (NOBODY, NOBODY)
     for robot, poor in ((1, MOST - 1), (2, MOST), (4, MOST)):
         front.pairs[robot] = tracker(Chain(robot, 1), AGREEMENT)
         for _ in range(poor):
             front.pairs[robot].search.on_verdict(Verdict.POOR_FIT)
-    found = front.partners_by_windows({0, 1, 2, 3})
+    found, _ = front.partners_by_windows({0, 1, 2, 3})
     assert found == Partners(frozenset({1, 2}), frozenset({2}))
-    assert front.partners_by_windows({0, 4}).all_contradict
-    assert front.partners_by_windows(()) == NOBODY
+    assert front.partners_by_windows({0, 4})[0].all_contradict
+    assert front.partners_by_windows(()) == (NOBODY, NOBODY)
+
+
+def test_partners_with_whom_another_track_fits_better_are_named_beside_them() -> None:
+    front = FrontScene().front
+    for robot in (1, 2):
+        front.pairs[robot] = tracker(Chain(robot, 1), AGREEMENT)
+    search = front.pairs[2].search
+    search.is_confirmed = search.is_provisional = True
+    for _ in range(2):
+        search.on_costs(costs({AS_IT_IS: 12.0, TRACK: 2.0}, rest=12.0), 33, is_mirror_told=False)
+    assert front.partners_by_windows({0, 1, 2}) == (
+        Partners(frozenset({1, 2})),
+        Partners(frozenset({1, 2}), frozenset({2})),
+    )
 
 
 # ranges of now

@@ -28,7 +28,7 @@ from drslamd.slam.odometry.mounting import LEARNED, Repair
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.range_model import RangeNoise
 from drslamd.slam.relative_pose.estimate import PairNoise
-from drslamd.slam.relative_pose.what_if import Case
+from drslamd.slam.relative_pose.mistakes.what_if import Case
 from drslamd.slam.relative_pose.window import Window
 from drslamd.slam.se2 import Array
 

@@ -21,10 +21,10 @@ from drslamd.slam.graph.measurements import ClosureMeasurement
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.relative_pose.estimate import RelativePoseEstimate
-from drslamd.slam.relative_pose.mounting_search import MOVED_M, MountingSearch
+from drslamd.slam.relative_pose.mistakes.mounting_search import MOVED_M, MountingSearch
+from drslamd.slam.relative_pose.mistakes.what_if import is_learned
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 from drslamd.slam.relative_pose.range_sampler import RangeSampler
-from drslamd.slam.relative_pose.what_if import is_learned
 from drslamd.slam.relative_pose.window_request import WindowRequest
 from drslamd.slam.se2 import Array
 

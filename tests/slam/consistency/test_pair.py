@@ -16,7 +16,7 @@ from drslamd.slam.consistency import pair as pair_module
 from drslamd.slam.consistency.pair import PENDING, Agreement
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import Keyframe
-from drslamd.slam.relative_pose.what_if import CASES
+from drslamd.slam.relative_pose.mistakes.what_if import CASES
 from drslamd.slam.settings import closure_method
 
 TWO = Agreement(least=2, outnumber=2, confirms=False)

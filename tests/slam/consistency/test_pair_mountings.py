@@ -16,8 +16,8 @@ from drslamd.slam.graph.measurements import Keyframe
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.mounting import SIDES, TRACKS
 from drslamd.slam.relative_pose.estimate import RelativePoseEstimate, Verdict
-from drslamd.slam.relative_pose.mounting_search import FEWEST_ASKED, MOST, MOVED_M
-from drslamd.slam.relative_pose.what_if import CASES, MIRROR, Case
+from drslamd.slam.relative_pose.mistakes.mounting_search import FEWEST_ASKED, MOST, MOVED_M
+from drslamd.slam.relative_pose.mistakes.what_if import CASES, MIRROR, Case
 from drslamd.slam.settings import closure_method
 
 TWO = Agreement(least=2, outnumber=2, confirms=False)

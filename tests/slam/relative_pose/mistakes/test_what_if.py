@@ -27,11 +27,9 @@ from drslamd.slam.odometry.mounting import (
 )
 from drslamd.slam.odometry.track import Track
 from drslamd.slam.range_model import RangeNoise
-from drslamd.slam.relative_pose import what_if
 from drslamd.slam.relative_pose.estimate import PairNoise
-from drslamd.slam.relative_pose.pair_end import PairEnd
-from drslamd.slam.relative_pose.range_buffer import RangeBuffer
-from drslamd.slam.relative_pose.what_if import (
+from drslamd.slam.relative_pose.mistakes import what_if
+from drslamd.slam.relative_pose.mistakes.what_if import (
     CASES,
     MIRROR,
     OUTPOSTS,
@@ -41,6 +39,8 @@ from drslamd.slam.relative_pose.what_if import (
     ask,
     variants,
 )
+from drslamd.slam.relative_pose.pair_end import PairEnd
+from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 from drslamd.slam.relative_pose.window_request import WindowRequest, WindowRule, request
 from drslamd.slam.robot_model import RobotModel
 

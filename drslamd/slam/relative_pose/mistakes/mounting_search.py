@@ -18,19 +18,24 @@ from typing import NamedTuple
 import numpy as np
 
 from drslamd.conventions import SECOND_US
-from drslamd.slam.chi_squared import evidence
-from drslamd.slam.relative_pose import what_if
 from drslamd.slam.relative_pose.estimate import PairNoise, Verdict
-from drslamd.slam.relative_pose.range_fit import POOR_FIT
-from drslamd.slam.relative_pose.what_if import (
+from drslamd.slam.relative_pose.mistakes import what_if
+from drslamd.slam.relative_pose.mistakes.evidence import (
+    EXCLUDED,
+    FITS,
+    INDIFFERENT,
+    against_backwards,
+    against_configured,
+    is_as_configured,
+    least_of_backwards,
+    winner,
+)
+from drslamd.slam.relative_pose.mistakes.what_if import (
     BACKWARDS,
     CASES,
-    MIRROR,
     OUTPOSTS,
     Case,
-    is_curve,
     is_learned,
-    is_like,
 )
 from drslamd.slam.se2 import Array
 
@@ -46,32 +51,12 @@ MOST_SPARED = 4
 """So many times as long is waited at most, twice as long each time, while one window has confirmed
 the pair and nothing seems better but by chance. An answer then stands for those that were spared:
 windows that are `APART_US` apart share nearly all of their data."""
-EXCLUDED = 20.0
-"""By how much chi-squared of the newest three windows must be worse where wheels run backwards. Of
-fifteen teams all are confirmed after 12 to 44 s (median 20 s), and of forty with wheels that run
-backwards or count wrongly none is."""
 MOVED_M = 1.0
 """A robot that drove less in a window looks the same in a mirror."""
 FEWEST_ASKED, MOST_ASKED = 3, 12
 """Windows that decide."""
 SHARED = 3
 """So many windows beyond the third are worth one: they share most of their data."""
-WRONG, CLEAR = 60.0, 30.0
-"""By how much chi-squared must fall, over that of a degree of freedom, for the configuration to be
-wrong, and by how much the next kind must be worse, for wheels that run backwards to be named. Of
-twenty-one such robots all are, after 20 to 48 s, and in eighty pairs without such wheels none."""
-BETTER, UNLIKE = 100.0, 40.0
-"""Likewise for a track or a scale to begin with, and by how much all that is no track or scale of
-the same robot must be worse. Of eighteen robots that count wrongly all begin near the truth after
-24 to 72 s; of fifteen healthy pairs none begins elsewhere, of six with blocked sight one does."""
-FITS = 0.7
-"""Chi-squared per degree of freedom of windows that a track, a scale or a curve really explains: it
-is 0.2 to 0.6, because noise is allowed for generously; more, where sight is blocked."""
-MUCH = 0.6
-"""Of chi-squared that is left where a track, a scale or a curve explains some of it."""
-INDIFFERENT = -5.0
-"""Who drives straight for long is the same in a mirror: then what is configured is believed. So is
-it against wheels of unlike size: of six pairs with bent ways none is confirmed."""
 QUICKLY_US = SECOND_US * 9 // 10
 """Between two windows that are asked quickly, while a pair waits for nothing else."""
 SURELY = 7.0
@@ -80,10 +65,15 @@ pair. A world whose wheels do is the mirror image of one whose do not: of 210 he
 has 4.3 for the mirror image, eight more than 2.8."""
 STEADILY, STEADY = 5.5, 3
 """So is the mean of that of so many: of the same pairs one ever has 3.1."""
-SURE_FIT = 0.45
-"""As `FITS`, of such a window: one with a burst of wrong ranges had 11 for the mirror image."""
 SLIGHTLY = -2.0
 """By how much a track, a scale or a curve may seem better in such a window: chance."""
+WATCHED = 16
+"""So many windows after the one that confirmed a pair are asked, one a second: short windows hide a
+track or a scale, and what is said meanwhile is doubtful as soon as they no longer do."""
+CONTESTED = 15.0
+"""Evidence of the two newest windows for a track or a scale that makes a pair doubtful which one
+window confirmed. Tracks that are 30 % off have it one to three seconds later; of thirty-seven
+healthy pairs one ever has more than 14, and two where sensors are as wrong as configured."""
 BY_CHANCE = 4.0
 """Likewise the best of those that are asked first, for the others to be spared, once a window has
 confirmed the pair: two sigmas of the one number in which it differs."""
@@ -119,6 +109,9 @@ class MountingSearch:
         self._recent: deque[float] = deque(maxlen=STEADY - 1)
         self._worst = 0.0
         """Evidence against wheels that run backwards: of late, and the least ever."""
+        self._unlike: deque[float] = deque(maxlen=2)
+        """Evidence of windows of late against a track and a scale as configured."""
+        self._watched = 0
 
     def on_verdict(self, verdict: Verdict) -> None:
         """Module 1 has answered, with what is known of the mountings."""
@@ -151,6 +144,11 @@ class MountingSearch:
         """Do ranges and odometries of the pair contradict each other again and again?"""
         return self.poor >= MOST
 
+    @property
+    def is_contested(self) -> bool:
+        """Did one window confirm what others would rather have with another track or scale?"""
+        return self.is_provisional and sum(self._unlike) >= CONTESTED
+
     def is_due(self, utime: int, awaits: bool) -> bool:
         """Is it time to ask?
 
@@ -171,7 +169,9 @@ class MountingSearch:
     def _is_quickly_due(self, utime: int, awaits: bool) -> bool:
         last = self._asked_quickly_at
         is_late = last is None or utime - last >= QUICKLY_US
-        return is_late and awaits and self.found is None and not self.is_confirmed
+        is_open = awaits and not self.is_confirmed
+        is_new = self.is_provisional and self._watched < WATCHED
+        return is_late and self.found is None and (is_open or is_new)
 
     @property
     def _is_final(self) -> bool:
@@ -203,7 +203,7 @@ class MountingSearch:
     ) -> Callable[[], tuple[Array, float]]:
         """What is to be computed of that window: for `on_costs`, and how far the robot drove that
         drove less, m."""
-        if self._is_quick:
+        if self._is_quick and not self.is_provisional:
             return partial(_asked_quickly, question, noise, delta, self._enough)
         chance = BY_CHANCE if self.is_provisional else 0.0
         return partial(question.answer, self.cases, noise, delta, self.asked_first, chance)
@@ -214,13 +214,8 @@ class MountingSearch:
         Args:
             is_mirror_told: did both robots drive so that mirrored wheels would show?
         """
-        if self.found is None and is_mirror_told:
-            found = against_backwards(costs, measurements - 3)
-            is_alone = found >= self._enough and bool((costs - costs[0] >= SLIGHTLY).all())
-            if is_alone and not self.is_confirmed:
-                self.is_confirmed = self.is_provisional = True
-            self._recent.append(found)
-            self._worst = min(self._worst, found)
+        if self.found is None:
+            self._weigh(costs, measurements - 3, is_mirror_told)
         if self._is_quick:
             return False
         self._answers.extend(self._stands_for * [_Answer(costs, measurements - 3)])
@@ -242,7 +237,7 @@ class MountingSearch:
         total = worth * np.mean([answer.costs for answer in self._answers], axis=0)
         freedom = worth * float(np.mean([answer.freedom for answer in self._answers]))
         if asked == MOST_ASKED:
-            self._confirm(bool(_backwards(total - total[0], True) >= INDIFFERENT))
+            self._confirm(bool(least_of_backwards(total - total[0], True) >= INDIFFERENT))
         case, is_clear = winner(total, freedom)
         # whatever happens to a mounting that was right is something else
         if case is None or self._is_final:
@@ -253,6 +248,20 @@ class MountingSearch:
         self._fits.clear()
         self._answers.clear()
         return True
+
+    def _weigh(self, costs: Array, freedom: int, is_mirror_told: bool) -> None:
+        """What one window says by itself."""
+        is_watched = self._is_quick and self.is_provisional
+        self._watched = self._watched + 1 if self.is_provisional else 0
+        self._unlike.append(against_configured(costs, freedom))
+        if is_watched or not is_mirror_told:
+            return
+        found = against_backwards(costs, freedom)
+        is_alone = found >= self._enough and bool((costs - costs[0] >= SLIGHTLY).all())
+        if is_alone and not self.is_confirmed:
+            self.is_confirmed = self.is_provisional = True
+        self._recent.append(found)
+        self._worst = min(self._worst, found)
 
     def _refine(self, found: Case) -> bool:
         """Windows with the repair disagree: is it a little more, or less?"""
@@ -267,38 +276,6 @@ class MountingSearch:
             return True
         self.found = what_if.variants(found)[int(np.argmin(total))]
         return self.found != found
-
-
-def is_as_configured(chi2: Array, freedom: float, is_mirror_told: bool) -> bool:
-    """Do windows exclude that wheels run backwards, and is no other mistake better?
-
-    Where nothing fits, as when sight is blocked, a track, a scale or a curve is better by chance:
-    none of them counts that does not explain what is left.
-
-    Args:
-        chi2: (cases,) of up to three windows; freedom: degrees of it.
-    """
-    worse = chi2 - chi2[0]
-    # (short ways hardly tell a slight curve from none)
-    least = [INDIFFERENT if is_curve(case) else 0.0 for case in CASES]
-    backwards = _backwards(worse, is_mirror_told) / max(chi2[0] / freedom, 1.0)
-    others = np.delete(np.arange(len(CASES)), BACKWARDS)
-    explains = chi2[others].min() <= max(FITS * freedom, MUCH * chi2[0])
-    is_none_better = bool((worse >= least).all())
-    return bool(backwards >= EXCLUDED and (is_none_better or not explains))
-
-
-def against_backwards(chi2: Array, freedom: int) -> float:
-    """Evidence of one window against wheels that run backwards; none for them, where it fits badly.
-
-    Args:
-        chi2: (cases,); freedom: degrees of it.
-    """
-    best = float(chi2[0])
-    if not np.isfinite(best):
-        return 0.0
-    least = min(evidence(float(chi2[place]) - best, best, freedom) for place in BACKWARDS)
-    return least if best <= SURE_FIT * freedom else min(least, 0.0)
 
 
 def _asked_quickly(
@@ -316,31 +293,3 @@ def _asked_quickly(
         if SLIGHTLY <= costs.min() - costs[0] < 0:
             ask(what_if.BEYOND)
     return costs, question.way_m
-
-
-def _backwards(worse: Array, is_mirror_told: bool) -> float:
-    """The least of what windows have against wheels that run backwards."""
-    places = (place for place in BACKWARDS if is_mirror_told or CASES[place] != MIRROR)
-    return min(float(worse[place]) for place in places)
-
-
-def winner(chi2: Array, freedom: float) -> tuple[Case | None, bool]:
-    """Which of `CASES` explains windows, if any does, and whether only that one does.
-
-    Args:
-        chi2: (cases,) of all windows together; freedom: degrees of it.
-    """
-    best = int(np.argmin(chi2))
-    level = float(chi2[best]) / freedom
-    if level > POOR_FIT:
-        return None, False
-    worse = (chi2 - chi2[best]) / max(level, 1.0)
-    case = CASES[best]
-    others = min(by for by, other in zip(worse, CASES, strict=True) if other.kind != case.kind)
-    if not is_learned(case):
-        # sight that is blocked looks like a curve, and hardly like wheels that run backwards
-        fits = level <= FITS or not is_curve(case)
-        return (case, True) if fits and worse[0] >= WRONG and others >= CLEAR else (None, False)
-    unlike = min(by for by, other in zip(worse, CASES, strict=True) if not is_like(other, case))
-    is_start = level <= FITS and worse[0] >= BETTER and unlike >= UNLIKE
-    return (case, bool(others >= UNLIKE)) if is_start else (None, False)

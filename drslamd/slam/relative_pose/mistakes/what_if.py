@@ -92,6 +92,8 @@ def is_like(one: Case, other: Case) -> bool:
     return is_learned(one) and is_learned(other) and whose[0] == whose[1]
 
 
+LEARNABLE = tuple(place for place, case in enumerate(CASES) if is_learned(case))
+"""Places of the configuration, and of other tracks and scales."""
 BACKWARDS = tuple(
     place for place, case in enumerate(CASES) if place and not (is_learned(case) or is_curve(case))
 )

@@ -9,229 +9,59 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from mounting_costs import (
+    AS_IT_IS,
+    FAR,
+    FIT,
+    GOOD,
+    LEFT,
+    LITTLE,
+    SCALE,
+    TRACK,
+    costs,
+)
 from slam_scenes import Array
 
 from drslamd.slam.chi_squared import LEVEL_FREEDOM
-from drslamd.slam.odometry.mounting import COARSE_SCALES, CURVES, MIRRORED, SCALES, SIDES, TRACKS
+from drslamd.slam.odometry.mounting import CURVES
 from drslamd.slam.relative_pose.estimate import Verdict
-from drslamd.slam.relative_pose.mounting_search import (
-    APART_US,
+from drslamd.slam.relative_pose.mistakes.evidence import (
     BETTER,
-    BY_CHANCE,
-    CLEAR,
     EXCLUDED,
-    FEWEST_ASKED,
     FITS,
     INDIFFERENT,
+    SURE_FIT,
+    WRONG,
+    against_backwards,
+)
+from drslamd.slam.relative_pose.mistakes.mounting_search import (
+    APART_US,
+    BY_CHANCE,
+    CONTESTED,
+    FEWEST_ASKED,
     MANY,
     MOST,
     MOST_ASKED,
     MOST_SPARED,
-    MUCH,
     QUICKLY_US,
     RECENT,
     SHARED,
     SLIGHTLY,
     STEADILY,
     STEADY,
-    SURE_FIT,
     SURELY,
-    UNLIKE,
-    WRONG,
+    WATCHED,
     MountingSearch,
-    against_backwards,
-    is_as_configured,
-    winner,
 )
-from drslamd.slam.relative_pose.range_fit import POOR_FIT
-from drslamd.slam.relative_pose.what_if import (
+from drslamd.slam.relative_pose.mistakes.what_if import (
     BACKWARDS,
     CASES,
     MIRROR,
     OUTPOSTS,
     Case,
-    is_curve,
-    is_learned,
     variants,
 )
-
-FAR = 1e4
-"""Chi-squared of what does not fit at all."""
-FREEDOM = 100
-"""Of all windows together."""
-FIT = 0.9 * FITS * FREEDOM
-"""Chi-squared of what fits them, noise being allowed for generously."""
-GOOD = 0.9 * FITS * 30
-"""Likewise, of one window of 33 measurements."""
-AS_IT_IS = Case()
-LEFT, RIGHT = Case(b=SIDES[0]), Case(b=SIDES[1])
-TRACK, SCALE = Case(b=TRACKS[0]), Case(b=SCALES[0])
-LITTLE = 0.01
-
-
-def costs(known: dict[Case, float], rest: float = FAR) -> Array:
-    """(cases,) in the order of `CASES`."""
-    return np.array([known.get(case, rest) for case in CASES])
-
-
-# who wins
-
-
-@pytest.mark.parametrize("level", [0.5, 1.0, 2.0])
-@pytest.mark.parametrize(
-    ("worse", "next_worse", "wins"),
-    [
-        (WRONG + LITTLE, CLEAR + LITTLE, True),
-        (WRONG - LITTLE, CLEAR + LITTLE, False),
-        (WRONG + LITTLE, CLEAR - LITTLE, False),
-    ],
-)
-def test_wheels_that_run_backwards_win_by_far_and_only_they(
-    level: float, worse: float, next_worse: float, wins: bool
-) -> None:
-    """By multiples of what a degree of freedom scatters, where that is more than it should."""
-    unit, fit = max(level, 1.0), level * FREEDOM
-    found = winner(
-        costs({LEFT: fit, AS_IT_IS: fit + worse * unit, RIGHT: fit + next_worse * unit}), FREEDOM
-    )
-    assert found == ((LEFT, True) if wins else (None, False))
-
-
-@pytest.mark.parametrize("rival", [MIRROR, RIGHT, TRACK, Case(a=SIDES[0])])
-def test_any_other_kind_makes_it_unclear(rival: Case) -> None:
-    known = {LEFT: FIT, AS_IT_IS: FIT + WRONG + LITTLE}
-    assert winner(costs({**known, rival: FIT + CLEAR - LITTLE}), FREEDOM) == (None, False)
-    assert winner(costs({**known, rival: FIT + CLEAR + LITTLE}), FREEDOM) == (LEFT, True)
-
-
-@pytest.mark.parametrize(("level", "wins"), [(POOR_FIT - 0.01, True), (POOR_FIT + 0.01, False)])
-def test_what_does_not_fit_itself_is_no_explanation(level: float, wins: bool) -> None:
-    found, _ = winner(costs({LEFT: level * FREEDOM}), FREEDOM)
-    assert (found == LEFT) is wins
-
-
-@pytest.mark.parametrize(
-    ("worse", "unlike", "is_begun"),
-    [
-        (BETTER + LITTLE, UNLIKE + LITTLE, True),
-        (BETTER - LITTLE, UNLIKE + LITTLE, False),
-        (BETTER + LITTLE, UNLIKE - LITTLE, False),
-    ],
-)
-@pytest.mark.parametrize("best", [TRACK, SCALE, Case(COARSE_SCALES[1], COARSE_SCALES[1])])
-def test_a_track_or_a_scale_is_begun_with_where_nothing_unlike_it_fits(
-    best: Case, worse: float, unlike: float, is_begun: bool
-) -> None:
-    found, _ = winner(
-        costs({best: FIT, AS_IT_IS: FIT + worse, Case(a=SIDES[1]): FIT + unlike}), FREEDOM
-    )
-    assert found == (best if is_begun else None)
-
-
-@pytest.mark.parametrize(
-    ("rival", "is_unlike"),
-    [
-        (Case(b=SCALES[3]), False),
-        (Case(b=TRACKS[1]), False),
-        (Case(a=SCALES[3]), True),
-        (Case(COARSE_SCALES[3], COARSE_SCALES[3]), True),
-        (LEFT, True),
-        (MIRROR, True),
-    ],
-)
-def test_tracks_and_scales_of_the_same_robots_are_alike(rival: Case, is_unlike: bool) -> None:
-    known = {TRACK: FIT, AS_IT_IS: FIT + BETTER + LITTLE, rival: FIT + LITTLE}
-    found, is_clear = winner(costs(known), FREEDOM)
-    assert found == (None if is_unlike else TRACK)
-    # another track is the same mistake, a scale is another one
-    assert is_clear is (rival.kind == TRACK.kind)
-
-
-@pytest.mark.parametrize(("level", "is_begun"), [(FITS - 0.01, True), (FITS + 0.01, False)])
-def test_a_track_or_a_scale_must_fit_well_itself(level: float, is_begun: bool) -> None:
-    found, _ = winner(costs({SCALE: level * FREEDOM}), FREEDOM)
-    assert found == (SCALE if is_begun else None)
-
-
-@pytest.mark.parametrize(("level", "is_named"), [(FITS - 0.01, True), (FITS + 0.01, False)])
-def test_a_curve_must_fit_well_itself_to_be_named(level: float, is_named: bool) -> None:
-    case, is_clear = winner(costs({Case(b=CURVES[0]): level * FREEDOM}), FREEDOM)
-    assert (case == Case(b=CURVES[0]), is_clear) == (is_named, is_named)
-
-
-@pytest.mark.parametrize(("by", "confirms"), [(INDIFFERENT + 1, True), (INDIFFERENT - 1, False)])
-def test_a_pair_is_not_confirmed_where_a_curve_is_better_by_more_than_chance(
-    by: float, confirms: bool
-) -> None:
-    chi2 = costs({AS_IT_IS: FIT, Case(a=CURVES[2]): FIT + by})
-    assert is_as_configured(chi2, FREEDOM, True) is confirms
-
-
-def test_what_is_configured_wins_nothing() -> None:
-    assert winner(costs({AS_IT_IS: 10.0}), FREEDOM) == (None, False)
-
-
-def test_what_is_learned_are_tracks_and_scales_and_no_mistake_at_all() -> None:
-    learned = [case for case in CASES if is_learned(case) or is_curve(case)]
-    backwards = {MIRROR, *(Case(a=side) for side in SIDES), *(Case(b=side) for side in SIDES)}
-    assert set(CASES) - set(learned) == backwards
-    assert AS_IT_IS in learned
-    assert not is_learned(Case(a=TRACKS[0], b=MIRRORED))
-
-
-# what confirms the configuration
-
-
-@pytest.mark.parametrize(
-    ("case", "by", "is_told", "confirms"),
-    [
-        (LEFT, EXCLUDED + LITTLE, True, True),
-        (LEFT, EXCLUDED - LITTLE, True, False),
-        (LEFT, EXCLUDED - LITTLE, False, False),
-        (Case(a=SIDES[1]), EXCLUDED - LITTLE, True, False),
-        (MIRROR, EXCLUDED + LITTLE, True, True),
-        (MIRROR, EXCLUDED - LITTLE, True, False),
-        (MIRROR, EXCLUDED - LITTLE, False, True),
-        (TRACK, LITTLE, True, True),
-        (TRACK, -LITTLE, True, False),
-        (MIRROR, -LITTLE, False, False),
-    ],
-)
-def test_windows_must_exclude_wheels_that_run_backwards_and_find_no_other_mistake_better(
-    case: Case, by: float, is_told: bool, confirms: bool
-) -> None:
-    """A robot that hardly drove is the same in a mirror, and is not asked about that."""
-    assert is_as_configured(costs({AS_IT_IS: FIT, case: FIT + by}), FREEDOM, is_told) is confirms
-
-
-@pytest.mark.parametrize(
-    ("level", "left", "confirms"),
-    [
-        # nothing explains what blocked sight does, whatever is a little better
-        (2.0, MUCH + LITTLE, True),
-        (2.0, MUCH - LITTLE, False),
-        # what fits well explains it, and what fits well as configured is told from it
-        (1.1, FITS / 1.1 + LITTLE, True),
-        (1.1, FITS / 1.1 - LITTLE, False),
-        (FITS - LITTLE, 0.9, False),
-    ],
-)
-@pytest.mark.parametrize("case", [TRACK, SCALE, Case(a=CURVES[2])])
-def test_where_nothing_fits_only_what_explains_it_speaks_against_the_configuration(
-    case: Case, level: float, left: float, confirms: bool
-) -> None:
-    chi2 = level * FREEDOM
-    assert is_as_configured(costs({AS_IT_IS: chi2, case: left * chi2}), FREEDOM, True) is confirms
-
-
-@pytest.mark.parametrize("level", [0.5, 1.0, 3.0])
-def test_windows_that_fit_badly_must_exclude_backwards_by_multiples_of_how_badly(
-    level: float,
-) -> None:
-    chi2, unit = level * FREEDOM, max(level, 1.0)
-    for by, confirms in ((EXCLUDED + LITTLE, True), (EXCLUDED - LITTLE, False)):
-        known = costs({AS_IT_IS: chi2, LEFT: chi2 + by * unit})
-        assert is_as_configured(known, FREEDOM, True) is confirms
+from drslamd.slam.relative_pose.range_fit import POOR_FIT
 
 
 def test_a_pair_is_confirmed_once_and_for_all() -> None:
@@ -516,12 +346,22 @@ def test_who_is_sure_is_confirmed_where_both_robots_drove(is_told: bool) -> None
     assert confirms(excluding(20.0), is_told=is_told) is is_told
 
 
-def sure() -> MountingSearch:
-    """One window has confirmed it alone."""
+def unlike(by: float, case: Case = TRACK) -> Array:
+    """A window with so much evidence for another track or scale."""
+    best = 4.0
+    worse = (LEVEL_FREEDOM + best) * np.expm1(by / (LEVEL_FREEDOM + FREE))
+    return costs({AS_IT_IS: best + worse, case: best}, rest=best + worse)
+
+
+def sure(watched: int = WATCHED) -> MountingSearch:
+    """One window has confirmed it alone, and so many after it have said nothing."""
     search = MountingSearch()
     search.begin(0, True)
     search.begin(QUICKLY_US, True)
     search.on_costs(excluding(20.0), FREE + 3, True)
+    for later in range(watched):
+        search.begin(QUICKLY_US + later, False)
+        search.on_costs(unlike(0.0), FREE + 3, True)
     search.begin(APART_US, False)
     return search
 
@@ -546,6 +386,49 @@ def test_nothing_is_left_of_that_where_a_later_window_has_a_much_better_explanat
     assert ask(search, {AS_IT_IS: GOOD + by, case: GOOD}) is not is_left
     assert (search.is_confirmed, search.is_provisional) == (is_left, is_left)
     assert search.found is None
+
+
+@pytest.mark.parametrize(
+    ("windows", "is_contested"),
+    [
+        ((CONTESTED / 2 + LITTLE, CONTESTED / 2), True),
+        ((CONTESTED / 2 - LITTLE, CONTESTED / 2), False),
+        ((CONTESTED, 0.0, 0.0), False),
+    ],
+)
+def test_the_newest_two_windows_contest_what_one_alone_confirmed(
+    windows: tuple[float, ...], is_contested: bool
+) -> None:
+    """The pair stays connected: module 3 may be learning that track."""
+    search = sure()
+    for by in windows:
+        search.on_costs(unlike(by), FREE + 3, True)
+    assert search.is_contested is is_contested
+    assert search.is_confirmed
+
+
+def test_what_several_windows_confirmed_is_not_contested() -> None:
+    search = sure()
+    ask(search, {AS_IT_IS: GOOD}, rest=GOOD + EXCLUDED)
+    assert not search.is_provisional
+    for _ in range(2):
+        search.on_costs(unlike(CONTESTED), FREE + 3, True)
+    assert not search.is_contested
+
+
+def test_a_pair_that_one_window_confirmed_is_watched_for_a_while() -> None:
+    """Each second, and all that may win is asked; after that every few seconds are enough."""
+    search, utime = sure(watched=0), APART_US
+    assert not search.is_due(utime + QUICKLY_US - 1, False)
+    for watched in range(WATCHED):
+        utime += QUICKLY_US
+        assert search.is_due(utime, False), watched
+        search.begin(utime, False)
+        question = cast(Any, Asked({}))
+        assert search.question(question, cast(Any, None), 0.1)() == (OUTPOSTS, BY_CHANCE)
+        search.on_costs(unlike(0.0), FREE + 3, True)
+    assert search.is_provisional
+    assert not search.is_due(utime + QUICKLY_US, False)
 
 
 def test_what_several_windows_say_finds_a_mistake_after_that() -> None:
