@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 from lab.bound import efficiency, first_pose
+from lab.files import keep
 from lab.progress import Progress
 from lab.reproduce import experiment, pages, pictures, plan, rbcd_table, verdict
 from lab.reproduce.gyro import gyro_rows
@@ -160,9 +161,14 @@ def write_efficiency(total: Tally, out: Path) -> list[verdict.Check]:
 
 def _write(total: Tally, checks: list[verdict.Check], page: str, out: Path) -> None:
     figures = {"verdict": [check.as_dict() for check in checks], "figures": total.as_dict()}
-    (out / "results.json").write_text(json.dumps(figures, indent=1) + "\n")
-    (out / "verdict.md").write_text(pages.verdict(checks))
-    (out / "results.md").write_text(page)
+    texts = {
+        "results.json": json.dumps(figures, indent=1) + "\n",
+        "verdict.md": pages.verdict(checks),
+        "results.md": page,
+    }
+    for name, text in texts.items():
+        if code := keep(out / name, text):
+            raise SystemExit(code)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+from lab.files import keep
 from lab.progress import Progress
 from lab.soak import churn, results
 from lab.soak.invariants import Broken
@@ -52,8 +53,7 @@ def main(arguments: list[str] | None = None) -> int:
         )
         return 0
     if options.page:
-        PAGE.write_text("\n".join(results.page(results.read(options.results))) + "\n")
-        return 0
+        return keep(PAGE, "\n".join(results.page(results.read(options.results))) + "\n")
     if options.seed is not None:
         found = [run(name, options.seed, options.until) for name in options.scenario or [MIXED]]
         print("\n".join(result.line for result in found))

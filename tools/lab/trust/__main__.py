@@ -8,8 +8,8 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from pathlib import Path
 
+from lab.files import keep, result_file
 from lab.trust import play, table
 from lab.trust.cases import CASES, QUICK
 from lab.trust.play import Trusted
@@ -40,10 +40,9 @@ def main(arguments: list[str] | None = None) -> int:
     seeds = {name: options.seeds or usual.get(name, 1) for name in names}
     found = play.trusted(seeds, options.jobs)
     print("\n".join(page(found)))
-    if options.json:
-        options.json.write_text(json.dumps(play.as_json(found), indent=1) + "\n")
+    code = keep(options.json, json.dumps(play.as_json(found), indent=1) + "\n")
     kept = [check.is_kept for trusted in found for check in trusted.checks]
-    return 0 if all(kept) else BROKEN
+    return code if all(kept) else BROKEN
 
 
 def page(found: list[Trusted]) -> list[str]:
@@ -72,7 +71,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="at once"
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
+    parser.add_argument("--json", type=result_file, metavar="FILE", help="write all figures there")
     parser.add_argument("--list", action="store_true", help="name the cases")
     return parser
 
