@@ -21,6 +21,7 @@ from typing import Any
 
 from drslamd.cli.view import HTTP_PORT
 from lab.files import beside_a_good_one, keep, result_file
+from lab.numbers import real, whole
 from lab.play import real_team
 from lab.play.playback import equip
 from lab.play.virtual_team import SETTLE_S
@@ -33,6 +34,8 @@ from lab.score.outcome import Outcome
 
 AT_MOST = 1.2
 NO_INPUT, FAILED = 66, 70
+MOST_ROBOTS = 30
+"""Processes that a laptop bears."""
 
 EXAMPLES = """\
 examples:
@@ -77,9 +80,15 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--view", action="store_true", help="show it on the live map meanwhile")
     parser.add_argument("--dataset", type=Path, metavar="FILE", help="play this recording")
-    parser.add_argument("--seed", type=int, default=1, help="of the simulated world (default 1)")
-    parser.add_argument("--robots", type=int, default=3, help="in the simulated world (default 3)")
-    parser.add_argument("--seconds", type=float, default=75.0, help="of driving (default 75)")
+    parser.add_argument(
+        "--seed", type=whole(), default=1, help="of the simulated world (default 1)"
+    )
+    parser.add_argument(
+        "--robots", type=whole(2, MOST_ROBOTS), default=3, help="in the simulated world (default 3)"
+    )
+    parser.add_argument(
+        "--seconds", type=real(5, 3600), default=75.0, help="of driving (default 75)"
+    )
     parser.add_argument("--png", type=result_file, default="out/demo.png", metavar="FILE")
     parser.add_argument("--json", type=result_file, metavar="FILE", help="write all figures there")
     return parser

@@ -23,6 +23,7 @@ from drslamd.gossip import messages
 from drslamd.gossip.message_types import Pose, PoseState
 from drslamd.slam import se2
 from lab.files import CANNOT_WRITE, keep, result_file
+from lab.numbers import whole
 from lab.play import virtual_team
 from lab.play.simulator import Member, Simulator
 from lab.progress import Progress
@@ -178,10 +179,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="lab.bound.first_pose", description=(__doc__ or "").split("\n")[0]
     )
-    parser.add_argument("--seeds", type=int, default=500, metavar="N", help="default 500")
-    parser.add_argument("--first", type=int, default=0, metavar="SEED", help="default 0")
-    parser.add_argument("--robots", type=int, default=3, metavar="N", help="default 3")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N")
+    parser.add_argument("--seeds", type=whole(1), default=500, metavar="N", help="default 500")
+    parser.add_argument("--first", type=whole(), default=0, metavar="SEED", help="default 0")
+    parser.add_argument("--robots", type=whole(2, 100), default=3, metavar="N", help="default 3")
+    parser.add_argument("--jobs", type=whole(1), default=os.cpu_count() or 1, metavar="N")
     parser.add_argument(
         "--json", type=result_file, metavar="FILE", help="every first pose, as it comes"
     )

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from lab.bound import efficiency, first_pose
 from lab.files import keep
+from lab.numbers import whole
 from lab.progress import Progress
 from lab.reproduce import experiment, pages, pictures, plan, rbcd_table, verdict
 from lab.reproduce.gyro import gyro_rows
@@ -111,7 +112,9 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--quick", action="store_true", help="one seed, fewer rows")
-    parser.add_argument("--seeds", type=int, default=plan.SEEDS, metavar="N", help="default 20")
+    parser.add_argument(
+        "--seeds", type=whole(1), default=plan.SEEDS, metavar="N", help="default 20"
+    )
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="default out/reproduce[-quick]")
     parser.add_argument(
         "--rbcd", type=Path, metavar="DATA", help="hold module 3 against its centralised optimum"
