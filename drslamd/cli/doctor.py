@@ -93,7 +93,10 @@ def _lines(found: list[Finding], no_answer: str) -> list[str]:
     out = []
     for finding in found:
         since = "" if finding.since_s is None else f" (since {span(finding.since_s)})"
-        out.append(f"{finding.severity.value}: {finding.check}: {finding.cause}{since}")
+        # a cause that begins with what was looked at needs no other heading
+        is_named = finding.cause.startswith(finding.check.split()[0])
+        heading = "" if is_named else f"{finding.check}: "
+        out.append(f"{finding.severity.value}: {heading}{finding.cause}{since}")
         out += [f"    {finding.remedy}"] if finding.remedy else []
     if no_answer:
         return [*out, no_answer]

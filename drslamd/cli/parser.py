@@ -63,7 +63,7 @@ def load(path: str) -> Config:
 def _unreadable(path: str, error: OSError | UnicodeDecodeError) -> str:
     """Why there is no configuration in a file, and what to do."""
     if isinstance(error, FileNotFoundError):
-        return f"{error.strerror}; copy etc/drslamd.toml there and edit it"
+        return f"{error.strerror}; correct the path, or make one: drslamd init -c {path}"
     if isinstance(error, PermissionError):
         return f"{error.strerror}; {denied(Path(path))}"
     if isinstance(error, IsADirectoryError):

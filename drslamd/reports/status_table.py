@@ -5,6 +5,7 @@ What is wrong stands above everything else. Rates are the differences of two ans
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,6 +14,8 @@ PEER_COLUMNS = (
 )  # fmt: skip
 FEWEST_ROWS = 4
 """Of a terminal that is too low for everything."""
+NARROWEST = 20
+"""Columns in which a sentence can be read."""
 NOTHING = "-"
 
 
@@ -37,12 +40,24 @@ def table(
 
 
 def fitted(lines: Sequence[str], width: int, height: int) -> list[str]:
-    """As much of it as a terminal shows; the last line says what is left out."""
+    """As much of it as a terminal shows; the last line says what is left out.
+
+    Sentences, which stand before the first empty line, are folded: what to do is their end. Rows of
+    tables are cut off.
+    """
     rows = max(height, FEWEST_ROWS)
-    shown = [line[:width] for line in lines]
+    sentences = lines.index("") if "" in lines else len(lines)
+    shown = [piece for line in lines[:sentences] for piece in _folded(line, width)]
+    shown += [line[:width] for line in lines[sentences:]]
     if len(shown) <= rows:
         return shown
     return [*shown[: rows - 1], f"... {len(shown) - rows + 1} more lines"[:width]]
+
+
+def _folded(sentence: str, width: int) -> list[str]:
+    if width < NARROWEST:
+        return [sentence[:width]]
+    return textwrap.wrap(sentence, width, subsequent_indent="  ")
 
 
 def span(seconds: float) -> str:

@@ -32,7 +32,7 @@ def test_without_a_daemon_the_machine_is_looked_at_and_the_code_says_so(
         setup.key.chmod(0o644)
         assert look(setup) == 78
     first, remedy, last = capsys.readouterr().out.splitlines()
-    assert first.startswith("error: team key: team.key_file = ")
+    assert first.startswith("error: team.key_file = ")
     assert remedy.startswith("    chmod 600 ")
     assert last == line
 

@@ -100,7 +100,7 @@ def _configuration() -> list[Fault]:
         setup.config.chmod(0)
 
     return [
-        Fault("no file", no_file, "No such file or directory", "copy etc/drslamd.toml there"),
+        Fault("no file", no_file, "No such file or directory", "make one: drslamd init -c "),
         Fault("a folder", folder, "Is a directory", "name a file"),
         Fault("no text", binary, "not a text file", "name a TOML file"),
         Fault("not to be read", unreadable, "Permission denied", "chmod u+rX", as_nobody=True),

@@ -132,7 +132,22 @@ def test_a_team_in_pieces_ends_with_1_and_still_draws_what_there_is(
     played.apart = True
     assert demo.main([*SMALL, "--png", str(tmp_path / "demo.png")]) == 1
     assert "FAILED: the team is not one group" in capsys.readouterr().out
-    assert (tmp_path / "demo.png").exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["demo-failed.png"]
+
+
+def test_a_run_that_failed_leaves_the_results_of_a_good_one(
+    played: Played, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    png, figures = tmp_path / "demo.png", tmp_path / "demo.json"
+    command = [*SMALL, "--png", str(png), "--json", str(figures)]
+    assert demo.main(command) == 0
+    good = png.read_bytes(), figures.read_bytes()
+    played.share = 5.0
+    assert demo.main(command) == 1
+    assert (png.read_bytes(), figures.read_bytes()) == good
+    assert f"picture: {tmp_path / 'demo-failed.png'}" in capsys.readouterr().out
+    failed = json.loads((tmp_path / "demo-failed.json").read_text())
+    assert failed["team"]["ate_rmse_m"] > json.loads(good[1])["team"]["ate_rmse_m"]
 
 
 def test_a_daemon_that_failed_ends_with_70_and_its_last_words(

@@ -77,6 +77,19 @@ def test_what_does_not_fit_is_counted() -> None:
     assert len(fitted(lines, 80, 1)) == 4
 
 
+def test_a_sentence_is_folded_so_that_what_to_do_is_seen_and_a_table_is_cut_off() -> None:
+    said = "! not localised: not enough motion; drive curves, and not side by side"
+    row = "    1    0 s   0 %       yes  -19310427.8"
+    assert fitted([said, "", row], 40, 24) == [
+        "! not localised: not enough motion;",
+        "  drive curves, and not side by side",
+        "",
+        row[:40],
+    ]
+    assert fitted([said], len(said), 24) == [said]
+    assert fitted([said], 19, 24) == [said[:19]]
+
+
 def test_a_time_is_said_in_the_unit_that_one_would_say() -> None:
     spans = {0.4: "0 s", 119: "119 s", 120: "2 min", 7_199: "120 min", 7_200: "2 h"}
     assert {seconds: span(seconds) for seconds in spans} == spans

@@ -4,7 +4,8 @@ Each robot is a process of its own with two pseudo-terminals, on which an emulat
 and an emulated wheel controller speak their true bytes; the processes gossip over multicast on
 this host only. Exit codes: 0 the team is one group and at most 1.2 times as far off as dead
 reckoning that was given the true start poses, 1 it is not, 2 wrong usage, 66 unusable recording,
-70 a daemon failed.
+70 a daemon failed, 73 a result cannot be written. What a run that failed found stands beside what a
+good one found, as `demo-failed.png`.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from drslamd.cli.view import HTTP_PORT
+from lab.files import beside_a_good_one, keep, result_file
+from lab.numbers import real, whole
 from lab.play import real_team
 from lab.play.playback import equip
 from lab.play.virtual_team import SETTLE_S
@@ -31,6 +34,8 @@ from lab.score.outcome import Outcome
 
 AT_MOST = 1.2
 NO_INPUT, FAILED = 66, 70
+MOST_ROBOTS = 30
+"""Processes that a laptop bears."""
 
 EXAMPLES = """\
 examples:
@@ -75,11 +80,17 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--view", action="store_true", help="show it on the live map meanwhile")
     parser.add_argument("--dataset", type=Path, metavar="FILE", help="play this recording")
-    parser.add_argument("--seed", type=int, default=1, help="of the simulated world (default 1)")
-    parser.add_argument("--robots", type=int, default=3, help="in the simulated world (default 3)")
-    parser.add_argument("--seconds", type=float, default=75.0, help="of driving (default 75)")
-    parser.add_argument("--png", type=Path, default=Path("out/demo.png"), metavar="FILE")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
+    parser.add_argument(
+        "--seed", type=whole(), default=1, help="of the simulated world (default 1)"
+    )
+    parser.add_argument(
+        "--robots", type=whole(2, MOST_ROBOTS), default=3, help="in the simulated world (default 3)"
+    )
+    parser.add_argument(
+        "--seconds", type=real(5, 3600), default=75.0, help="of driving (default 75)"
+    )
+    parser.add_argument("--png", type=result_file, default="out/demo.png", metavar="FILE")
+    parser.add_argument("--json", type=result_file, metavar="FILE", help="write all figures there")
     return parser
 
 
@@ -108,17 +119,19 @@ async def live_map(port: int, http_port: int = HTTP_PORT) -> AsyncIterator[None]
 
 def _report(recording: Recording, result: Outcome, options: argparse.Namespace) -> int:
     scores = outcome.score(recording, result)
-    picture.draw(recording, result, options.png)
+    faults = shortcomings(result, scores)
+    png, figures = options.png, options.json
+    if faults:
+        png, figures = beside_a_good_one(png), figures and beside_a_good_one(figures)
     print(f"\n{recording.name}, {recording.duration:.0f} s")
     print("\n".join(table.lines(scores)))
-    print(f"picture: {options.png}")
-    if options.json:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(scores, indent=1) + "\n")
-    faults = shortcomings(result, scores)
+    code = picture.draw(recording, result, png)
+    if not code:
+        print(f"picture: {png}")
+    code = keep(figures, json.dumps(scores, indent=1) + "\n") or code
     for fault in faults:
         print(f"FAILED: {fault}")
-    return 1 if faults else 0
+    return 1 if faults else code
 
 
 def shortcomings(result: Outcome, scores: dict[str, Any]) -> list[str]:

@@ -10,9 +10,9 @@ import asyncio
 import json
 import sys
 from pathlib import Path
-from typing import Any
 
 from drslamd.config import ConfigError
+from lab.files import keep, result_file, sections
 from lab.play import edge_run, real_team, virtual_team
 from lab.play.virtual_team import SETTLE_S
 from lab.progress import Progress
@@ -42,7 +42,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run it; the exit code."""
     options = _parser().parse_args(arguments)
     try:
-        extra = options.config.read_text() if options.config else ""
+        extra = sections(options.config)
         recording: Recording | EdgeRecording
         if is_recording(options.recording):
             return _evaluate_own(options, extra)
@@ -63,14 +63,7 @@ def main(arguments: list[str] | None = None) -> int:
         return FAILED
     scores = outcome.score(recording, result)
     print("\n".join([*table.lines(scores), *reasons.lines(result.status)]))
-    _write(options, scores)
-    return 0
-
-
-def _write(options: argparse.Namespace, scores: dict[str, Any]) -> None:
-    if options.json:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(scores, indent=1) + "\n")
+    return keep(options.json, json.dumps(scores, indent=1) + "\n")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -81,7 +74,7 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("recording", type=Path, metavar="RECORDING")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
+    parser.add_argument("--json", type=result_file, metavar="FILE", help="write all figures there")
     parser.add_argument("--speed", choices=("real", "virtual"), default="virtual")
     parser.add_argument(
         "--truth",
@@ -117,8 +110,7 @@ def _evaluate_own(options: argparse.Namespace, extra: str) -> int:
         lines = table.lines(scores)
     why = reasons.lines(result.status, complaints.lasted())
     print("\n".join([*team.said(), *lines, *why]))
-    _write(options, scores)
-    return 0
+    return keep(options.json, json.dumps(scores, indent=1) + "\n")
 
 
 def _run(recording: Recording, speed: str, extra: str) -> Outcome:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from dataclasses import replace
 from pathlib import Path
 
@@ -64,11 +65,28 @@ def test_a_fault_in_the_middle_leaves_the_page_of_before(
 
 
 def test_a_page_that_cannot_be_written_ends_with_73(
-    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    recording: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    (tmp_path / "file").write_text("")
-    assert main([str(recording), "--to", str(tmp_path / "file" / "page.html")]) == 73
-    assert capsys.readouterr().err.endswith("page.html: File exists\n")
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    assert main([str(recording), "--to", str(tmp_path / "page.html")]) == 73
+    assert "page.html: No space left on device; " in capsys.readouterr().err
+
+
+def test_no_place_for_the_usual_page_is_said_before_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "run.html").mkdir()
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(["run.pyfg"])
+    assert ended.value.code == 2
+    assert "run.html is a folder; name a file" in capsys.readouterr().err
 
 
 def test_a_wrong_configuration_ends_with_78(

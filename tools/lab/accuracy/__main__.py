@@ -13,6 +13,7 @@ from pathlib import Path
 
 from lab.accuracy.ablation import PIECES, Piece
 from lab.accuracy.accuracy_rows import ROWS, Figure, Setup
+from lab.files import keep, result_file, sections
 from lab.recordings.recording import BadRecording
 
 NOT_REACHED, NO_INPUT = 1, 66
@@ -31,11 +32,11 @@ def main(arguments: list[str] | None = None) -> int:
     """Run it; the exit code."""
     parser = _parser()
     options = parser.parse_args(arguments)
-    extra = options.config.read_text() if options.config else ""
     piece = PIECES[options.without] if options.without else Piece("")
-    if piece.section and f"[{piece.section}]" in extra:
-        parser.error(f"--without {options.without} needs [{piece.section}], as does --config")
     try:
+        extra = sections(options.config)
+        if piece.section and f"[{piece.section}]" in extra:
+            parser.error(f"--without {options.without} needs [{piece.section}], as does --config")
         setup = Setup(extra + piece.toml, piece.tuning)
         figures = _measured(options.data, options.only or list(ROWS), setup)
     except BadRecording as error:
@@ -46,10 +47,9 @@ def main(arguments: list[str] | None = None) -> int:
     if options.without:
         print(f"Without {options.without}: {piece.instead}.\n")
     print("\n".join(markdown(figures)))
-    if options.json:
-        rows = [{**asdict(figure), "is_reached": figure.is_reached} for figure in figures]
-        options.json.write_text(json.dumps(rows, indent=1) + "\n")
-    return 0 if all(figure.is_reached for figure in figures) else NOT_REACHED
+    rows = [{**asdict(figure), "is_reached": figure.is_reached} for figure in figures]
+    code = keep(options.json, json.dumps(rows, indent=1) + "\n")
+    return code if all(figure.is_reached for figure in figures) else NOT_REACHED
 
 
 def _measured(data: Path, names: list[str], setup: Setup) -> list[Figure]:
@@ -91,7 +91,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("data", type=Path, metavar="FOLDER", help="of the recordings' folders")
     parser.add_argument("--only", nargs="+", choices=list(ROWS), metavar="ROW")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
+    parser.add_argument("--json", type=result_file, metavar="FILE", help="write all figures there")
     parser.add_argument("--config", type=Path, metavar="TOML", help="sections for every robot")
     parser.add_argument("--without", choices=list(PIECES), metavar="PIECE", help="leave one out")
     return parser

@@ -31,6 +31,7 @@ from lab.benchmark import (
     traffic,
 )
 from lab.benchmark.rows import Row
+from lab.files import keep, result_file
 from lab.progress import Progress
 from lab.recordings.recording import BadRecording
 
@@ -76,17 +77,18 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"{error}; DRSLAMD_POSEGRAPHS names the folder", file=sys.stderr)
         return NO_INPUT
     print(f"{_machine()}\n\n{rows.markdown(found)}")
+    code = 0
     if options.json:
         # a line for each row, so that a stored file can be read and compared
         lines = ",\n".join(json.dumps(row) for row in rows.to_json(found))
         head = json.dumps({"machine": _machine(), "quick": options.quick})[:-1]
-        options.json.write_text(f'{head}, "rows": [\n{lines}\n]}}\n')
+        code = keep(options.json, f'{head}, "rows": [\n{lines}\n]}}\n')
     if options.picture:
-        curves.draw(found, options.picture)
+        code = curves.draw(found, options.picture) or code
     worse = rows.regressions(found, stored)
     for sentence in worse:
         print(f"worse: {sentence}", file=sys.stderr)
-    return WORSE if worse else 0
+    return WORSE if worse else code
 
 
 def _possible() -> list[str]:
@@ -105,8 +107,10 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--quick", action="store_true", help="fewer repetitions and graphs")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
-    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw what grows (.png, .svg)")
+    parser.add_argument("--json", type=result_file, metavar="FILE", help="write all figures there")
+    parser.add_argument(
+        "--picture", type=result_file, metavar="FILE", help="draw what grows (.png, .svg)"
+    )
     parser.add_argument("--check", type=Path, metavar="FILE", help="compare with an earlier --json")
     parser.add_argument("--module", action="append", choices=list(PARTS), help="only this one")
     return parser

@@ -10,19 +10,20 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 from lab.benchmark.rows import Row
+from lab.files import drawn
 
 LABELS = {"ms": "ms for one update", "MB": "MB sent a minute"}
 """By the unit of a curve's rows."""
 
 
-def draw(rows: list[Row], path: Path) -> None:
-    """Write a picture of all rows that are points of a curve; none of no such rows."""
+def draw(rows: list[Row], path: Path) -> int:
+    """Write a picture of all rows that are points of a curve, if there are any; the exit code."""
     panels: dict[str, list[tuple[float, Row]]] = {}
     for row in rows:
         if row.curve is not None:
             panels.setdefault(row.curve[0], []).append((row.curve[1], row))
     if not panels:
-        return
+        return 0
     figure, axes = plt.subplots(1, len(panels), figsize=(4 * len(panels), 3), squeeze=False)
     for panel, (axis, points) in zip(axes[0], panels.items(), strict=True):
         points.sort(key=lambda point: point[0])
@@ -33,6 +34,6 @@ def draw(rows: list[Row], path: Path) -> None:
         panel.set_ylim(bottom=0)
         panel.grid(alpha=0.3)
     figure.tight_layout()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path)
+    code = drawn(figure, path)
     plt.close(figure)
+    return code

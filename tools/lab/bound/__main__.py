@@ -16,6 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lab.bound import efficiency
+from lab.numbers import whole
 from lab.progress import Progress
 from lab.recordings.recording import Array
 from lab.reproduce.tally import Tally
@@ -35,8 +36,8 @@ def jackknifed(drives: Array) -> tuple[float, float]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print one line for each row and unit."""
     parser = argparse.ArgumentParser(prog="lab.bound", description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--seeds", type=int, default=20, metavar="N", help="default 20")
-    parser.add_argument("--robots", type=int, default=3, metavar="N", help="default 3")
+    parser.add_argument("--seeds", type=whole(1), default=20, metavar="N", help="default 20")
+    parser.add_argument("--robots", type=whole(2, 100), default=3, metavar="N", help="default 3")
     options = parser.parse_args(arguments)
     team, drives = efficiency.Team(options.robots, 0.0), list[Tally]()
     bar = Progress("bounds", options.seeds, "seeds")

@@ -15,7 +15,6 @@ import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 
 import numpy as np
 
@@ -23,6 +22,8 @@ from drslamd.events import Effect, Event, Send
 from drslamd.gossip import messages
 from drslamd.gossip.message_types import Pose, PoseState
 from drslamd.slam import se2
+from lab.files import CANNOT_WRITE, keep, result_file
+from lab.numbers import whole
 from lab.play import virtual_team
 from lab.play.simulator import Member, Simulator
 from lab.progress import Progress
@@ -178,19 +179,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="lab.bound.first_pose", description=(__doc__ or "").split("\n")[0]
     )
-    parser.add_argument("--seeds", type=int, default=500, metavar="N", help="default 500")
-    parser.add_argument("--first", type=int, default=0, metavar="SEED", help="default 0")
-    parser.add_argument("--robots", type=int, default=3, metavar="N", help="default 3")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="every first pose, as it comes")
+    parser.add_argument("--seeds", type=whole(1), default=500, metavar="N", help="default 500")
+    parser.add_argument("--first", type=whole(), default=0, metavar="SEED", help="default 0")
+    parser.add_argument("--robots", type=whole(2, 100), default=3, metavar="N", help="default 3")
+    parser.add_argument("--jobs", type=whole(1), default=os.cpu_count() or 1, metavar="N")
+    parser.add_argument(
+        "--json", type=result_file, metavar="FILE", help="every first pose, as it comes"
+    )
     options = parser.parse_args(arguments)
     seeds = range(options.first, options.first + options.seeds)
     bar, found = Progress("first poses", len(seeds), "seeds"), list[FirstPose]()
     for done, firsts in enumerate(played(seeds, options.robots, options.jobs), start=1):
         found += firsts
         bar(done)
-        if options.json:
-            options.json.write_text(json.dumps([asdict(first) for first in found]) + "\n")
+        if keep(options.json, json.dumps([asdict(first) for first in found]) + "\n"):
+            return CANNOT_WRITE
     bar.end()
     print("\n".join(lines(found)))
     return 0 if is_reached(found) else 1

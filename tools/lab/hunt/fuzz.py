@@ -15,6 +15,7 @@ from typing import Protocol
 
 from lab.hunt import flips, liar, volume
 from lab.hunt.targets import TARGETS, seeds
+from lab.numbers import real, whole
 from lab.progress import Progress
 
 FOUND = 1
@@ -40,11 +41,11 @@ def main(arguments: list[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("target", nargs="*", metavar="TARGET", help=f"of: {', '.join(TARGETS)}")
-    parser.add_argument("--seconds", type=int, default=SECONDS, help="for each target")
-    parser.add_argument("--datagrams", type=float, default=0, metavar="N", help="malformed ones")
-    parser.add_argument("--bytes", type=float, default=0, metavar="N", help="of serial noise")
-    parser.add_argument("--flips", type=float, default=0, metavar="N", help="two bits in a frame")
-    parser.add_argument("--lies", type=float, default=0, metavar="N", help="of a member")
+    parser.add_argument("--seconds", type=whole(1), default=SECONDS, help="for each target")
+    parser.add_argument("--datagrams", type=real(), default=0, metavar="N", help="malformed ones")
+    parser.add_argument("--bytes", type=real(), default=0, metavar="N", help="of serial noise")
+    parser.add_argument("--flips", type=real(), default=0, metavar="N", help="two bits in a frame")
+    parser.add_argument("--lies", type=real(), default=0, metavar="N", help="of a member")
     options = parser.parse_args(arguments)
     for name in options.target:
         if name not in TARGETS:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lab.hunt.copies import ROOT, copied, ran
+from lab.numbers import real, whole
 from lab.progress import Progress
 
 FEWER = 1
@@ -71,9 +72,11 @@ def main(arguments: list[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("file", nargs="*", metavar="FILE", help="in drslamd/, by default all")
-    parser.add_argument("--each", type=int, default=5, metavar="N", help="mutants of each file")
-    parser.add_argument("--seed", type=int, default=0, help="of the choice")
-    parser.add_argument("--least", type=float, default=0.0, help="share that is to be noticed")
+    parser.add_argument(
+        "--each", type=whole(1), default=5, metavar="N", help="mutants of each file"
+    )
+    parser.add_argument("--seed", type=whole(), default=0, help="of the choice")
+    parser.add_argument("--least", type=real(0, 1), default=0.0, help="share that is to be noticed")
     parser.add_argument("--survivors", action="store_true", help="name those not noticed")
     options = parser.parse_args(arguments)
     files = options.file or names()

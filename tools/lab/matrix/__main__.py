@@ -10,6 +10,7 @@ import os
 import subprocess
 import sys
 
+from lab.files import keep
 from lab.matrix import measuring, page
 from lab.soak import results
 
@@ -34,13 +35,14 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--measure", nargs=argparse.REMAINDER, help="run tests, then write")
     options = parser.parse_args(arguments)
     failed = options.measure is not None and _measured(options.measure)
+    code = 0
     tests = page.named_rows()
     if not options.check:
         made = page.page(tests, results.read(page.RUNS), measuring.read(measuring.FOUND))
-        page.PAGE.write_text("\n".join(made) + "\n")
+        code = keep(page.PAGE, "\n".join(made) + "\n")
     absent = [*page.missing(tests), *page.unknown(tests)]
     print(f"rows without a test, or tests without a row: {', '.join(absent) or 'none'}")
-    return 1 if absent or failed else 0
+    return 1 if absent or failed else code
 
 
 def _measured(chosen: list[str]) -> bool:

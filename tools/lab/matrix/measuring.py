@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from lab.files import keep
+
 WHERE = "DRSLAMD_MEASURED"
 """The variable that names the file."""
 FOUND = Path(__file__).with_name("measured.json")
@@ -47,7 +49,7 @@ def read(path: Path) -> dict[str, Found]:
 def write(path: Path, found: Mapping[str, Found]) -> None:
     """One line for each test."""
     lines = [f"{json.dumps(name)}: {json.dumps(found[name])}" for name in sorted(found)]
-    path.write_text("{\n" + ",\n".join(lines) + "\n}\n")
+    keep(path, "{\n" + ",\n".join(lines) + "\n}\n")
 
 
 class Measuring:

@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from lab.near import age, pairs
+from lab.numbers import real, whole
 from lab.progress import Progress
 from lab.recordings import readers
 from lab.recordings.recording import Recording
@@ -43,11 +44,11 @@ WORLDS: dict[str, Callable[[int], Recording]] = {
 def main() -> int:
     """Print every figure beside its goal; 1 when one is missed."""
     parser = argparse.ArgumentParser(prog="lab.near", description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--first", type=int, default=1, help="seed")
+    parser.add_argument("--seeds", type=whole(1), default=20)
+    parser.add_argument("--first", type=whole(), default=1, help="seed")
     parser.add_argument("--world", nargs="*", default=["reproduce"], choices=tuple(WORLDS))
-    parser.add_argument("--seconds", type=float, default=20.0)
-    parser.add_argument("--robots", type=int, nargs="*", default=[3, 50])
+    parser.add_argument("--seconds", type=real(1), default=20.0)
+    parser.add_argument("--robots", type=whole(2, 100), nargs="*", default=[3, 50])
     parser.add_argument("--recording", type=Path, nargs="*", default=[], metavar="FILE")
     options = parser.parse_args()
     missed = 0

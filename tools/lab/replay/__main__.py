@@ -15,6 +15,7 @@ from pathlib import Path
 from drslamd import report
 from drslamd.config import ConfigError
 from drslamd.reports import status_text
+from lab.numbers import real
 from lab.progress import Progress
 from lab.recordings.recording import BadRecording
 from lab.replay.exact import Replayed, Replayer
@@ -70,7 +71,7 @@ def _parser() -> argparse.ArgumentParser:
         "--config", type=Path, metavar="TOML", help="what if these keys had been set?"
     )
     what.add_argument(
-        "--at", type=float, metavar="S", help="what was known S seconds after the beginning?"
+        "--at", type=real(), metavar="S", help="what was known S seconds after the beginning?"
     )
     parser.add_argument(
         "--key", metavar="FILE", help="the team key (default: where the robot had it)"

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from drslamd import __version__
 from drslamd.config import ConfigError
-from drslamd.export.files import replaced
+from lab.files import keep, result_file, sections
 from lab.play import edge_run, virtual_team
 from lab.play.virtual_team import SETTLE_S
 from lab.progress import Progress
@@ -25,7 +25,7 @@ from lab.report.evidence import gather
 from lab.report.page import blind_page, edge_page, page
 from lab.score import outcome
 
-NO_INPUT, CANNOT_WRITE, BAD_CONFIG = 66, 73, 78
+NO_INPUT, BAD_CONFIG = 66, 78
 
 EXAMPLES = """\
 examples:
@@ -38,25 +38,24 @@ examples:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run it; the exit code."""
-    options = _parser().parse_args(arguments)
-    to = options.to or Path(f"{options.recording.resolve().stem}.html")
+    parser = _parser()
+    options = parser.parse_args(arguments)
     try:
-        extra = options.config.read_text() if options.config else ""
-        text = _report(options, extra)
+        to = options.to or result_file(f"{options.recording.resolve().stem}.html")
+    except argparse.ArgumentTypeError as error:
+        parser.error(str(error))
+    try:
+        text = _report(options, sections(options.config))
     except (BadRecording, OSError) as error:
         print(error, file=sys.stderr)
         return NO_INPUT
     except ConfigError as error:
         print(error, file=sys.stderr)
         return BAD_CONFIG
-    try:
-        to.parent.mkdir(parents=True, exist_ok=True)
-        replaced(to, text)
-    except OSError as error:
-        print(f"{to}: {error.strerror}", file=sys.stderr)
-        return CANNOT_WRITE
-    print(to)
-    return 0
+    code = keep(to, text)
+    if not code:
+        print(to)
+    return code
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -67,7 +66,9 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("recording", type=Path, metavar="RECORDING")
-    parser.add_argument("--to", type=Path, metavar="FILE", help="the page (default RECORDING.html)")
+    parser.add_argument(
+        "--to", type=result_file, metavar="FILE", help="the page (default RECORDING.html)"
+    )
     parser.add_argument(
         "--truth",
         type=Path,

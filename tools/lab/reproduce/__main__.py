@@ -12,6 +12,8 @@ import sys
 from pathlib import Path
 
 from lab.bound import efficiency, first_pose
+from lab.files import keep
+from lab.numbers import whole
 from lab.progress import Progress
 from lab.reproduce import experiment, pages, pictures, plan, rbcd_table, verdict
 from lab.reproduce.gyro import gyro_rows
@@ -110,7 +112,9 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--quick", action="store_true", help="one seed, fewer rows")
-    parser.add_argument("--seeds", type=int, default=plan.SEEDS, metavar="N", help="default 20")
+    parser.add_argument(
+        "--seeds", type=whole(1), default=plan.SEEDS, metavar="N", help="default 20"
+    )
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="default out/reproduce[-quick]")
     parser.add_argument(
         "--rbcd", type=Path, metavar="DATA", help="hold module 3 against its centralised optimum"
@@ -160,9 +164,14 @@ def write_efficiency(total: Tally, out: Path) -> list[verdict.Check]:
 
 def _write(total: Tally, checks: list[verdict.Check], page: str, out: Path) -> None:
     figures = {"verdict": [check.as_dict() for check in checks], "figures": total.as_dict()}
-    (out / "results.json").write_text(json.dumps(figures, indent=1) + "\n")
-    (out / "verdict.md").write_text(pages.verdict(checks))
-    (out / "results.md").write_text(page)
+    texts = {
+        "results.json": json.dumps(figures, indent=1) + "\n",
+        "verdict.md": pages.verdict(checks),
+        "results.md": page,
+    }
+    for name, text in texts.items():
+        if code := keep(out / name, text):
+            raise SystemExit(code)
 
 
 if __name__ == "__main__":

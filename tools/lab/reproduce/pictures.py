@@ -14,6 +14,7 @@ from matplotlib import pyplot as plt
 
 from drslamd.slam.relative_pose import algorithm_1
 from drslamd.slam.relative_pose.window import Window
+from lab.files import drawn
 from lab.recordings.recording import Array
 from lab.reproduce import dpgo, paper_column
 from lab.reproduce.experiment import PAIRS, TYPICAL_SEED, Trial, trial
@@ -136,6 +137,5 @@ def _line(axis: Any, x: Sequence[float], y: Sequence[float], label: str, style: 
 
 def _save(figure: Any, path: Path) -> None:
     figure.tight_layout()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path)
+    drawn(figure, path)
     plt.close(figure)

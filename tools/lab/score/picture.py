@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib import pyplot as plt
 
+from lab.files import drawn
 from lab.recordings.recording import Array, Recording
 from lab.score import metrics, panels
 from lab.score.outcome import Outcome, dead_reckoning, score
@@ -17,9 +17,11 @@ SIZE_INCHES = (13.0, 8.6)
 MISSING = "no robot is localised"
 
 
-def draw(recording: Recording, outcome: Outcome, path: Path) -> None:
-    """Write a PNG, whole or not at all; the estimate is aligned to the truth as one team, dead
-    reckoning was given the true start."""
+def draw(recording: Recording, outcome: Outcome, path: Path) -> int:
+    """Write a picture, whole or not at all; the exit code.
+
+    The estimate is aligned to the truth as one team, dead reckoning was given the true start.
+    """
     robots = sorted(recording.trails)
     scores, found = score(recording, outcome), panels.aligned(recording, outcome)
     given = dead_reckoning(recording)
@@ -30,11 +32,9 @@ def draw(recording: Recording, outcome: Outcome, path: Path) -> None:
         _maps(maps, recording, robots, given, found, scores)
         _errors(errors, recording, robots, given, found, outcome)
         figure.suptitle(recording.name, fontweight="bold")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        beside = path.with_name(f".{os.getpid()}.{path.name}")
-        figure.savefig(beside, format="png")
+        code = drawn(figure, path)
         panels.closed(figure)
-    beside.replace(path)
+    return code
 
 
 def _maps(

@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+from lab.files import keep
+from lab.numbers import real, whole
 from lab.progress import Progress
 from lab.soak import churn, results
 from lab.soak.invariants import Broken
@@ -44,16 +46,13 @@ def main(arguments: list[str] | None = None) -> int:
     unknown = [name for name in options.scenario if name not in {*SCENARIOS, MIXED}]
     if unknown:
         parser.error(f"no scenario {unknown[0]!r}; tools/soak --list names them")
-    if options.seeds < 1 or options.jobs < 1 or (options.hours or 0) < 0:
-        parser.error("--seeds and --jobs are at least 1, --hours at least 0")
     if options.list:
         print(
             "\n".join(f"{s.name:<22} {', '.join(s.rows):<8} {s.what}" for s in SCENARIOS.values())
         )
         return 0
     if options.page:
-        PAGE.write_text("\n".join(results.page(results.read(options.results))) + "\n")
-        return 0
+        return keep(PAGE, "\n".join(results.page(results.read(options.results))) + "\n")
     if options.seed is not None:
         found = [run(name, options.seed, options.until) for name in options.scenario or [MIXED]]
         print("\n".join(result.line for result in found))
@@ -123,14 +122,14 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("scenario", nargs="*", metavar="SCENARIO", help="all of them if left out")
-    parser.add_argument("--seeds", type=int, default=1, metavar="N", help="of each, 1 to N")
-    parser.add_argument("--seed", type=int, metavar="N", help="only this one, written nowhere")
+    parser.add_argument("--seeds", type=whole(1), default=1, metavar="N", help="of each, 1 to N")
+    parser.add_argument("--seed", type=whole(), metavar="N", help="only this one, written nowhere")
     parser.add_argument(
-        "--until", type=float, default=float("inf"), metavar="S", help="second of the run"
+        "--until", type=real(), default=float("inf"), metavar="S", help="second of the run"
     )
-    parser.add_argument("--hours", type=float, metavar="H", help="of the day with churn")
+    parser.add_argument("--hours", type=real(), metavar="H", help="of the day with churn")
     parser.add_argument(
-        "--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="at once"
+        "--jobs", type=whole(1), default=os.cpu_count() or 1, metavar="N", help="at once"
     )
     parser.add_argument(
         "--results",

@@ -8,8 +8,9 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from pathlib import Path
 
+from lab.files import keep, result_file
+from lab.numbers import whole
 from lab.trust import play, table
 from lab.trust.cases import CASES, QUICK
 from lab.trust.play import Trusted
@@ -30,8 +31,6 @@ def main(arguments: list[str] | None = None) -> int:
     """Run it; the exit code."""
     parser = _parser()
     options = parser.parse_args(arguments)
-    if options.jobs < 1 or (options.seeds is not None and options.seeds < 1):
-        parser.error("--seeds and --jobs are at least 1")
     if options.list:
         print("\n".join(f"{c.name:<14} {c.seeds:>3} seeds  {c.what}" for c in CASES.values()))
         return 0
@@ -40,10 +39,9 @@ def main(arguments: list[str] | None = None) -> int:
     seeds = {name: options.seeds or usual.get(name, 1) for name in names}
     found = play.trusted(seeds, options.jobs)
     print("\n".join(page(found)))
-    if options.json:
-        options.json.write_text(json.dumps(play.as_json(found), indent=1) + "\n")
+    code = keep(options.json, json.dumps(play.as_json(found), indent=1) + "\n")
     kept = [check.is_kept for trusted in found for check in trusted.checks]
-    return 0 if all(kept) else BROKEN
+    return code if all(kept) else BROKEN
 
 
 def page(found: list[Trusted]) -> list[str]:
@@ -68,11 +66,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("case", nargs="*", metavar="CASE", help="all of them when left out")
     parser.add_argument("--quick", action="store_true", help="a few cases, few seeds")
-    parser.add_argument("--seeds", type=int, metavar="N", help="of each case, not its usual number")
     parser.add_argument(
-        "--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="at once"
+        "--seeds", type=whole(1), metavar="N", help="of each case, not its usual number"
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
+    parser.add_argument(
+        "--jobs", type=whole(1), default=os.cpu_count() or 1, metavar="N", help="at once"
+    )
+    parser.add_argument("--json", type=result_file, metavar="FILE", help="write all figures there")
     parser.add_argument("--list", action="store_true", help="name the cases")
     return parser
 

@@ -20,6 +20,7 @@ import numpy as np
 from drslamd.gossip.message_types import PoseState
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import PoseNow
+from lab.numbers import whole
 from lab.play import virtual_team
 from lab.play.playback import equip, robot_config
 from lab.play.simulator import Member, Simulator
@@ -232,8 +233,12 @@ def holes(what: str, seeds: range) -> Iterator[Hole]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--what", default="cable", choices=tuple(BACK_S))
-    parser.add_argument("--seeds", type=int, default=20, metavar="N", help="default: %(default)s")
-    parser.add_argument("--first", type=int, default=1, metavar="N", help="default: %(default)s")
+    parser.add_argument(
+        "--seeds", type=whole(1), default=20, metavar="N", help="default: %(default)s"
+    )
+    parser.add_argument(
+        "--first", type=whole(), default=1, metavar="N", help="default: %(default)s"
+    )
     asked = parser.parse_args()
     found: list[Hole] = []
     for hole in holes(asked.what, range(asked.first, asked.first + asked.seeds)):

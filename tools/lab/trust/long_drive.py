@@ -15,6 +15,7 @@ import numpy as np
 
 from drslamd.slam.tuning import DEFAULTS, Tuning
 from lab.accuracy.accuracy_rows import Figure
+from lab.numbers import real, whole
 from lab.play import virtual_team
 from lab.play.simulator import Simulator
 from lab.recordings import world
@@ -123,8 +124,8 @@ def figures(seeds: Iterable[int] = SEEDS, seconds: float = SECONDS) -> list[Figu
 def main(arguments: list[str] | None = None) -> int:
     """Run it; 0 when every figure is reached."""
     parser = argparse.ArgumentParser(prog="lab.trust.long_drive", description=__doc__)
-    parser.add_argument("--seeds", type=int, nargs="+", default=list(SEEDS))
-    parser.add_argument("--seconds", type=float, default=SECONDS)
+    parser.add_argument("--seeds", type=whole(), nargs="+", default=list(SEEDS))
+    parser.add_argument("--seconds", type=real(1), default=SECONDS)
     options = parser.parse_args(arguments)
     found = figures(options.seeds, options.seconds)
     for figure in found:

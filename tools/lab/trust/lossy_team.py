@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drslamd.conventions import node_chain
+from lab.numbers import real, whole
 from lab.play import virtual_team
 from lab.play.simulator import Network
 from lab.progress import Progress
@@ -95,12 +96,12 @@ def lines(loss: float, pairs: list[tuple[Live, Live]]) -> Iterator[str]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--robots", type=int, default=10, metavar="N")
-    parser.add_argument("--modules", type=int, default=2, metavar="N")
-    parser.add_argument("--loss", type=float, default=0.3, metavar="SHARE")
-    parser.add_argument("--seeds", type=int, default=1, metavar="N")
-    parser.add_argument("--first", type=int, default=1, metavar="N")
-    parser.add_argument("--seconds", type=float, default=SCENE.seconds)
+    parser.add_argument("--robots", type=whole(2, 100), default=10, metavar="N")
+    parser.add_argument("--modules", type=whole(), default=2, metavar="N")
+    parser.add_argument("--loss", type=real(0, 1), default=0.3, metavar="SHARE")
+    parser.add_argument("--seeds", type=whole(1), default=1, metavar="N")
+    parser.add_argument("--first", type=whole(), default=1, metavar="N")
+    parser.add_argument("--seconds", type=real(1), default=SCENE.seconds)
     asked = parser.parse_args()
     pairs = []
     for seed in range(asked.first, asked.first + asked.seeds):

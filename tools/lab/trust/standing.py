@@ -20,6 +20,7 @@ from drslamd.conventions import GRID_US, node_chain
 from drslamd.gossip.message_types import PoseState
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import TeamEstimate
+from lab.numbers import real, whole
 from lab.play import virtual_team
 from lab.play.simulator import Simulator
 from lab.progress import Progress
@@ -207,10 +208,10 @@ def lines(what: str, runs: list[Run]) -> Iterator[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--what", default="robot", choices=("robot", "module", "moved"))
-    parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--first", type=int, default=1)
-    parser.add_argument("--seconds", type=float, default=SCENE.seconds)
-    parser.add_argument("--drivers", type=int, default=DRIVERS)
+    parser.add_argument("--seeds", type=whole(1), default=20)
+    parser.add_argument("--first", type=whole(), default=1)
+    parser.add_argument("--seconds", type=real(1), default=SCENE.seconds)
+    parser.add_argument("--drivers", type=whole(1, 100), default=DRIVERS)
     options = parser.parse_args()
     seeds = range(options.first, options.first + options.seeds)
     progress, runs = Progress("played", len(seeds), "runs"), []

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drslamd.sensors.wheels.wheel_input import WheelInput
+from lab.numbers import whole
 from lab.play.playback import equip, robot_config
 from lab.progress import Progress
 from lab.recordings import world
@@ -107,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="lab.reproduce.gyro.alone", description=(__doc__ or "").split("\n")[0]
     )
-    parser.add_argument("--seeds", type=int, default=20, metavar="N", help="default 20")
+    parser.add_argument("--seeds", type=whole(1), default=20, metavar="N", help="default 20")
     options = parser.parse_args(arguments)
     cases = [case for case in CASES if case.has_gyro or not case.slips]
     drives: dict[str, list[Drive]] = {case.name: [] for case in cases}
