@@ -9,7 +9,9 @@ import pytest
 from lab.healing import Conversation, heal, joined, parted, restarted
 from places import Recorded
 
-from drslamd.slam.graph.chapters import SPAN
+from drslamd.slam.graph.chapters.books import LEVELS
+
+SPAN = LEVELS[0].entries
 
 
 @pytest.mark.row("N6")

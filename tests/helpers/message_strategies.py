@@ -21,7 +21,7 @@ from drslamd.gossip.message_types import (
     PoseState,
     Status,
 )
-from drslamd.slam.graph.chapters import PER_ENTRY
+from drslamd.slam.graph.chapters.books import PER_ENTRY
 from drslamd.slam.graph.measurements import (
     Chapter,
     ClosureMeasurement,
@@ -145,10 +145,12 @@ def chapters(draw: st.DrawFn) -> GraphEntry:
     """An entry that is part of a chapter."""
     seq = draw(samples)
     first = max(0, seq - draw(st.integers(0, 64)))
-    layer = draw(st.integers(0, 2))
-    parts = (0, 0, 0)
-    if layer == 0 and seq - first >= 3 and draw(st.booleans()):
-        parts = (draw(st.integers(0, 1)), draw(st.integers(0, 1)), 1)
+    parts, replaces = 0, tuple[tuple[int, int], ...]()
+    if seq > first and draw(st.booleans()):
+        parts = draw(st.integers(1, min(127, seq - first)))
+        edges = st.sets(st.integers(first, seq + 1 - parts), min_size=2, max_size=8)
+        ends = sorted(draw(edges))
+        replaces = tuple(zip(ends[::2], ends[1::2], strict=False))
     places = st.integers(first * PER_ENTRY, (seq + 1) * PER_ENTRY - 1)
 
     def placed(items: st.SearchStrategy[Any]) -> tuple[Any, ...]:
@@ -157,9 +159,8 @@ def chapters(draw: st.DrawFn) -> GraphEntry:
         return tuple(sorted(found.items(), key=lambda entry: (entry[1].peer, entry[0])))
 
     said = Chapter(
-        layer,
-        first,
         parts,
+        replaces,
         tuple(draw(st.lists(st.tuples(st.integers(first, seq), models), max_size=2))),
         tuple(draw(st.lists(keyframes, max_size=4))),
         placed(ranges),

@@ -20,7 +20,7 @@ from drslamd.gossip.message_types import (
     Status,
 )
 from drslamd.gossip.seal import Seal
-from drslamd.slam.graph.chapters import PER_ENTRY
+from drslamd.slam.graph.chapters.books import PER_ENTRY
 from drslamd.slam.graph.measurements import (
     Chapter,
     ClosureMeasurement,
@@ -144,12 +144,12 @@ class Liar:
         """Entry `seq` of a log, which says again what no other entry said."""
         first = max(0, seq - int(self._rng.integers(65)))
         is_last = seq - first >= 2 and self._rng.random() < 0.5
-        parts = (int(self._rng.integers(0, seq - first)), 0, 1) if is_last else (0, 0, 0)
+        parts = int(self._rng.integers(1, seq - first + 1)) if is_last else 0
+        end = int(self._rng.integers(first + 1, seq + 2 - parts)) if is_last else first
         models = ((first, RobotModel(OdometryNoise(0.5, 0.5, 0.5, 0.5))),)
         return Chapter(
-            0 if is_last else int(self._rng.integers(3)),
-            first,
             parts,
+            ((first, end),) if is_last else (),
             models[: self._int(0, 1)],
             tuple(self._keyframe() for _ in range(self._int(0, 5))),
             self._placed(self._range, first, seq),
