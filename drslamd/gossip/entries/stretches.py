@@ -15,7 +15,11 @@ MOST_BITS = 35
 
 
 def packed(states: Sequence[LogState]) -> tuple[list[LogState], bytes]:
-    """The first row of each log, and what the other rows say."""
+    """The first row of each log, and what the other rows say.
+
+    Raises:
+        ValueError: they do not follow each other.
+    """
     rows: dict[tuple[int, int], list[LogState]] = {}
     for state in states:
         rows.setdefault((state.id, state.epoch), []).append(state)
@@ -32,6 +36,8 @@ def _said(rows: Sequence[LogState]) -> bytes:
 
 
 def _coded(number: int) -> bytes:
+    if number < 0:
+        raise ValueError("stretches of a log out of order")
     out = bytearray()
     while number >> 7:
         out.append(number & 127 | 128)

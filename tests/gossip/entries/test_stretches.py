@@ -57,6 +57,12 @@ def test_what_nobody_says_is_refused(data: bytes) -> None:
         stretches.unpacked(rows(3, 5, 10), data)
 
 
+def test_rows_that_do_not_follow_each_other_are_not_said() -> None:
+    for beyond in ((4, 6), (8, 7)):
+        with pytest.raises(ValueError, match="out of order"):
+            stretches.packed(rows(3, 5, 10, beyond))
+
+
 def test_a_log_is_named_once() -> None:
     with pytest.raises(ValueError, match="twice"):
         stretches.unpacked([*rows(3, 5, 10), *rows(3, 6, 10)], b"\x00\x00")
