@@ -1,9 +1,9 @@
 """How large logs grow: what each robot of a team holds of all, hour by hour, and after ten.
 
-The team of `lab.healing` without a radio: everybody says what robots say that drive all the while and
-range to ten others each second, and chapters stand for what is old.
+The team of `lab.healing` without a radio: everybody says what robots say that drive all the while
+and range to ten others each second, and chapters stand for what is old.
 
-    python -m lab.log_sizes                 # twenty robots, three hours, ten worked out; ten minutes
+    python -m lab.log_sizes             # twenty robots, three hours, ten worked out: ten minutes
     python -m lab.log_sizes --robots 5 --hours 10
 """
 

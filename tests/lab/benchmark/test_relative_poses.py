@@ -39,7 +39,7 @@ def test_the_bytes_are_those_that_its_module_describes() -> None:
     """Written down once more with struct."""
     header = Header(3, 3, 11, 12, 13)
     message = relative_poses.encode(header, some(2))
-    expected = FINGERPRINT + struct.pack(">bhqiq", 2, 3, 11, 12, 13) + bytes(8)
+    expected = FINGERPRINT + struct.pack(">bhqiq", 3, 3, 11, 12, 13) + bytes(8)
     expected += struct.pack(">ih", 4, 254)
     for k in range(2):
         values = (math.pi / (k + 1), -math.e, 1e-300, 1e300, 0.1 + k)
