@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from drslamd.conventions import GRID_HZ, ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain
 from drslamd.slam.graph.chapters.coarse_measurements import (
+    WHOLE_WAY_STEPS,
     coarse_closure,
     coarse_keyframe,
     coarse_range,
@@ -215,6 +216,7 @@ def coarse(book: Book) -> Book:
     """The same as chapters say it."""
     return replace(
         book,
+        keyframes=[coarse_keyframe(k, WHOLE_WAY_STEPS) for k in book.keyframes],
         ranges=[(place, coarse_range(item)) for place, item in book.ranges],
         closures=[(place, coarse_closure(item)) for place, item in book.closures],
         words=[(place, coarse_closure(item)) for place, item in book.words],
