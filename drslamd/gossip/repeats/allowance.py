@@ -30,6 +30,9 @@ MOST_LOSS = 0.8
 """That is reckoned with."""
 REPEATED = 0.55
 """At a loss p, messages that one needs beyond itself until all have it, by p / (1 - p)^2."""
+UNSURE = 1.2
+"""At a loss p, this times p (1 - p) of repeats is left as well: whoever hears only some of them does
+not know how many the others were, and all fill what room they see."""
 BIN_US = SECOND_US // 10
 PER_SECOND, PERIOD = 10, 30
 """Bins of a second, and of the three between two statuses."""
@@ -167,7 +170,8 @@ class Allowance:
         most = max(MOST * self._first.rate(utime), least) * needed
         first, again = self._first.busiest(utime), self._again.bytes(utime)
         repeats = max(most - first, LEAST_SHARE * most)
-        room = repeats * (1 - RESERVE) if is_one_of_many else repeats
+        left = RESERVE + UNSURE * self.loss * (1 - self.loss)
+        room = repeats * (1 - left) if is_one_of_many else repeats
         is_flooded = first + again > FLOOD * most
         is_waiting = utime - self._own_utime < SECOND_US
         return again + size + FRAMING <= room or (is_flooded and not is_waiting)

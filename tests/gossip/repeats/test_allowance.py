@@ -96,11 +96,15 @@ def test_one_of_many_leaves_a_fiftieth_of_the_room() -> None:
 
 
 def test_they_may_be_more_where_messages_are_lost() -> None:
-    """At a loss of a half each needs 0.55 * 0.5 / 0.25 beyond itself: of 2,800 bytes 5,880."""
+    """At a loss of a half each needs 0.55 * 0.5 / 0.25 beyond itself: of 2,800 bytes 5,880. One of
+    many leaves a third of that, 1.2 / 4 and a fiftieth, since half of what is said again is not
+    heard of."""
     lossy = Allowance()
     lossy.reckon([0.5, 0.5, 0.0])
     assert lossy.has_room(T0, 5_879 - FRAMING)
     assert not lossy.has_room(T0, 5_881 - FRAMING)
+    assert lossy.has_room(T0, 3_998 - FRAMING, is_one_of_many=True)
+    assert not lossy.has_room(T0, 3_999 - FRAMING, is_one_of_many=True)
     hopeless = Allowance()
     hopeless.reckon([1.0])
     assert hopeless.loss == 0.8
