@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Iterator, Set
+from collections.abc import Callable, Iterable, Set
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -103,53 +103,57 @@ class ChapterWriter:
         self._is_asked = lacking >= FEWEST
 
     def due(self, seq: int, utime: int, team: Audience) -> list[GraphEntry]:
-        """The entries that follow now, from number `seq` on: chapters, most often none."""
+        """The entries that follow now, from number `seq` on: one chapter, most often none. Ask once
+        a second: what becomes due at once is said one chapter after the other, because each takes
+        as long as sensors may wait."""
         is_full = self._measurements >= MOST_MEASUREMENTS
-        if not is_full and len(self._entries) < (FEWEST if self._is_asked else LEVELS[0].entries):
-            return []
-        self._is_asked = False
-        new = coarse(bound(self._unsaid))
-        self._entries, self._unsaid, self._measurements = [], [], 0
-        out = self._say(new, 0, seq, team)
+        if is_full or len(self._entries) >= (FEWEST if self._is_asked else LEVELS[0].entries):
+            self._is_asked = False
+            new = coarse(bound(self._unsaid))
+            self._entries, self._unsaid, self._measurements = [], [], 0
+            return self._say(new, 0, seq, team)
         for number, level in enumerate(LEVELS[1:], start=1):
             until = utime - SECOND_US * level.age_s(team.recent_s)
-            for old in self._ripe(number, seq - MOST_LAG // 2, until):
+            old = self._ripe(number, seq - MOST_LAG // 2, until)
+            if old is not None:
                 ends = team.named(old, level)
                 longest = int(LONGEST_STEP_S) - 1 if self._has_gyro else level.keyframes_s
                 # (a later one says what the sensors are like)
                 book = replace(condensed(old, level, ends, longest), models=[])
-                out += self._say(book, number, seq + len(out), team)
-        return out
+                return self._say(book, number, seq, team)
+        return []
 
-    def _ripe(self, number: int, first: int, until: int) -> Iterator[Book]:
-        """Chapters of the level below that together make one of this level.
+    def _ripe(self, number: int, first: int, until: int) -> Book | None:
+        """Chapters of the level below that together make the next one of this level, if there are.
 
         Args:
             first: what was said before this entry has to be said now; until: what was said before
                 this time is old enough.
         """
         waiting, most = self._said[number - 1], LEVELS[number].entries
-        while waiting:
-            is_late = is_ready = waiting[0].spans[0][0] < first
-            taken: list[Book] = []
-            for book in waiting:
-                spans = merged_spans([span for one in (*taken, book) for span in one.spans])
-                if sum(one.entries for one in taken) >= most or len(spans) >= MOST_SPANS:
-                    is_ready = True
-                    break
-                if book.utime >= until and not is_late:
-                    break
-                taken.append(book)
-            is_ready = is_ready or sum(one.entries for one in taken) >= most
-            if not (taken and is_ready):
-                return
-            del waiting[: len(taken)]
-            yield bound(taken)
+        if not waiting:
+            return None
+        is_late = is_ready = waiting[0].spans[0][0] < first
+        taken: list[Book] = []
+        for book in waiting:
+            spans = merged_spans([span for one in (*taken, book) for span in one.spans])
+            if sum(one.entries for one in taken) >= most or len(spans) >= MOST_SPANS:
+                is_ready = True
+                break
+            if book.utime >= until and not is_late:
+                break
+            taken.append(book)
+        is_ready = is_ready or sum(one.entries for one in taken) >= most
+        if not (taken and is_ready):
+            return None
+        del waiting[: len(taken)]
+        return bound(taken)
 
     def _say(self, book: Book, number: int, seq: int, team: Audience) -> list[GraphEntry]:
         """A book of a level in as many entries as it takes."""
         spans, most = tuple(book.spans), team.most_bytes()
-        count = 1
+        # (pieces have about as many bytes as the whole, and their envelopes)
+        count = 1 + len(packed(book.part())) // most
         while not all(_fits(piece, spans, most) for piece in book.pieces(count)):
             count += 1
         chapters = [piece.part() for piece in book.pieces(count)]

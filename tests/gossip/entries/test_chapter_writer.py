@@ -201,7 +201,12 @@ def test_the_keyframes_that_others_name_are_asked_for_and_stay() -> None:
     writer.due(257, 0, replace(MANY, named=named))
     for k in range(257, 513):
         writer.take(an_entry(k, 10 * k), 700 * SECOND)
-    said = writer.due(513, 1_362 * SECOND, replace(MANY, named=named))
+    now, audience = 1_362 * SECOND, replace(MANY, named=named)
+    (new,) = writer.due(513, now, audience)
+    assert new.chapter is not None
+    assert new.chapter.replaces == ((257, 513),)
+    said = writer.due(514, now, audience)
+    assert not writer.due(514 + len(said), now, audience)
     assert asked == [(0, 2_560, 16)]
     frames = {k.n for entry in said if entry.chapter for k in entry.chapter.keyframes}
     assert {50, 70} <= frames
