@@ -31,8 +31,8 @@ MOST_LOSS = 0.8
 REPEATED = 0.55
 """At a loss p, messages that one needs beyond itself until all have it, by p / (1 - p)^2."""
 UNSURE = 1.2
-"""At a loss p, this times p (1 - p) of repeats is left as well: whoever hears only some of them does
-not know how many the others were, and all fill what room they see."""
+"""At a loss p, this times p (1 - p) of repeats is left as well: whoever hears only some of them
+does not know how many the others were, and all fill what room they see."""
 BIN_US = SECOND_US // 10
 PER_SECOND, PERIOD = 10, 30
 """Bins of a second, and of the three between two statuses."""
