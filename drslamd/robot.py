@@ -252,9 +252,10 @@ class Robot:
         keyframes = (keyframe,) if keyframe else ()
         entries = self.team.entries(self.front.model, keyframes, ranges, closures)
         said = [self.team.append(entry, utime) for entry in entries]
-        chapter = self.team.write_chapter(utime, aloud=bool(neighbours))
-        for decoded in [*(decoded for decoded, _ in said), *chapter]:
+        for decoded, _ in said:
             self.back.insert(self.own, decoded)
+        for chapter in self.team.write_chapters(utime, self.back.graph, aloud=bool(neighbours)):
+            self.back.insert(self.own, chapter)
         return [self.team.send_sealed(self.own.robot, s) for _, s in said] if neighbours else []
 
     # the three modules

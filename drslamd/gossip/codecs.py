@@ -18,6 +18,7 @@ from drslamd.conventions import (
 )
 from drslamd.gossip import bounds
 from drslamd.gossip.bounds import LONGEST_STEP, bounded
+from drslamd.gossip.entries import stretches
 from drslamd.gossip.entries.chapter_packing import packed, unpacked
 from drslamd.gossip.entries.hypothesis_codecs import fill_hypotheses, read_hypotheses
 from drslamd.gossip.entries.measurement_codecs import (
@@ -35,6 +36,7 @@ from drslamd.gossip.entries.measurement_codecs import (
 )
 from drslamd.gossip.message_types import (
     MAX_BATCH,
+    MAX_BEYOND,
     MAX_HEARD,
     MAX_LOGS,
     NOTHING_WANTED,
@@ -65,14 +67,17 @@ def _fill_status(out: Any, m: Status) -> None:
     out.state, out.frame, out.leaving = m.state, m.frame, int(m.leaving)
     out.uwb_id, out.uwb_clock_us, out.graph_hash = m.uwb_id, m.uwb_clock_us, m.graph_hash
     out.heard = [filled(lcmtypes.heard_t, h) for h in m.heard]
-    out.logs = [filled(lcmtypes.log_t, log) for log in m.logs]
+    logs, out.beyond = stretches.packed(m.logs)
+    out.logs = [filled(lcmtypes.log_t, log) for log in logs]
     out.ranged = list(m.ranged)
-    out.n_heard, out.n_logs, out.n_ranged = len(m.heard), len(m.logs), len(m.ranged)
+    out.n_heard, out.n_logs, out.n_ranged = len(m.heard), len(logs), len(m.ranged)
+    out.n_beyond = len(out.beyond)
 
 
 def _read_status(raw: Any) -> Status:
     bounded("heard", raw.n_heard, 0, MAX_HEARD)
     bounded("logs", raw.n_logs, 0, MAX_LOGS)
+    bounded("bytes about gaps", raw.n_beyond, 0, MAX_BEYOND)
     bounded("ranged", raw.n_ranged, 0, MAX_HEARD)
     logs = tuple(
         LogState(bounds.robot(r.id), bounds.epoch(r.epoch), r.first, r.complete, r.newest)
@@ -89,7 +94,7 @@ def _read_status(raw: Any) -> Status:
         graph_hash=raw.graph_hash,
         heard=tuple(_read_heard(h) for h in raw.heard),
         ranged=tuple(bounds.robot(robot) for robot in raw.ranged),
-        logs=logs,
+        logs=stretches.unpacked(logs, raw.beyond),
     )
 
 

@@ -7,8 +7,11 @@ log; `log_repeats` says who then repeats what is missing.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from drslamd.conventions import MILLISECOND_US, SECOND_US, Chain
-from drslamd.gossip.message_types import MAX_LOGS, MAX_STRETCHES, LogState
+from drslamd.gossip.entries import stretches
+from drslamd.gossip.message_types import LOG_BYTES, MAX_BEYOND, MAX_LOGS, LogState
 from drslamd.gossip.repeats.allowance import Speech
 from drslamd.gossip.repeats.log_repeats import REPEATS_AT_ONCE, LogRepeats, holdings
 from drslamd.gossip.replicated_log import AHEAD, ReplicatedLog
@@ -18,6 +21,19 @@ ECHO_US = 200 * MILLISECOND_US
 """So late at most we hear ourselves."""
 MUCH = 650
 """Bytes of a large repeat: where there is no room for it, others say again what they can."""
+
+
+def _with_stretches(
+    state: LogState, logs: Mapping[int, ReplicatedLog], most: int
+) -> list[LogState]:
+    """A row of a status, and those that follow it in so many bytes."""
+    out, log = [state], logs[state.id]
+    for first, end in log.stretches() if log.complete < log.newest else ():
+        row = LogState(state.id, log.epoch, first, end, log.newest)
+        if stretches.size([*out, row]) > most:
+            break
+        out.append(row)
+    return out
 
 
 class LogSync:
@@ -107,13 +123,9 @@ class LogSync:
             LogState(robot, log.epoch, log.start, log.complete, log.newest)
             for robot, log in logs.items()
         ]
-        # (a status that is full leaves logs out)
-        room = MAX_LOGS - 1 - len(states)
-        most = min(MAX_STRETCHES, room // max(1, len(lacking)))
-        for robot, log in lacking.items() if most > 0 else ():
-            rows = log.stretches(most)
-            states += [LogState(robot, log.epoch, *row, log.newest) for row in rows]
-        return tuple(states)
+        room = min(MAX_BEYOND - MAX_LOGS, LOG_BYTES * (MAX_LOGS - len(states)))
+        share = 1 + room // max(1, len(lacking))
+        return tuple(row for state in states for row in _with_stretches(state, logs, share))
 
     def epoch(self, robot: int) -> int | None:
         log = self._logs.get(robot)
@@ -165,7 +177,7 @@ class LogSync:
             log = self._logs.get(theirs.id)
             if log is not None and theirs.epoch == log.epoch:
                 self._learn(log, theirs, is_owner=theirs.id == sender)
-        left_out = self._logs.keys() - first_rows if len(states) == MAX_LOGS else set()
+        left_out = self._logs.keys() - first_rows if len(first_rows) == MAX_LOGS else set()
         self.repeats.on_status(sender, holdings(states), left_out, utime)
 
     def _learn(self, log: ReplicatedLog, theirs: LogState, is_owner: bool) -> None:

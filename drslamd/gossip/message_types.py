@@ -26,12 +26,15 @@ UNANSWERED = -LAST_UTIME
 says does not count before (`drslamd.gossip.acquaintance`)."""
 
 MAX_HEARD = 28
-"""Peers named in one status, which with as many logs has 1,361 bytes; whoever hears more names them
+"""Peers named in one status, which with as many logs has 1,391 bytes; whoever hears more names them
 in turn."""
 MAX_LOGS = 28
 """Logs named in one status; whoever holds more names them in turn."""
-MAX_STRETCHES = 6
-"""Of one log, in one status."""
+MAX_BEYOND = 240 + MAX_LOGS
+"""Bytes that say what is held beyond gaps of logs: of each log how many stretches, and 60 or more
+of these."""
+LOG_BYTES = 22
+"""Of a log in a status; what is said of gaps takes the place of as many logs."""
 MAX_PLACES = 20
 """Of all peers in one message: four of each of the nearest five, at least."""
 MAX_MOTIONS = 8

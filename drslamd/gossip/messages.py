@@ -59,6 +59,17 @@ _DECODE_EXCEPTIONS = (ValueError, struct.error, IndexError)
 """What the generated decoders and our checks raise on bytes that are not theirs."""
 
 
+class _Whole(BytesIO):
+    """Bytes of which nobody gets fewer than asked for: LCM's decoders take what is left of them for
+    an array of bytes, however many it says it has."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        found = super().read(size)
+        if len(found) != size:
+            raise ValueError("bytes that end too soon")
+        return found
+
+
 def channel(kind: str, robot: int) -> str:
     return f"{CHANNEL_PREFIX}{kind}_{robot:03d}"
 
@@ -88,10 +99,10 @@ def encode(header: Header, message: Message) -> bytes:
 
 def decode(kind: str, payload: bytes) -> Message | str:
     """The message, or one phrase that says what is wrong with it."""
-    codec, stream = CODECS[kind], BytesIO(payload)
+    codec, stream = CODECS[kind], _Whole(payload)
     try:
         raw = codec.struct.decode(stream)
-        if stream.read(1):
+        if stream.tell() < len(payload):
             return "bytes left over"
         return cast(Message, codec.read(raw))
     except _DECODE_EXCEPTIONS as error:

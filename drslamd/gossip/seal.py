@@ -24,8 +24,8 @@ from drslamd.gossip.epochs import FIRST_EPOCH
 from drslamd.gossip.lc02 import MAX_PAYLOAD
 from drslamd.gossip.replay_window import ReplayWindow
 
-VERSION = 2
-"""Of the set of types: 2 says the graph without relative poses in full precision."""
+VERSION = 3
+"""Of the set of types: 3 has chapters of chapters, and says gaps of logs in few bytes."""
 KEY_BYTES = 32
 TAG_BYTES = 8
 """A forger needs 2^63 tries, each of them a datagram."""

@@ -9,7 +9,7 @@ from drslamd.conventions import SECOND_US, Chain
 from drslamd.events import ChannelMessage, Datagram, Send
 from drslamd.gossip import messages
 from drslamd.gossip.bounds import LAST_SEQ, Measurement, is_sayable
-from drslamd.gossip.entries.chapter_writer import ChapterWriter
+from drslamd.gossip.entries.chapter_writer import ChapterWriter, audience_of
 from drslamd.gossip.envelopes.opening import Opened, entry_of, opened
 from drslamd.gossip.envelopes.splitting import entries_of, parts_of
 from drslamd.gossip.log_sync import LogSync
@@ -31,6 +31,7 @@ from drslamd.slam.graph.measurements import (
     Keyframe,
     RangeMeasurement,
 )
+from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.robot_model import RobotModel
 
@@ -75,8 +76,6 @@ class Team:
     def refused(self) -> Counter[str]:
         return self.refusals.counts
 
-    # outgoing
-
     def send(self, message: Message, utime: int) -> Send:
         """Seal a message."""
         channel = messages.channel(messages.kind_of(message), self.own.robot)
@@ -96,7 +95,7 @@ class Team:
         if not isinstance(decoded, GraphEntry):
             raise AssertionError(f"own graph entry does not decode: {decoded}")
         self.logs.say(self.own, decoded, sealed, utime)
-        self._chapters.take(decoded)
+        self._chapters.take(decoded, utime)
         self._next_seq = decoded.seq + 1
         return decoded, sealed
 
@@ -115,17 +114,19 @@ class Team:
         self._told_model = model if measurements else self._told_model
         yield from entries_of(model, measurements, self._next_seq, is_news=is_news)
 
-    def write_chapter(self, utime: int, *, aloud: bool) -> list[GraphEntry]:
+    def write_chapters(self, utime: int, graph: PoseGraph, *, aloud: bool) -> list[GraphEntry]:
         """Entries that follow where a chapter is due; they are said later, if `aloud`."""
-        entries = [self.append(e, utime)[0] for e in self._chapters.due(self._next_seq)]
+        team = audience_of(graph, self.own, 1 + len(self.living(utime)))
+        entries = [
+            self.append(e, utime)[0] for e in self._chapters.due(self._next_seq, utime, team)
+        ]
         for entry in entries if aloud else ():
             self.logs.repeats.say_when_there_is_room(Place(*self.own, entry.seq), utime)
         return entries
 
     def is_asking(self, utime: int) -> bool:
         """Do we lack odometry that may still come, or entries that are not on their way?"""
-        lacks_odometry = any(peer.lacks_odometry for peer in self.peers.values())
-        return lacks_odometry or self.logs.is_asking(utime)
+        return self.logs.is_asking(utime) or any(p.lacks_odometry for p in self.peers.values())
 
     def send_sealed(self, owner: int, sealed: bytes) -> Send:
         """A log entry as it was sealed, ours or another's."""
@@ -168,8 +169,6 @@ class Team:
     def _is_peer(self, chain: Chain) -> bool:
         peer = self.peers.get(chain.robot)
         return peer is not None and peer.chain == chain
-
-    # incoming
 
     def receive(self, event: Datagram | ChannelMessage) -> Received | None:
         """Judge one datagram; whatever is wrong with it is counted by its reason."""

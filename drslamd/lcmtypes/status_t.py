@@ -12,11 +12,11 @@ import drslamd.lcmtypes
 class status_t(object):
     """ Heartbeat, every second, or every third without news: who I am, whom I hear, what I hold. """
 
-    __slots__ = ["header", "state", "frame", "leaving", "uwb_id", "uwb_clock_us", "graph_hash", "n_heard", "heard", "n_ranged", "ranged", "n_logs", "logs"]
+    __slots__ = ["header", "state", "frame", "leaving", "uwb_id", "uwb_clock_us", "graph_hash", "n_heard", "heard", "n_ranged", "ranged", "n_logs", "logs", "n_beyond", "beyond"]
 
-    __typenames__ = ["drslamd.lcmtypes.header_t", "int8_t", "int16_t", "int8_t", "int64_t", "int64_t", "int64_t", "int16_t", "drslamd.lcmtypes.heard_t", "int16_t", "int16_t", "int16_t", "drslamd.lcmtypes.log_t"]
+    __typenames__ = ["drslamd.lcmtypes.header_t", "int8_t", "int16_t", "int8_t", "int64_t", "int64_t", "int64_t", "int16_t", "drslamd.lcmtypes.heard_t", "int16_t", "int16_t", "int16_t", "drslamd.lcmtypes.log_t", "int16_t", "byte"]
 
-    __dimensions__ = [None, None, None, None, None, None, None, None, ["n_heard"], None, ["n_ranged"], None, ["n_logs"]]
+    __dimensions__ = [None, None, None, None, None, None, None, None, ["n_heard"], None, ["n_ranged"], None, ["n_logs"], None, ["n_beyond"]]
 
     def __init__(self):
         self.header = drslamd.lcmtypes.header_t()
@@ -73,6 +73,15 @@ class status_t(object):
         """ LCM Type: int16_t """
         self.logs = []
         """ LCM Type: drslamd.lcmtypes.log_t[n_logs] """
+        self.n_beyond = 0
+        """
+        what it holds of these logs beyond `complete`: the packed numbers of
+        drslamd/gossip/entries/stretches.py
+        LCM Type: int16_t
+        """
+
+        self.beyond = b""
+        """ LCM Type: byte[n_beyond] """
 
     def encode(self):
         buf = BytesIO()
@@ -93,6 +102,8 @@ class status_t(object):
         for i0 in range(self.n_logs):
             assert self.logs[i0]._get_packed_fingerprint() == drslamd.lcmtypes.log_t._get_packed_fingerprint()
             self.logs[i0]._encode_one(buf)
+        buf.write(struct.pack(">h", self.n_beyond))
+        buf.write(bytearray(self.beyond[:self.n_beyond]))
 
     @staticmethod
     def decode(data: bytes):
@@ -118,13 +129,15 @@ class status_t(object):
         self.logs = []
         for i0 in range(self.n_logs):
             self.logs.append(drslamd.lcmtypes.log_t._decode_one(buf))
+        self.n_beyond = struct.unpack(">h", buf.read(2))[0]
+        self.beyond = buf.read(self.n_beyond)
         return self
 
     @staticmethod
     def _get_hash_recursive(parents):
         if status_t in parents: return 0
         newparents = parents + [status_t]
-        tmphash = (0x7e778e596f0dfd17+ drslamd.lcmtypes.header_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.heard_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.log_t._get_hash_recursive(newparents)) & 0xffffffffffffffff
+        tmphash = (0x82b39eb26a68fd4d+ drslamd.lcmtypes.header_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.heard_t._get_hash_recursive(newparents)+ drslamd.lcmtypes.log_t._get_hash_recursive(newparents)) & 0xffffffffffffffff
         tmphash  = (((tmphash<<1)&0xffffffffffffffff) + (tmphash>>63)) & 0xffffffffffffffff
         return tmphash
     _packed_fingerprint = None

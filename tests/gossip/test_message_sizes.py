@@ -15,6 +15,7 @@ from drslamd.events import ChannelMessage, Send
 from drslamd.gossip import lc02, messages
 from drslamd.gossip.envelopes.splitting import MEASUREMENTS_PER_ENTRY
 from drslamd.gossip.lc02 import MAX_PAYLOAD
+from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.message_types import (
     MAX_MOTIONS,
     MAX_PLACES,
@@ -41,10 +42,26 @@ def fits(send: Send) -> bool:
 
 
 @pytest.mark.row("N9")
-def test_a_full_status_has_1361_bytes() -> None:
-    """8 + 31 + 34 of frame, 28 peers of 22, 28 ids of 2 and 28 logs of 22."""
-    status = a_status((Heard(1, 1, 1),) * 28, (LogState(1, 1, 0, 0, 0),) * 28, ranged=(1,) * 28)
-    assert len(messages.encode(HEADER, status)) == 73 + 28 * (22 + 2 + 22) == 1361
+def test_a_full_status_has_1391_bytes() -> None:
+    """8 + 31 + 36 of frame, 28 peers of 22, 28 ids of 2 and 28 logs of 23."""
+    logs = tuple(LogState(robot, 1, 0, 0, 0) for robot in range(28))
+    status = a_status((Heard(1, 1, 1),) * 28, logs, ranged=(1,) * 28)
+    assert len(messages.encode(HEADER, status)) == 75 + 28 * (22 + 2 + 23) == 1391
+
+
+@pytest.mark.parametrize("others", [1, 5, 17, 26, 27, 28, 60])
+def test_a_status_that_says_what_lies_beyond_gaps_fits(others: int) -> None:
+    logs = LogSync(0)
+    for robot in range(1, others + 1):
+        for seq in range(1, 900, 9):
+            logs.add(Chain(robot, 1), seq, b"", 0)
+    rows = logs.next_states()
+    assert len({row.id for row in rows}) == min(others, 28)
+    status = a_status((Heard(1, 1, 1),) * 28, rows, ranged=(1,) * 28)
+    payload = messages.encode(HEADER, status)
+    assert len(payload) <= 1_400
+    assert messages.decode("STATUS", payload) == status
+    assert len(rows) > min(others, 28) or others > 25
 
 
 def test_the_status_of_a_robot_that_hears_254_others_fits() -> None:

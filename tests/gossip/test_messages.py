@@ -5,11 +5,13 @@ from __future__ import annotations
 import random
 
 import pytest
-from message_builders import HEADER, kinds
+from message_builders import HEADER, a_status, kinds
 
 from drslamd.gossip import messages
 from drslamd.gossip.codecs import CODECS
+from drslamd.gossip.message_types import LogState, Message
 from drslamd.gossip.seal import Header
+from drslamd.slam.graph.measurements import Chapter, GraphEntry, Keyframe
 
 
 def test_the_header_stands_where_every_lcm_program_finds_it() -> None:
@@ -17,7 +19,7 @@ def test_the_header_stands_where_every_lcm_program_finds_it() -> None:
         raw = CODECS[kind].struct.decode(messages.encode(HEADER, message))
         head = raw.header
         fields = (head.version, head.origin, head.epoch, head.counter, head.utime, head.tag)
-        assert fields == (2, 3, 11, 12, 13, bytes(8))
+        assert fields == (3, 3, 11, 12, 13, bytes(8))
 
 
 def test_each_kind_has_a_channel_for_each_robot() -> None:
@@ -59,6 +61,29 @@ def test_a_message_cut_at_any_byte_is_refused(kind: str) -> None:
     payload = messages.encode(HEADER, kinds()[kind])
     for length in range(len(payload)):
         assert isinstance(messages.decode(kind, payload[:length]), str)
+
+
+BYTES_AT_THE_END = [
+    GraphEntry(7, chapter=Chapter(0, keyframes=(Keyframe(40, 1, -100, 200, -30),))),
+    a_status(logs=(LogState(3, 11, 0, 5, 9), LogState(3, 11, 6, 9, 9))),
+]
+"""What LCM's decoders read without counting."""
+
+
+@pytest.mark.parametrize("message", BYTES_AT_THE_END)
+def test_bytes_at_the_end_of_a_message_are_as_many_as_it_says(message: Message) -> None:
+    kind, payload = messages.kind_of(message), messages.encode(HEADER, message)
+    assert messages.decode(kind, payload) == message
+    for length in range(len(payload)):
+        assert isinstance(messages.decode(kind, payload[:length]), str)
+    raw = CODECS[kind].struct.decode(payload)
+    count = len(raw.packed if kind == "GRAPH" else raw.beyond)
+    at = len(payload) - count - 2
+    assert payload[at : at + 2] == count.to_bytes(2, "big")
+    for more in (1, 200, -count - 1):
+        said = (count + more).to_bytes(2, "big", signed=True)
+        forged = payload[:at] + said + payload[at + 2 :]
+        assert isinstance(messages.decode(kind, forged), str)
 
 
 @pytest.mark.parametrize("kind", CODECS)

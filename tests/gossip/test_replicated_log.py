@@ -129,27 +129,18 @@ def test_every_order_of_arrival_gives_the_same_log(monkeypatch: pytest.MonkeyPat
 # chapters
 
 
-def a_chapter(layer: int, first: int, *parts: int) -> Chapter:
-    two, one, zero = parts or (0, 0, 0)
-    return Chapter(layer, first, (two, one, zero))
-
-
 def with_chapter(*missing: int) -> ReplicatedLog:
-    """Entries 0 to 9, said again by a chapter: parts 10 (layer 2), 11 (layer 1) and 12 (lasts)."""
+    """Entries 0 to 9, said again by a chapter in parts 10, 11 and 12."""
     log = ReplicatedLog(1)
     for seq in range(10):
         log.put(seq, b"entry")
-    for seq, chapter in (
-        (10, a_chapter(2, 0)),
-        (11, a_chapter(1, 0)),
-        (12, a_chapter(0, 0, 1, 1, 1)),
-    ):
+    for seq, chapter in ((10, Chapter(0)), (11, Chapter(0)), (12, Chapter(3, ((0, 10),)))):
         if seq not in missing:
             log.put(seq, b"chapter", chapter)
     return log
 
 
-def test_entries_that_a_chapter_says_again_are_kept_no_longer_nor_waited_for() -> None:
+def test_entries_for_which_a_chapter_stands_are_kept_no_longer_nor_waited_for() -> None:
     log = with_chapter()
     assert sorted(log.sealed) == [10, 11, 12]
     assert (log.complete, log.newest, log.lacking) == (13, 13, 0)
@@ -164,54 +155,39 @@ def test_entries_are_kept_until_all_parts_of_the_chapter_are_here() -> None:
     log = with_chapter(11)
     assert sorted(log.sealed) == [*range(11), 12]
     assert (log.complete, log.lacking) == (11, 1)
-    log.put(11, b"chapter", a_chapter(1, 0))
+    log.put(11, b"chapter", Chapter(0))
     assert sorted(log.sealed) == [10, 11, 12]
     assert log.complete == 13
 
 
-def test_who_knows_only_the_chapter_lacks_nothing_that_it_says_again() -> None:
+def test_who_knows_only_the_chapter_lacks_nothing_for_which_it_stands() -> None:
     log = ReplicatedLog(1)
-    for seq, chapter in ((12, a_chapter(0, 0, 1, 1, 1)), (10, a_chapter(2, 0))):
+    for seq, chapter in ((12, Chapter(3, ((0, 10),))), (10, Chapter(0))):
         log.put(seq, b"chapter", chapter)
         assert log.complete == 0
-    log.put(11, b"chapter", a_chapter(1, 0))
+    log.put(11, b"chapter", Chapter(0))
     assert (log.complete, log.lacking) == (13, 0)
 
 
-@pytest.mark.parametrize(
-    ("latest", "held"),
-    [(12 + 703, [10, 11, 12]), (12 + 704, [11, 12]), (12 + 2_687, [11, 12]), (12 + 2_688, [12])],
-)
-def test_parts_that_count_no_more_are_neither_kept_nor_waited_for(
-    latest: int, held: list[int]
-) -> None:
+def test_a_chapter_of_chapters_stands_for_these_too_and_not_for_what_lies_between() -> None:
     log = with_chapter()
-    log.put(latest, b"later", a_chapter(0, latest - 1, 0, 0, 1))
-    assert [seq for seq in sorted(log.sealed) if seq < 13] == held
+    for seq in range(13, 20):
+        log.put(seq, b"entry")
+    log.put(20, b"chapter", Chapter(1, ((0, 13), (15, 17))))
+    assert sorted(log.sealed) == [13, 14, 17, 18, 19, 20]
+    assert (log.complete, log.lacking) == (21, 0)
     newcomer = ReplicatedLog(1)
-    newcomer.put(latest, b"later", a_chapter(0, latest - 1, 0, 0, 1))
-    for seq in held:
-        assert newcomer.complete == 0
-        layer = 12 - seq
-        parts = (1, 1, 1) if layer == 0 else (0, 0, 0)
-        newcomer.put(seq, b"chapter", a_chapter(layer, 0, *parts))
-    assert newcomer.complete == 13
+    newcomer.put(20, b"chapter", Chapter(1, ((0, 13), (15, 17))))
+    assert (newcomer.complete, newcomer.lacking) == (13, 5)
+    assert newcomer.stretches() == [(15, 17), (20, 21)]
 
 
-def test_ten_hours_are_a_few_messages_for_each_chapter() -> None:
-    log = ReplicatedLog(1)
-    seq = 0
-    while seq < 36_000:
-        first = seq
-        for _ in range(64):
-            log.put(seq, b"entry")
-            seq += 1
-        for chapter in (a_chapter(2, first), a_chapter(1, first), a_chapter(0, first, 1, 1, 1)):
-            log.put(seq, b"chapter", chapter)
-            seq += 1
-    chapters = 36_000 // 67 + 1
-    assert log.lacking == 0
-    assert len(log.sealed) == chapters + 2_688 // 67 + 1 + 704 // 67 + 1
+def test_parts_come_in_the_place_of_what_they_stand_for() -> None:
+    log = holding(*range(5, 12), 30)
+    log.put(28, b"part", Chapter(0))
+    log.put(29, b"last", Chapter(2, ((0, 5), (7, 8))))
+    assert log.held_from(0) == [28, 29, 5, 6, 8, 9, 10, 11, 30]
+    assert [seq for seq in log.sealed if log.is_of_chapter(seq)] == [28, 29]
 
 
 def test_what_is_forgotten_takes_its_chapters_along(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -30,12 +30,12 @@ def counters(*values: int, once: bool = True) -> list[bool]:
 
 def test_a_message_of_the_team_is_opened_with_its_header() -> None:
     message = sealed(a_seal(3, epoch=5), a_status(), utime=77)
-    assert opened(a_seal(1), message) == Header(2, 3, 5, 1, 77)
+    assert opened(a_seal(1), message) == Header(3, 3, 5, 1, 77)
 
 
 def test_who_has_no_key_reads_what_a_message_says_of_itself_and_nothing_is_proven() -> None:
     _, payload = forged(a_status(), robot=3, epoch=5, counter=9, utime=77, secret=OTHER_SECRET)
-    assert header_of(payload, STATUS) == Header(2, 3, 5, 9, 77)
+    assert header_of(payload, STATUS) == Header(3, 3, 5, 9, 77)
     assert header_of(payload, frozenset()) is SealFault.UNKNOWN_TYPE
     assert header_of(payload[:38], STATUS) is SealFault.TOO_SHORT
 
@@ -116,7 +116,7 @@ def test_a_type_that_does_not_belong_to_the_channel_is_refused() -> None:
 
 
 @pytest.mark.row("N12")
-@pytest.mark.parametrize("version", [1, 3, 0, -2])
+@pytest.mark.parametrize("version", [1, 2, 4, 0, -2])
 @pytest.mark.row("N12")
 def test_another_version_is_refused(version: int) -> None:
     assert opened(a_seal(1), forged(a_status(), version=version)) is SealFault.WRONG_VERSION
@@ -162,7 +162,7 @@ def test_faults_are_named_in_the_order_of_their_cost() -> None:
     channel = messages.channel("STATUS", 3)
 
     def bad(
-        version: int = 2,
+        version: int = 3,
         robot: int = 3,
         epoch: int = 5,
         counter: int = 4,
@@ -177,12 +177,12 @@ def test_faults_are_named_in_the_order_of_their_cost() -> None:
         (bad(1, -5, 4, kind="POSE") + bytes(1400), SealFault.TOO_LONG),
         (bad(1, -5, 4, kind="POSE"), SealFault.UNKNOWN_TYPE),
         (bad(1, -5, 4), SealFault.WRONG_VERSION),
-        (bad(2, -5, 4), SealFault.BAD_ORIGIN),
-        (bad(2, 1, 10, 1, utime=-1), SealFault.BAD_TIME),
-        (bad(2, 1, 10, 1), SealFault.OWN),
-        (bad(2, 3, 4), SealFault.OLD_EPOCH),
-        (bad(2, 3, 5), SealFault.SEEN),
-        (bad(2, 3, 5, 5), SealFault.WRONG_TAG),
+        (bad(3, -5, 4), SealFault.BAD_ORIGIN),
+        (bad(3, 1, 10, 1, utime=-1), SealFault.BAD_TIME),
+        (bad(3, 1, 10, 1), SealFault.OWN),
+        (bad(3, 3, 4), SealFault.OLD_EPOCH),
+        (bad(3, 3, 5), SealFault.SEEN),
+        (bad(3, 3, 5, 5), SealFault.WRONG_TAG),
     ]
     for payload, fault in order:
         assert opened(receiver, (channel, payload)) is fault
@@ -341,4 +341,4 @@ def test_our_log_of_another_start_may_come_from_a_peer_and_proves_no_other_robot
 def test_counters_of_our_messages_begin_at_one_and_never_repeat() -> None:
     seal = a_seal(3, epoch=9)
     headers = [seal.header(utime) for utime in (10, 20, 30)]
-    assert headers == [Header(2, 3, 9, k, 10 * k) for k in (1, 2, 3)]
+    assert headers == [Header(3, 3, 9, k, 10 * k) for k in (1, 2, 3)]

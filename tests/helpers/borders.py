@@ -141,7 +141,7 @@ def spoken(counter: int = 20) -> tuple[Header, dict[str, Message]]:
     place = RangeMeasurement(n, peer, n, (0.25, 0.0), (-0.125, 0.5), 3.5, 0.125, 0.25, -0.5)
     pose = (1.5, -2.5, 0.25)
     closure = ClosureMeasurement(8, True, n, peer, n, pose, COVARIANCE, CORRECTED)
-    header = Header(2, LIAR, 1, counter, 104 * SECOND)
+    header = Header(3, LIAR, 1, counter, 104 * SECOND)
     return header, {
         "STATUS": a_status(
             (Heard(0, 1, 7), Heard(1, 1, 7)),

@@ -37,7 +37,7 @@ SECOND = 1_000_000
 SECRET = bytes(range(32))
 OTHER_SECRET = bytes(range(1, 33))
 
-HEADER = Header(2, 3, 11, 12, 13)
+HEADER = Header(3, 3, 11, 12, 13)
 
 COVARIANCE = (0.25, 0.0, 0.0, 0.25, 0.0, 0.0625)
 """Powers of two, so that a float on the wire changes nothing."""
@@ -138,7 +138,7 @@ def forged(
     epoch: int = 1,
     counter: int = 1,
     utime: int = 0,
-    version: int = 2,
+    version: int = 3,
     secret: bytes = SECRET,
 ) -> tuple[str, bytes]:
     """A message under any header, with a right tag."""

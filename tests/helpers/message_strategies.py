@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from drslamd.gossip.message_types import (
     PoseState,
     Status,
 )
-from drslamd.slam.graph.chapters import PER_ENTRY
+from drslamd.slam.graph.chapters.books import PER_ENTRY
 from drslamd.slam.graph.measurements import (
     Chapter,
     ClosureMeasurement,
@@ -64,11 +65,28 @@ def fiftieths(steps: int) -> float:
 
 covariances = st.tuples(variances, metres, metres, variances, metres, variances)
 diagonals = st.floats(2**-20, 2**16, width=32).map(lambda v: (v, 0.0, 0.0, v, 0.0, v))
-log_states = st.builds(
-    lambda robot, epoch, numbers: LogState(robot, epoch, *sorted(numbers)),
-    robot=robots,
-    epoch=epochs,
-    numbers=st.tuples(n32, n32, n32),
+
+
+def rows_of_log(robot: int, epoch: int, numbers: Sequence[int]) -> list[LogState]:
+    """From where to where it is held, first to last, and how far it goes: ascending numbers."""
+    *edges, newest = numbers
+    spans = zip(edges[::2], edges[1::2], strict=True)
+    return [LogState(robot, epoch, first, end, newest) for first, end in spans]
+
+
+def logs(numbers: st.SearchStrategy[Any], most: int) -> st.SearchStrategy[Any]:
+    """The rows of so many logs, each named once."""
+    log = st.builds(rows_of_log, robots, epochs, numbers.map(sorted))
+    drawn = st.lists(log, max_size=most, unique_by=lambda rows: rows[0].id)
+    return drawn.map(lambda found: tuple(row for rows in found for row in rows))
+
+
+whole_logs = logs(st.tuples(n32, n32, n32), 28)
+logs_with_gaps = logs(
+    st.integers(1, 4).flatmap(
+        lambda spans: st.lists(n32, min_size=2 * spans + 1, max_size=2 * spans + 1, unique=True)
+    ),
+    8,
 )
 delays = st.one_of(times, times.map(lambda v: -v))
 heard = st.builds(Heard, robots, epochs, delays, st.integers(-1, 2**31 - 1))
@@ -82,7 +100,7 @@ statuses = st.builds(
     graph_hash=i64,
     heard=st.lists(heard, max_size=28).map(tuple),
     ranged=st.lists(robots, max_size=28).map(tuple),
-    logs=st.lists(log_states, max_size=28).map(tuple),
+    logs=whole_logs | logs_with_gaps,
 )
 batches = st.builds(
     lambda start, later, first, steps: OdometryBatch(
@@ -145,10 +163,12 @@ def chapters(draw: st.DrawFn) -> GraphEntry:
     """An entry that is part of a chapter."""
     seq = draw(samples)
     first = max(0, seq - draw(st.integers(0, 64)))
-    layer = draw(st.integers(0, 2))
-    parts = (0, 0, 0)
-    if layer == 0 and seq - first >= 3 and draw(st.booleans()):
-        parts = (draw(st.integers(0, 1)), draw(st.integers(0, 1)), 1)
+    parts, replaces = 0, tuple[tuple[int, int], ...]()
+    if seq > first and draw(st.booleans()):
+        parts = draw(st.integers(1, min(127, seq - first)))
+        edges = st.sets(st.integers(first, seq + 1 - parts), min_size=2, max_size=8)
+        ends = sorted(draw(edges))
+        replaces = tuple(zip(ends[::2], ends[1::2], strict=False))
     places = st.integers(first * PER_ENTRY, (seq + 1) * PER_ENTRY - 1)
 
     def placed(items: st.SearchStrategy[Any]) -> tuple[Any, ...]:
@@ -157,9 +177,8 @@ def chapters(draw: st.DrawFn) -> GraphEntry:
         return tuple(sorted(found.items(), key=lambda entry: (entry[1].peer, entry[0])))
 
     said = Chapter(
-        layer,
-        first,
         parts,
+        replaces,
         tuple(draw(st.lists(st.tuples(st.integers(first, seq), models), max_size=2))),
         tuple(draw(st.lists(keyframes, max_size=4))),
         placed(ranges),

@@ -39,7 +39,7 @@ def told(team: VirtualTeam) -> list[Lie]:
     member = team.member(LIAR)
     utime = member.clock.local(team.simulator.now)
     seal = member.robot.team.seal
-    header = Header(2, LIAR, seal.epoch, seal._counter + 1, utime)
+    header = Header(3, LIAR, seal.epoch, seal._counter + 1, utime)
     return list(lies(header, team_key(None), like_those_of(team)))
 
 

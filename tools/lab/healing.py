@@ -129,7 +129,7 @@ class Conversation:
             self.said.append((team.own, decoded.seq, self.utime))
             mate.graph.insert(team.own, decoded)
             self._carry(robot, team.send_sealed(robot, sealed))
-        for entry in team.write_chapter(self.utime, aloud=True):
+        for entry in team.write_chapters(self.utime, mate.graph, aloud=True):
             mate.graph.insert(team.own, entry)
 
     def _partners(self, robot: int, mate: Mate) -> Iterator[Chain]:

@@ -33,7 +33,7 @@ from drslamd.gossip.entries.measurement_codecs import (
     traits_of,
 )
 from drslamd.gossip.entries.number_tables import Shape, Table
-from drslamd.slam.graph.chapters import COUNTS_FOR, PER_ENTRY
+from drslamd.slam.graph.chapters.books import PER_ENTRY
 from drslamd.slam.graph.measurements import (
     Chapter,
     ClosureMeasurement,
@@ -44,13 +44,19 @@ from drslamd.slam.robot_model import BY_GYRO
 from drslamd.slam.se2 import Index
 
 Item = TypeVar("Item", RangeMeasurement, ClosureMeasurement)
-LONGEST_SPAN = 512
-"""Entries from the first that a chapter says again to its last part: 256, and its parts."""
+MOST_LAG = 1 << 15
+"""Entries from the first that a chapter says again to its last part: 4,096 that are 45 minutes old
+or older, of a robot that makes five a second."""
 MOST_PARTS = 127
+MOST_SPANS = 64
+"""Stretches of entries for which a chapter stands: between them lie chapters for which it does not,
+a few for each hour."""
 SHORT = 2**15 - 1
 """Of what has 16 bits in an entry."""
-_HEAD = struct.Struct(">b3bi3H")
-"""Layer, parts, first, then how many peers, models and keyframes."""
+_HEAD = struct.Struct(">bBi3H")
+"""Parts, spans, the first entry that is spoken of, then how many peers, models and keyframes."""
+_SPAN = struct.Struct(">2H")
+"""Entries since the end of the last span, and its length."""
 _PEER = struct.Struct(">hq2H")
 """Robot, epoch, how many ranges and closures."""
 _MODEL = struct.Struct(">ib")
@@ -65,19 +71,22 @@ def packed(chapter: Chapter) -> bytes:
     seen = Counter(item.peer for _, item in chapter.closures)
     peers = sorted(ranged.keys() | seen.keys())
     keyframes = [[k.n, k.segment, k.x, k.y, k.theta] for k in chapter.keyframes]
+    first = min(_spoken_of(chapter), default=0)
     ranges = []
     for place, item in chapter.ranges:
         r = filled_range(item, 0)
         ends = [*r.qa, *r.qb, r.range, r.sigma, *r.turn]
-        ranges.append([*_when(place, r, chapter.first), *ends])
+        ranges.append([*_when(place, r, first), *ends])
     closures = []
     for place, closure in chapter.closures:
         c = filled_closure(closure, 0)
         doubt = np.array(c.covariance, dtype="<f4").view("<i4").tolist()
         ends = [c.number, c.kept, c.x, c.y, c.theta, *c.corrected, *doubt]
-        closures.append([*_when(place, c, chapter.first), *ends])
+        closures.append([*_when(place, c, first), *ends])
     counts = map(len, (peers, chapter.models, keyframes))
-    out = [_HEAD.pack(chapter.layer, *chapter.parts, chapter.first, *counts)]
+    out = [_HEAD.pack(chapter.parts, len(chapter.replaces), first, *counts)]
+    ends = [first, *(end for _, end in chapter.replaces)]
+    out += [_SPAN.pack(a - end, b - a) for end, (a, b) in zip(ends, chapter.replaces, strict=False)]
     out += [_PEER.pack(*said_peer(peer), ranged[peer], seen[peer]) for peer in peers]
     out += [_model(seq, traits_of(model)) for seq, model in chapter.models]
     tables = [
@@ -86,6 +95,13 @@ def packed(chapter: Chapter) -> bytes:
         _table(closures, _CLOSURE, [seen[peer] for peer in peers]),
     ]
     return b"".join([*out, number_tables.packed(tables)])
+
+
+def _spoken_of(chapter: Chapter) -> set[int]:
+    """Entries of which a chapter speaks, the first ones of its spans among them."""
+    places = [place for place, _ in (*chapter.ranges, *chapter.closures)]
+    seqs = [*(seq for seq, _ in chapter.models), *(first for first, _ in chapter.replaces)]
+    return {*seqs, *(place // PER_ENTRY for place in places)}
 
 
 def _model(seq: int, traits: Sequence[float]) -> bytes:
@@ -145,13 +161,12 @@ def unpacked(data: bytes, seq: int) -> Chapter:
         ValueError, IndexError: no chapter has such bytes.
     """
     reader = _Reader(data)
-    layer, two, one, lasting, first, *counts = _HEAD.unpack(reader.take(_HEAD.size))
-    n_peers, n_models, n_keyframes = counts
-    parts = two, one, lasting
-    bounded("layer", layer, 0, len(COUNTS_FOR) - 1)
-    bounded("first entry of a chapter", first, max(0, seq - LONGEST_SPAN), seq)
-    if any(parts) and (layer or min(parts) < 0 or not lasting or sum(parts) > seq - first):
-        raise ValueError("parts that a chapter cannot have")
+    parts, n_spans, first, n_peers, n_models, n_keyframes = _HEAD.unpack(reader.take(_HEAD.size))
+    bounded("number of parts", parts, 0, MOST_PARTS)
+    bounded("number of spans", n_spans, 0, MOST_SPANS)
+    replaces = _replaces(first, reader.structs(_SPAN, n_spans))
+    if (parts > 0) != (n_spans > 0) or (parts and replaces[-1][1] > seq + 1 - parts):
+        raise ValueError("chapter that stands for what it cannot stand for")
     peers, ranged, seen = list[Chain](), list[int](), list[int]()
     for robot, epoch, n_ranges, n_closures in reader.structs(_PEER, n_peers):
         peers.append(read_peer(SimpleNamespace(id=robot, epoch=epoch)))
@@ -179,9 +194,27 @@ def unpacked(data: bytes, seq: int) -> Chapter:
     span = range(first, seq + 1)
     ranges = list(_placed(of_ranges, _each_of(peers, ranged), span, _range))
     closures = list(_placed(of_closures, _each_of(peers, seen), span, _closure))
-    return Chapter(
-        layer, first, parts, tuple(models), tuple(keyframes), tuple(ranges), tuple(closures)
+    chapter = Chapter(
+        parts, replaces, tuple(models), tuple(keyframes), tuple(ranges), tuple(closures)
     )
+    spoken_of = _spoken_of(chapter)
+    if first != min(spoken_of, default=0):
+        raise ValueError("first entry of a chapter that is not its first")
+    if spoken_of:
+        bounded("first entry of a chapter", first, max(0, seq - MOST_LAG), seq)
+    return chapter
+
+
+def _replaces(first: int, rows: Iterable[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
+    """Spans of entries in order, none of which touches the next one."""
+    out: list[tuple[int, int]] = []
+    end = first
+    for gap, length in rows:
+        if not length or (out and not gap):
+            raise ValueError("spans that touch or are empty")
+        out.append((end + gap, end + gap + length))
+        end = out[-1][1]
+    return tuple(out)
 
 
 def _each_of(peers: list[Chain], counts: list[int]) -> list[Chain]:

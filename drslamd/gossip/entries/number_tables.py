@@ -3,14 +3,15 @@
 Of each column either the numbers themselves or the steps from row to row are near one number: their
 middle and their common divisor are said once, then how far each is from there, in an
 exponential-Golomb code (Teuhola 1978) whose size is the column's own. A column that steps evenly
-costs nothing but its head.
+costs nothing but its head: its kind and its middle.
 
 Rows come in groups, of one peer each, and steps do not go from one group to the next: the first
 numbers of the groups are said as steps of their own.
 
-Bits, most significant first: of all columns their kinds, middles and divisors, then what they hold;
-of each of these four, the lengths of all numbers come before their digits, so that all are read at
-once.
+Bits, most significant first: of all columns their kinds, then their middles, of those that do not
+step evenly their divisors (how often two divides them, what is left, and what middles have beyond a
+multiple), then what they hold; of each of these six, the lengths of all numbers come before their
+digits, so that all are read at once.
 """
 
 from __future__ import annotations
@@ -34,8 +35,8 @@ EVEN = LARGEST + 1
 MOST_BITS = 32
 KIND_SIZE = 2
 """Code of the first number of a head: it is small where a column steps evenly."""
-WIDE = 24
-"""Code of a middle that has more digits; of others 0."""
+WIDTHS = np.array([0, 8, 16, 24])
+"""Codes of middles: that in which it has the fewest bits."""
 
 
 class Table(NamedTuple):
@@ -59,13 +60,6 @@ class _Head(NamedTuple):
     size: int
     middle: int
     divisor: int
-
-    def coded(self) -> tuple[list[int], list[int]]:
-        """Its three numbers, and their codes."""
-        middle = int(_folded(self.middle))
-        is_wide = middle >> WIDE > 0
-        kind = 4 * (EVEN - self.size) + 2 * is_wide + self.is_steps
-        return [kind, middle, self.divisor - 1], [KIND_SIZE, WIDE * is_wide, 0]
 
 
 def _wrapped(values: Array | Index) -> Index:
@@ -104,6 +98,11 @@ def _cost(folded: Index) -> tuple[int, int]:
     bits = (2 * zeros + 1 + sizes).sum(axis=0)
     best = int(np.argmin(bits))
     return int(bits[best]), int(sizes[best])
+
+
+def _bits_of(numbers: Index, sizes: Index) -> Index:
+    """How many bits numbers have in codes of these sizes."""
+    return np.asarray(2 * (_bit_length(numbers + (1 << sizes)) - 1) - sizes + 1)
 
 
 def _near(values: Index) -> tuple[int, int, Index]:
@@ -152,11 +151,30 @@ def packed(tables: Sequence[Table]) -> bytes:
                 if size != EVEN:
                     numbers.append(part)
                     sizes.append(np.full(len(part), size))
-    of_heads = np.array([head.coded() for head in heads], np.int64).reshape(-1, 2, 3)
     empty = [np.zeros(0, np.int64)]
-    bits = [bit for said, size in of_heads.transpose(2, 1, 0) for bit in _code(said, size)]
+    bits = _code_of_heads(heads)
     bits += _code(np.concatenate(numbers or empty), np.concatenate(sizes or empty))
     return np.packbits(np.concatenate(bits)).tobytes()
+
+
+def _code_of_heads(heads: list[_Head]) -> list[Bits]:
+    steps, sizes, middles, divisors = np.array(heads, np.int64).reshape(-1, 4).T
+    uneven = np.flatnonzero(sizes != EVEN)
+    divisor = divisors[uneven]
+    twos = _bit_length(divisor & -divisor) - 1
+    beyond = middles[uneven] % divisor
+    middles[uneven] //= divisor
+    middles = _folded(middles)
+    width = np.argmin(_bits_of(middles[:, None], WIDTHS), axis=1)
+    kinds = 2 * (len(WIDTHS) * (EVEN - sizes) + width) + steps
+    plain = np.zeros(len(uneven), np.int64)
+    return [
+        *_code(kinds, np.full(len(heads), KIND_SIZE)),
+        *_code(middles, WIDTHS[width]),
+        *_code(twos, plain),
+        *_code((divisor >> twos) // 2, plain),
+        *_code(beyond, plain),
+    ]
 
 
 def _code(numbers: Index, sizes: Index) -> tuple[Bits, Bits]:
@@ -244,11 +262,20 @@ def _each(shapes: Sequence[Shape]) -> list[Shape]:
 
 def _heads(bits: _Bits, columns: int) -> list[_Head]:
     kinds = bits.numbers(np.full(columns, KIND_SIZE))
-    if (kinds > 4 * EVEN + 3).any():
+    sizes = EVEN - kinds // (2 * len(WIDTHS))
+    if (sizes < 0).any():
         raise ValueError("column that is said in no known way")
-    middles = _unfolded(bits.numbers(np.where(kinds & 2, WIDE, 0)))
-    divisors = bits.numbers(np.zeros(columns, np.int64)) + 1
-    rows = zip(kinds & 1, EVEN - kinds // 4, middles, divisors, strict=True)
+    middles = _unfolded(bits.numbers(WIDTHS[kinds // 2 % len(WIDTHS)]))
+    uneven, divisors = np.flatnonzero(sizes != EVEN), np.ones(columns, np.int64)
+    plain = np.zeros(len(uneven), np.int64)
+    twos, odd, beyond = (bits.numbers(plain) for _ in range(3))
+    if (twos >= MOST_BITS).any() or (odd >= 1 << MOST_BITS - 1 - twos).any():
+        raise ValueError("divisor of more than 32 bits")
+    divisors[uneven] = 2 * odd + 1 << twos
+    if (beyond >= divisors[uneven]).any():
+        raise ValueError("middle beyond its divisor")
+    middles[uneven] = _wrapped(middles[uneven] * divisors[uneven] + beyond)
+    rows = zip(kinds & 1, sizes, middles, divisors, strict=True)
     return [_Head(bool(steps), *(int(number) for number in rest)) for steps, *rest in rows]
 
 

@@ -30,8 +30,9 @@ MOST_LOSS = 0.8
 """That is reckoned with."""
 REPEATED = 0.55
 """At a loss p, messages that one needs beyond itself until all have it, by p / (1 - p)^2."""
-LOOK_BACK_S = 5.0
-"""Over which it is counted what else is said."""
+UNSURE = 1.2
+"""At a loss p, this times p (1 - p) of repeats is left as well: whoever hears only some of them
+does not know how many the others were, and all fill what room they see."""
 BIN_US = SECOND_US // 10
 PER_SECOND, PERIOD = 10, 30
 """Bins of a second, and of the three between two statuses."""
@@ -85,20 +86,33 @@ class _First:
 
     def __init__(self) -> None:
         self._said: dict[int, float] = {}
-        """By tenth of a second."""
+        """By tenth of a second ..."""
+        self._comes: dict[int, float] = {}
+        """... all of it, and what comes again."""
 
-    def add(self, utime: int, count: float) -> None:
+    def add(self, utime: int, count: float, *, again: bool) -> None:
+        """So many bytes; will they come again?"""
         now = utime // BIN_US
         if now not in self._said:
-            self._said = {at: n for at, n in self._said.items() if 0 < now - at <= PERIOD}
+            for bins in (self._said, self._comes):
+                for past in [past for past in bins if not 0 < now - past <= PERIOD]:
+                    del bins[past]
         self._said[now] = self._said.get(now, 0.0) + count
+        if again:
+            self._comes[now] = self._comes.get(now, 0.0) + count
+
+    def rate(self, utime: int) -> float:
+        """Bytes a second of late that come again."""
+        now = utime // BIN_US
+        of_late = sum(n for past, n in self._comes.items() if 0 <= now - past < PERIOD)
+        return of_late * PER_SECOND / PERIOD
 
     def busiest(self, utime: int) -> float:
         """The most bytes in any second that has this moment in it, as far as can be foreseen."""
-        now, said = utime // BIN_US, self._said.get
+        now, said, usual = utime // BIN_US, self._said.get, self._comes.get
         past = [said(at, 0.0) for at in range(now - PER_SECOND + 1, now)]
-        come = [said(at - PERIOD, 0.0) for at in range(now + 1, now + PER_SECOND)]
-        total = sum(past) + max(said(now, 0.0), said(now - PERIOD, 0.0))
+        come = [usual(at - PERIOD, 0.0) for at in range(now + 1, now + PER_SECOND)]
+        total = sum(past) + max(said(now, 0.0), usual(now - PERIOD, 0.0))
         most = total
         for goes, comes in zip(past, come, strict=True):
             total += comes - goes
@@ -118,19 +132,12 @@ class Allowance:
 
     def __init__(self) -> None:
         self.loss, self._robots = 0.0, 1
-        self._rate, self._utime = 0.0, 0
-        """Bytes a second of late that are said when nobody lacks anything."""
         self._first, self._again = _First(), _LastSecond()
         """What is no repeat, and repeats."""
         self._heartbeats: dict[int, int] = {}
         """When a status of each robot came that was its usual one."""
         self._own_utime = 0
         """When a repeat of ours went out last."""
-
-    def _pass(self, utime: int) -> None:
-        passed = max(0, utime - self._utime) / SECOND_US
-        self._utime = max(utime, self._utime)
-        self._rate *= max(0.0, 1 - passed / LOOK_BACK_S)
 
     def reckon(self, losses: Sequence[float]) -> None:
         """How much of what each peer says is lost; of a newcomer little is known."""
@@ -141,15 +148,13 @@ class Allowance:
         self, size: int, utime: int, kind: Speech, sender: int, *, heard: bool = False
     ) -> None:
         """A message of so many bytes by a robot; of what is heard others were not."""
-        self._pass(utime)
         count = (size + FRAMING) / (1 - self.loss) if heard else size + FRAMING
         if kind is Speech.AGAIN:
             self._again.add(utime, count)
             self._own_utime = self._own_utime if heard else utime
             return
-        self._first.add(utime, count)
-        if kind is Speech.NEW or self._is_heartbeat(sender, utime):
-            self._rate += count / LOOK_BACK_S
+        is_usual = kind is Speech.NEW or self._is_heartbeat(sender, utime)
+        self._first.add(utime, count, again=is_usual)
 
     def _is_heartbeat(self, sender: int, utime: int) -> bool:
         last = self._heartbeats.get(sender)
@@ -160,13 +165,13 @@ class Allowance:
 
     def has_room(self, utime: int, size: int = 0, *, is_one_of_many: bool = False) -> bool:
         """May a repeat of so many bytes go out? Where others flood the channel, one each second."""
-        self._pass(utime)
         needed = 1 + REPEATED * self.loss / (1 - self.loss) ** 2
         least = max(LEAST_RATE, LEAST_EACH * self._robots)
-        most = max(MOST * self._rate, least) * needed
+        most = max(MOST * self._first.rate(utime), least) * needed
         first, again = self._first.busiest(utime), self._again.bytes(utime)
         repeats = max(most - first, LEAST_SHARE * most)
-        room = repeats * (1 - RESERVE) if is_one_of_many else repeats
+        left = RESERVE + UNSURE * self.loss * (1 - self.loss)
+        room = repeats * (1 - left) if is_one_of_many else repeats
         is_flooded = first + again > FLOOD * most
         is_waiting = utime - self._own_utime < SECOND_US
         return again + size + FRAMING <= room or (is_flooded and not is_waiting)

@@ -10,7 +10,7 @@ that it is there.
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -19,16 +19,15 @@ from drslamd.conventions import MILLISECOND_US, SECOND_US
 from drslamd.gossip.message_types import LogState
 from drslamd.gossip.repeats.allowance import Allowance, Speech
 from drslamd.gossip.replicated_log import ReplicatedLog
-from drslamd.slam.graph.chapters import SPAN
 
 REPEATS_AT_ONCE = 12
 """Entries of one log that one status of a lagging peer asks for, and all that one call of
 `take_due` hands out: a robot that comes back after an hour catches up in five minutes without
 crowding the channel."""
-FAR = SPAN
-"""A peer that lags by more entries is first told the latest chapter."""
 MAX_PLANNED = 20 * REPEATS_AT_ONCE
 """Repeats that wait for their time; what finds no room is asked for by the next status."""
+MISSES = 4
+"""So many repeats that find no room may let a smaller one go first."""
 QUIET_US = 800 * MILLISECOND_US
 """A status cannot know of what was on the air so shortly before it."""
 TURN_US = 300 * MILLISECOND_US
@@ -37,6 +36,8 @@ TURNS = 5
 """The owner, then four groups of relays by their ids."""
 SPEAKS_US = 5 * SECOND_US
 """An owner whose last status is not older repeats what is asked for the first time alone."""
+MANY = 6
+"""Entries of one log that are in no chapter, of those that one status asks for."""
 PATIENCE = 3
 """Statuses in a row that may ask for the same entry; then the order moves on by one, because
 whoever has the first turn may be heard by the others and not by the one who asks."""
@@ -155,8 +156,18 @@ class LogRepeats:
             {**still, **lacking}, again=utime + OVERDUE_US, until=utime + BELIEVED_US
         )
         self._forget_answered(sender, named)
+        alone = Counter(place.robot for place in lacking if not self._is_of_chapter(place))
         for place, times in lacking.items():
-            self._plan(place, times, utime, sender)
+            is_many = alone[place.robot] >= MANY and not self._is_of_chapter(place)
+            if not (is_many and self._waits_for_chapter(place.robot, times, utime)):
+                self._plan(place, times, utime, sender)
+
+    def _is_of_chapter(self, place: Place) -> bool:
+        return self._logs[place.robot].is_of_chapter(place.seq)
+
+    def _waits_for_chapter(self, owner: int, times: int, utime: int) -> bool:
+        """Of many entries that are in no chapter yet their owner makes one, if it is there."""
+        return owner != self._robot and times < PATIENCE and self._speaks(owner, utime)
 
     def _forget_answered(self, sender: int, named: Mapping[int, Holding]) -> None:
         """What a peer holds now need not be said for it: we did not hear who said it again."""
@@ -184,11 +195,7 @@ class LogRepeats:
             held = log.held_from(start)
             if theirs is not None and theirs.beyond and theirs.epoch == log.epoch:
                 held = [seq for seq in held if not theirs.has(seq)]
-            lacked = held[:REPEATS_AT_ONCE]
-            if log.latest > start + FAR and log.latest in held:
-                # by this one a peer knows what it need not wait for
-                lacked = [log.latest, *lacked[: REPEATS_AT_ONCE - 1]]
-            for seq in lacked:
+            for seq in held[:REPEATS_AT_ONCE]:
                 yield Place(robot, log.epoch, seq)
 
     def _plan(self, place: Place, times: int, utime: int, asker: int) -> None:
@@ -240,6 +247,7 @@ class LogRepeats:
         self._answer_again(utime)
         self._push(utime)
         out: list[tuple[int, bytes]] = []
+        misses = 0
         for place, repeat in list(self._planned.items()):
             if repeat.due > utime:
                 continue
@@ -249,10 +257,11 @@ class LogRepeats:
                 del self._planned[place]
                 continue
             size, is_one_of_many = len(log.sealed[place.seq]), len(self._planned) > REPEATS_AT_ONCE
-            if len(out) == REPEATS_AT_ONCE or not self.pace.has_room(
-                utime, size, is_one_of_many=is_one_of_many
-            ):
+            if len(out) == REPEATS_AT_ONCE or misses == MISSES:
                 break
+            if not self.pace.has_room(utime, size, is_one_of_many=is_one_of_many):
+                misses += 1
+                continue
             del self._planned[place]
             log.aired[place.seq] = utime
             self.repeated += 1

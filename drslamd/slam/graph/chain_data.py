@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from drslamd.conventions import ROTATION_STEP_RAD, TRANSLATION_STEP_M, Chain
-from drslamd.slam.graph.measurements import Keyframe
+from drslamd.slam.graph.chapters.replaced_entries import ReplacedEntries, Span
+from drslamd.slam.graph.measurements import Chapter, Keyframe
+from drslamd.slam.graph.said_rows import SaidRows
 from drslamd.slam.graph.tables import KeyframeTable, positions
-from drslamd.slam.graph.timed_rows import NEVER, TimedRows
+from drslamd.slam.graph.timed_rows import NEVER
 from drslamd.slam.odometry.noise import SUMS, growth
 from drslamd.slam.robot_model import UNTOLD, RobotModel
 from drslamd.slam.se2 import Array
@@ -22,24 +24,44 @@ class ChainData:
 
     Attributes:
         model: of its sensors, as it last said.
-        latest_chapter: entry with which its latest chapter ends, -1 before the first.
     """
 
     def __init__(self, chain: Chain) -> None:
         self.chain = chain
         self.model = UNTOLD
-        self.latest_chapter = -1
         self._model_seq = -1
-        self._said = TimedRows(5, identity=1, most=MAX_KEYFRAMES)
+        self._said = SaidRows(5, identity=1, most=MAX_KEYFRAMES)
+        self._replaced = ReplacedEntries()
         self._table = KeyframeTable(np.empty((0, 5)))
         self._table_changes = 0
         self._sums, self._summed_n = np.empty((0, SUMS)), np.empty(0)
         self._summed = 0
         """So many rows from the first on are those that were summed."""
 
-    def add(self, k: Keyframe) -> None:
+    def add(self, k: Keyframe, entry: int = 0) -> None:
+        """A keyframe, as an entry of its log says it."""
         metres, radians = TRANSLATION_STEP_M, ROTATION_STEP_RAD
-        self._said.add([k.n, k.segment, k.x * metres, k.y * metres, k.theta * radians])
+        self._said.say([k.n, k.segment, k.x * metres, k.y * metres, k.theta * radians], entry)
+
+    def stands_for(self, seq: int) -> bool:
+        """Does a chapter stand for this entry of its log?"""
+        return self._replaced.has(seq)
+
+    def take_part(self, seq: int, chapter: Chapter) -> tuple[Span, ...]:
+        """Entry `seq` is part of a chapter: what chapters stand for now and did not before."""
+        return self._replaced.take(seq, chapter)
+
+    def replace(self, spans: tuple[Span, ...]) -> None:
+        """What only these entries said of the robot's way goes; how it grew up to what stays is
+        known as before."""
+        sums = self.sums
+        if not self._said.replace(spans):
+            return
+        rows, known = self._said.rows.copy(), self._table.rows[:, 0]
+        rows[:, 1] = np.maximum.accumulate(rows[:, 1])
+        at, _ = positions(known, rows[:, 0])
+        self._table, self._table_changes = KeyframeTable(rows), self._said.changes
+        self._sums, self._summed, self._summed_n = sums[at], len(at), rows[:, 0]
 
     def take_model(self, seq: int, model: RobotModel) -> None:
         """What the robot says of its sensors in log entry `seq`; the latest entry counts."""
@@ -75,7 +97,7 @@ class ChainData:
         tail = max(same - 1, 0)
         rows[tail:, 1] = np.maximum.accumulate(rows[tail:, 1])
         self._table, self._table_changes = KeyframeTable(rows), said.changes
-        self._summed = min(self._summed, same)
+        self._summed = min(self._summed, _as_long(known[:, 0], rows[:, 0]))
         return self._table
 
     @property
@@ -102,3 +124,11 @@ class ChainData:
         """Along rows of `KeyframeTable`."""
         gyro = self.model.noise.gyro
         return growth(rows[:, 2:], None if gyro is None else gyro.seconds(rows[:, 0], rows[:, 2:]))
+
+
+def _as_long(one: Array, other: Array) -> int:
+    """How many numbers two arrays share from their beginnings on: a chapter says keyframes again a
+    millimetre away, and how the way to them grew is known better without it."""
+    both = min(len(one), len(other))
+    differ = np.flatnonzero(one[:both] != other[:both])
+    return int(differ[0]) if len(differ) else both

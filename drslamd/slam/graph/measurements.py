@@ -69,17 +69,16 @@ class Chapter:
     """Part of what a robot says again of earlier entries (`chapters`).
 
     Attributes:
-        layer: 0 lasts, 1 and 2 count for a while.
-        first: entry with which the chapter begins; it ends with its last part.
-        parts: of the last part, how many there are of each layer, itself among them: they are the
-            entries up to it, those of layer 2 first; of another part all 0.
+        parts: of the last part, in how many messages the chapter is said: they are the entries up
+            to it; of another part 0.
+        replaces: of the last part, the entries for which the chapter stands, as spans first ..
+            end - 1 in order, none of which touches the next one; of another part none.
         models: of its sensors, with the entry that said so.
         ranges, closures: by their peer, then by their place.
     """
 
-    layer: int
-    first: int
-    parts: tuple[int, int, int]
+    parts: int
+    replaces: tuple[tuple[int, int], ...] = ()
     models: tuple[tuple[int, RobotModel], ...] = ()
     keyframes: tuple[Keyframe, ...] = ()
     ranges: tuple[Placed[RangeMeasurement], ...] = ()

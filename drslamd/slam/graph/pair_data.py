@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from drslamd.conventions import Chain
-from drslamd.slam.graph.chapters import PER_ENTRY, RAW
+from drslamd.slam.graph.chapters.replaced_entries import Span
 from drslamd.slam.graph.clocks import Ahead, ClockDifferences
-from drslamd.slam.graph.fading_rows import FadingRows
 from drslamd.slam.graph.measurements import ClosureMeasurement, RangeMeasurement
+from drslamd.slam.graph.said_rows import SaidRows
 from drslamd.slam.graph.tables import CLOSURE_COLUMNS, RANGE_COLUMNS, ClosureTable, RangeTable
 
 MAX_RANGES = 40_000
@@ -32,41 +32,27 @@ class PairData:
 
     a: Chain
     b: Chain
-    said_ranges: FadingRows = field(
-        default_factory=lambda: FadingRows(
-            RANGE_COLUMNS, 2, MAX_RANGES, lambda rows: RangeTable(rows).place
-        )
-    )
-    said_closures: FadingRows = field(
-        default_factory=lambda: FadingRows(
-            CLOSURE_COLUMNS, 2, MAX_CLOSURES, lambda rows: ClosureTable(rows).place
-        )
+    said_ranges: SaidRows = field(default_factory=lambda: SaidRows(RANGE_COLUMNS, 2, MAX_RANGES))
+    said_closures: SaidRows = field(
+        default_factory=lambda: SaidRows(CLOSURE_COLUMNS, 2, MAX_CLOSURES, before=3)
     )
     _clocks_of_ranges: ClockDifferences = field(default_factory=ClockDifferences)
     _clocks_of_closures: ClockDifferences = field(default_factory=ClockDifferences)
 
-    def add_range(self, seq: int, place: int, r: RangeMeasurement) -> None:
-        """A range at some place in an entry of its owner's log."""
-        self.take_range(seq * PER_ENTRY + place, r, RAW)
-
-    def add_closure(self, seq: int, place: int, c: ClosureMeasurement) -> None:
-        """A closure, or its withdrawal; of one number the latest word counts."""
-        self.take_closure(seq * PER_ENTRY + place, c, RAW)
-
-    def take_range(self, place: int, r: RangeMeasurement, layer: int) -> None:
-        """A range at some place in the log, as a layer of a chapter says it."""
+    def add_range(self, place: int, r: RangeMeasurement, entry: int) -> None:
+        """A range that was first said at some place in its owner's log, as an entry says it."""
         if abs(r.range_m) < FARTHEST_M and r.sigma_m > 0:
-            self.said_ranges.say(RangeTable.row(place, r), place, layer)
+            self.said_ranges.say(RangeTable.row(place, r), entry)
 
-    def take_closure(self, place: int, c: ClosureMeasurement, layer: int) -> None:
-        """The same of a closure."""
+    def add_closure(self, place: int, c: ClosureMeasurement, entry: int) -> None:
+        """A closure, or its withdrawal; of one number the latest word counts."""
         if _is_believable(c):
-            self.said_closures.say(ClosureTable.row(place, c), place, layer)
+            self.said_closures.say(ClosureTable.row(place, c), entry)
 
-    def fade(self, latest: int) -> None:
-        """The owner's latest chapter is entry `latest` of its log."""
-        self.said_ranges.fade(latest)
-        self.said_closures.fade(latest)
+    def replace(self, spans: tuple[Span, ...]) -> None:
+        """Chapters stand for these entries of the owner."""
+        self.said_ranges.replace(spans)
+        self.said_closures.replace(spans)
 
     @property
     def ranges(self) -> RangeTable:

@@ -13,8 +13,10 @@ from __future__ import annotations
 
 from drslamd.conventions import Chain, is_node
 from drslamd.slam.graph.chain_data import ChainData
+from drslamd.slam.graph.chapters.books import PER_ENTRY
 from drslamd.slam.graph.measurements import Chapter, GraphEntry, Keyframe
 from drslamd.slam.graph.pair_data import PairData
+from drslamd.slam.graph.thinning import time_cells
 from drslamd.slam.graph.thinning.graph_view import GraphView, Steps, Thinning
 from drslamd.slam.graph.thinning.time_cells import RECENT_S
 
@@ -24,6 +26,18 @@ MAX_PLACES = 512
 """Where one of them stood: whoever carries it about all day comes to less."""
 ALL = 2**31
 """Work: more than any view is."""
+
+
+def _as_chapter(entry: GraphEntry) -> Chapter:
+    """What an entry says, in the form in which it is said again."""
+    begin = entry.seq * PER_ENTRY
+    return Chapter(
+        parts=0,
+        models=((entry.seq, entry.model),) if entry.model else (),
+        keyframes=entry.keyframes,
+        ranges=tuple(enumerate(entry.ranges, start=begin)),
+        closures=tuple(enumerate(entry.closures, start=begin)),
+    )
 
 
 class PoseGraph:
@@ -42,7 +56,7 @@ class PoseGraph:
         self.chains: dict[int, ChainData] = {}
         self.nodes: dict[int, ChainData] = {}
         self.pairs: dict[tuple[int, int], PairData] = {}
-        self._thinning = Thinning(recent_s)
+        self._thinning, self._recent_s = Thinning(recent_s), recent_s
         self._view: GraphView | None = None
         self._steps: Steps | None = None
         """Of the view that is being made."""
@@ -50,6 +64,11 @@ class PoseGraph:
         """What came meanwhile: of the ticks that follow each other until the view is made."""
         self._forgets = recent_s <= RECENT_S
         """What chapters leave out is needed where times are recent for longer than usual."""
+
+    @property
+    def recent_s(self) -> int:
+        """How long nothing is thinned."""
+        return time_cells.recent_s(len(self.chains), self._recent_s)
 
     @property
     def view(self) -> GraphView:
@@ -107,40 +126,27 @@ class PoseGraph:
         if data is None or origin.epoch > data.chain.epoch:
             self.forget(origin.robot)
             data = self.chains[origin.robot] = ChainData(origin)
-        if entry.model:
-            data.take_model(entry.seq, entry.model)
-        for k in entry.keyframes:
-            data.add(k)
-        for place, r in enumerate(entry.ranges):
+        if self._forgets and data.stands_for(entry.seq):
+            return
+        said = entry.chapter or _as_chapter(entry)
+        for seq, model in said.models:
+            data.take_model(seq, model)
+        for k in said.keyframes:
+            data.add(k, entry.seq)
+        for place, r in said.ranges:
             pair = self._pair(origin, r.peer, r.b_n)
             if pair:
-                pair.add_range(entry.seq, place, r)
-        for place, c in enumerate(entry.closures):
+                pair.add_range(place, r, entry.seq)
+        for place, c in said.closures:
             pair = self._pair(origin, c.peer, c.b_n)
             if pair:
-                pair.add_closure(entry.seq, place, c)
-        if entry.chapter:
-            self._take_chapter(data, entry.seq, entry.chapter)
-
-    def _take_chapter(self, data: ChainData, seq: int, chapter: Chapter) -> None:
-        """Take part of what a robot says again."""
-        for said, model in chapter.models:
-            data.take_model(said, model)
-        for k in chapter.keyframes:
-            data.add(k)
-        for place, r in chapter.ranges:
-            pair = self._pair(data.chain, r.peer, r.b_n)
-            if pair:
-                pair.take_range(place, r, chapter.layer)
-        for place, c in chapter.closures:
-            pair = self._pair(data.chain, c.peer, c.b_n)
-            if pair:
-                pair.take_closure(place, c, chapter.layer)
-        if any(chapter.parts) and seq > data.latest_chapter and self._forgets:
-            data.latest_chapter = seq
+                pair.add_closure(place, c, entry.seq)
+        replaced = data.take_part(entry.seq, said) if entry.chapter else ()
+        if replaced and self._forgets:
+            data.replace(replaced)
             for pair in self.pairs.values():
-                if pair.a == data.chain:
-                    pair.fade(seq)
+                if pair.a == origin:
+                    pair.replace(replaced)
 
     def _pair(self, a: Chain, b: Chain, b_n: int) -> PairData | None:
         """The pair's data; None for a start of b that is already past, for a pair of one, and for
@@ -153,7 +159,6 @@ class PoseGraph:
         if a.robot == b.robot or (pair and pair.b.epoch > b.epoch):
             return None
         pair = self.pairs[a.robot, b.robot] = PairData(a, b)
-        pair.fade(self.chains[a.robot].latest_chapter)
         return pair
 
     def _has_stood(self, node: Chain, place: int) -> bool:

@@ -104,14 +104,15 @@ class TimedRows:
         self._settle()
         return self._blocks[block]
 
-    def holds(self, block: int) -> bool:
-        """Is there any row of it?"""
+    def blocks(self) -> list[int]:
+        """Those that are held."""
         self._settle()
-        return block in self._blocks
+        return list(self._blocks)
 
     def keep(self, block: int, which: NDArray[np.bool_]) -> None:
         """Give up all rows (k,) of a block that is held but these."""
-        rows = self.of_block(block)
+        self._settle()
+        rows = self._blocks[block]
         self._blocks[block] = rows[which]
         self._held -= len(rows) - len(self._blocks[block])
         self._changes += 1
@@ -163,11 +164,15 @@ class TimedRows:
         keys = rows[:, : self._identity]
         if _ascends(keys):
             return rows
-        rows = rows[np.lexsort(rows.T[::-1])]
+        rows = self._sorted(rows)
         keys = rows[:, : self._identity]
         first = np.ones(len(rows), dtype=bool)
         first[1:] = (keys[1:] != keys[:-1]).any(axis=1)
         return rows[first]
+
+    def _sorted(self, rows: Array) -> Array:
+        """Rows in order; the first one of each identity counts."""
+        return rows[np.lexsort(rows.T[::-1])]
 
     def _drop_before(self, floor: int) -> None:
         """Give up what is older, whether it was held or not."""

@@ -40,9 +40,8 @@ def place(seq: int, at: int = 0) -> int:
 
 
 SAMPLE = Chapter(
-    layer=0,
-    first=3,
-    parts=(2, 1, 1),
+    parts=4,
+    replaces=((3, 40), (42, 66)),
     models=((5, UNTOLD), (9, TURNED)),
     keyframes=(Keyframe(10, 0, -(2**31), 2**31 - 1, 5), Keyframe(2**31 - 2, 9, 0, -1, -7)),
     ranges=((place(5), ranged(40, A, 3.5)), (place(5, 1), ranged(40, A, 2.25)),
@@ -61,7 +60,7 @@ def is_close(one: Chapter, other: Chapter) -> bool:
 
 def test_what_is_packed_comes_back() -> None:
     assert is_close(unpacked(packed(SAMPLE), SEQ), SAMPLE)
-    nothing = Chapter(2, 3, (0, 0, 0))
+    nothing = Chapter(0)
     assert unpacked(packed(nothing), SEQ) == nothing
 
 
@@ -76,28 +75,46 @@ def test_what_came_back_is_packed_to_the_same_bytes() -> None:
     assert packed(unpacked(packed(SAMPLE), SEQ)) == packed(SAMPLE)
 
 
-@pytest.mark.parametrize(("seq", "fits"), [(3 + 512, True), (3 + 513, False), (2, False)])
-def test_a_chapter_ends_within_512_entries_of_its_first(seq: int, fits: bool) -> None:
-    data = packed(Chapter(2, 3, (0, 0, 0)))
+@pytest.mark.parametrize(
+    ("seq", "fits"), [(5 + 32_768, True), (5 + 32_769, False), (5, True), (4, False)]
+)
+def test_a_chapter_speaks_of_nothing_that_lies_far_behind_it_or_ahead(seq: int, fits: bool) -> None:
+    data = packed(Chapter(0, (), ((5, UNTOLD),)))
     if fits:
-        assert unpacked(data, seq)
+        assert unpacked(data, seq).models[0][0] == 5
         return
-    with pytest.raises(ValueError, match="first entry"):
+    with pytest.raises(ValueError, match="entry"):
         unpacked(data, seq)
+
+
+def test_a_chapter_names_the_first_entry_that_it_speaks_of_as_such() -> None:
+    data = bytearray(packed(Chapter(0, (), ((5, UNTOLD),))))
+    assert data[2:6] == (5).to_bytes(4, "big")
+    data[2:6] = (4).to_bytes(4, "big")
+    with pytest.raises(ValueError, match="not its first"):
+        unpacked(bytes(data), SEQ)
+
+
+def test_a_chapter_stands_for_sixty_four_stretches_of_entries_at_most() -> None:
+    spans = tuple((3 * k, 3 * k + 2) for k in range(64))
+    said = Chapter(1, spans)
+    assert unpacked(packed(said), 200) == said
+    with pytest.raises(ValueError, match="spans"):
+        unpacked(packed(Chapter(1, (*spans, (192, 193)))), 200)
 
 
 @pytest.mark.parametrize(
     "wrong",
     [
-        replace(SAMPLE, layer=3),
-        replace(SAMPLE, layer=1),
-        replace(SAMPLE, parts=(2, 1, 0)),
-        replace(SAMPLE, parts=(-1, 1, 1)),
-        replace(SAMPLE, parts=(60, 6, 2)),
-        replace(SAMPLE, models=((2, UNTOLD),)),
+        replace(SAMPLE, parts=-1),
+        replace(SAMPLE, parts=0),
+        replace(SAMPLE, parts=6),
+        replace(SAMPLE, replaces=()),
+        replace(SAMPLE, replaces=((3, 40), (40, 66))),
+        replace(SAMPLE, replaces=((3, 3),)),
+        replace(SAMPLE, replaces=((3, 68),)),
+        replace(SAMPLE, replaces=tuple((3 + k, 4 + k) for k in range(0, 130, 2)), parts=1),
         replace(SAMPLE, models=((71, UNTOLD),)),
-        replace(SAMPLE, ranges=((place(2, 4095), ranged(40, A, 3.5)),)),
-        replace(SAMPLE, ranges=((place(3, -1), ranged(40, A, 3.5)),)),
         replace(SAMPLE, ranges=((place(71), ranged(40, A, 3.5)),)),
         replace(SAMPLE, ranges=SAMPLE.ranges[1::-1]),
         replace(SAMPLE, ranges=SAMPLE.ranges[:1] * 2),
@@ -114,8 +131,8 @@ def test_what_no_robot_could_have_packed_is_refused(wrong: Chapter) -> None:
         unpacked(packed(wrong), SEQ)
 
 
-def test_the_largest_number_of_parts_is_that_of_the_entries() -> None:
-    assert unpacked(packed(replace(SAMPLE, parts=(60, 6, 1))), SEQ).parts == (60, 6, 1)
+def test_parts_lie_behind_all_that_the_chapter_stands_for() -> None:
+    assert unpacked(packed(replace(SAMPLE, parts=5)), SEQ).parts == 5
 
 
 def test_bytes_that_end_elsewhere_are_refused() -> None:
@@ -127,7 +144,7 @@ def test_bytes_that_end_elsewhere_are_refused() -> None:
 
 def test_few_bytes_cannot_hold_many_numbers() -> None:
     """Columns that step evenly cost nothing."""
-    said = Chapter(2, 3, (0, 0, 0), (), tuple(Keyframe(k, 0, 0, 0, 0) for k in range(3_277)))
+    said = Chapter(0, (), (), tuple(Keyframe(k, 0, 0, 0, 0) for k in range(3_277)))
     assert numbers_in(said) == number_tables.MAX_NUMBERS + 1
     assert len(packed(said)) < 100
     with pytest.raises(ValueError, match="more than"):
@@ -138,8 +155,8 @@ def test_few_bytes_cannot_hold_many_numbers() -> None:
 
 def test_peers_are_named_in_order_and_have_something_said_of_them() -> None:
     data = packed(SAMPLE)
-    head, peer = data[:14], [data[14:28], data[28:42]]
-    rest = data[42:]
+    head, peer = data[:20], [data[20:34], data[34:48]]
+    rest = data[48:]
     assert head + b"".join(peer) + rest == data
     swapped = head + peer[1] + peer[0] + rest
     with pytest.raises(ValueError, match="out of order"):
@@ -176,12 +193,12 @@ def test_a_minute_of_driving_has_an_eighth_of_the_bytes_of_its_entries() -> None
         near = round(5 + 0.1 * k + chance.gauss(0, 0.1), 4)
         ranges += [(place(k, at), ranged(10 * k, peer, near)) for at, peer in enumerate((A, B))]
     ordered = tuple(sorted(ranges, key=lambda placed: (placed[1].peer, placed[0])))
-    chapter = Chapter(2, 0, (0, 0, 0), (), tuple(frames), ordered)
+    chapter = Chapter(0, (), (), tuple(frames), ordered)
     assert len(packed(chapter)) < 60 * (70 + 2 * 54) / 15
 
 
 def test_a_model_with_a_number_of_traits_that_none_has_is_refused() -> None:
-    data = bytearray(packed(Chapter(2, 3, (0, 0, 0), ((5, UNTOLD),))))
+    data = bytearray(packed(Chapter(0, (), ((5, UNTOLD),))))
     at = data.index((5).to_bytes(4, "big") + b"\x08") + 4
     for count in (-1 & 0xFF, 7, 15):
         data[at] = count

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import random
+from dataclasses import replace
 
 import pytest
 from message_builders import HEADER, an_entry
@@ -10,9 +12,11 @@ from message_builders import HEADER, an_entry
 from drslamd.conventions import Chain
 from drslamd.gossip import messages
 from drslamd.gossip.bounds import LAST_SEQ
-from drslamd.gossip.entries.chapter_writer import ChapterWriter
+from drslamd.gossip.entries import chapter_writer
+from drslamd.gossip.entries.chapter_writer import Audience, ChapterWriter
 from drslamd.gossip.lc02 import MAX_PAYLOAD
 from drslamd.gossip.message_types import LogState
+from drslamd.slam.graph.chapters.books import Book, Detail
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe, RangeMeasurement
 
 OWN = Chain(3, 7)
@@ -31,11 +35,14 @@ def busy(seq: int, peers: int) -> GraphEntry:
     return GraphEntry(seq, None, (Keyframe(10 * seq, 0, 37 * seq * seq, seq, 0),), ranges)
 
 
-def written(entries: list[GraphEntry]) -> list[GraphEntry]:
+MANY, FEW = Audience(300, 100), Audience(300, 2)
+
+
+def written(entries: list[GraphEntry], audience: Audience = MANY) -> list[GraphEntry]:
     writer = ChapterWriter()
     for entry in entries:
-        writer.take(entry)
-    return writer.due(len(entries))
+        writer.take(entry, 0)
+    return writer.due(len(entries), 0, audience)
 
 
 @pytest.mark.parametrize(("count", "is_due"), [(255, False), (256, True)])
@@ -51,14 +58,14 @@ def test_a_chapter_is_made_early_when_somebody_lacks_sixteen_entries(
     count: int, complete: int, is_due: bool
 ) -> None:
     writer = asked(count, LogState(*OWN, 0, complete, count))
-    assert bool(writer.due(count)) is is_due
+    assert bool(writer.due(count, 0, MANY)) is is_due
 
 
 def asked(count: int, *rows: LogState) -> ChapterWriter:
     """After so many entries and one status."""
     writer = ChapterWriter()
     for k in range(count):
-        writer.take(an_entry(k, 10 * k))
+        writer.take(an_entry(k, 10 * k), 0)
     writer.on_states(OWN, rows)
     return writer
 
@@ -68,38 +75,38 @@ def test_what_a_newcomer_heard_as_it_was_said_is_no_reason_for_a_chapter(
     first: int, is_due: bool
 ) -> None:
     rows = LogState(*OWN, 0, 0, 40), LogState(*OWN, first, 40, 40)
-    assert bool(asked(40, *rows).due(40)) is is_due
+    assert bool(asked(40, *rows).due(40, 0, MANY)) is is_due
 
 
 def test_the_log_of_somebody_else_or_of_another_start_is_no_reason_for_a_chapter() -> None:
     for chain in (Chain(OWN.robot + 1, OWN.epoch), Chain(OWN.robot, OWN.epoch - 1)):
-        assert not asked(40, LogState(*chain, 0, 0, 40)).due(40)
+        assert not asked(40, LogState(*chain, 0, 0, 40)).due(40, 0, MANY)
 
 
 def test_rows_of_any_length_are_read_in_no_time() -> None:
     rows = LogState(*OWN, 0, 0, 40), LogState(*OWN, 1, LAST_SEQ, LAST_SEQ)
-    assert not asked(40, *rows).due(40)
+    assert not asked(40, *rows).due(40, 0, MANY)
 
 
-def test_a_chapter_says_all_keyframes_and_its_last_part_says_of_how_many_it_is_made() -> None:
+def test_a_chapter_says_all_and_its_last_part_says_for_what_it_stands() -> None:
     said = written([busy(k, 4) for k in range(256)])
     chapters = [entry.chapter for entry in said if entry.chapter]
     assert [entry.seq for entry in said] == list(range(256, 256 + len(said)))
-    layers = [chapter.layer for chapter in chapters]
-    assert layers == sorted(layers, reverse=True)
-    assert [any(chapter.parts) for chapter in chapters] == [False] * (len(said) - 1) + [True]
-    assert chapters[-1].parts == tuple(layers.count(layer) for layer in (2, 1, 0))
-    assert all(chapter.first == 0 for chapter in chapters)
+    assert [chapter.parts for chapter in chapters] == [0] * (len(said) - 1) + [len(said)]
+    assert [chapter.replaces for chapter in chapters] == [()] * (len(said) - 1) + [((0, 256),)]
     frames = sorted(k.n for chapter in chapters for k in chapter.keyframes)
     assert frames == [10 * k for k in range(256)]
     places = [place for chapter in chapters for place, _ in chapter.ranges]
     assert sorted(places) == [4096 * k + at for k in range(256) for at in range(4)]
 
 
-def test_each_part_fits_a_message() -> None:
-    said = written([busy(k, 19) for k in range(64)])
-    assert len(said) > 5
-    assert all(len(messages.encode(HEADER, entry)) <= MAX_PAYLOAD for entry in said)
+@pytest.mark.parametrize("robots", [2, 5, 20])
+def test_each_part_fits_a_message_for_which_a_team_of_this_size_has_room(robots: int) -> None:
+    said = written([busy(k, 19) for k in range(64)], Audience(300, robots))
+    sizes = [len(messages.encode(HEADER, entry)) for entry in said]
+    assert len(said) >= 4
+    assert max(sizes) <= min(MAX_PAYLOAD, 500 * robots**0.5 + 1)
+    assert min(sizes) > 0.5 * min(MAX_PAYLOAD, 500 * robots**0.5)
 
 
 @pytest.mark.parametrize(("count", "is_due"), [(63, False), (64, True)])
@@ -111,14 +118,96 @@ def test_a_chapter_is_made_of_fewer_entries_when_they_say_much(count: int, is_du
 def test_robots_that_range_to_nobody_write_one_part() -> None:
     (entry,) = written([an_entry(k, 10 * k) for k in range(256)])
     assert entry.chapter is not None
-    assert entry.chapter.parts == (0, 0, 1)
+    assert entry.chapter.parts == 1
 
 
-def test_chapters_are_not_made_of_chapters() -> None:
+Log = dict[int, GraphEntry]
+SECOND = 1_000_000
+PEER = Chain(1, 9)
+
+
+def a_log(count: int, each_s: int = 1) -> Log:
+    """All that a robot says that drives straight on and ranges to one peer, what chapters stand for
+    taken away; somebody asks for all that is in no chapter when it has waited for a minute or so.
+
+    Args:
+        each_s: entries in a second.
+    """
+    writer, log, seq = ChapterWriter(), Log(), 0
+    for k in range(count):
+        metres = round(30 + 20 * math.sin(0.01 * k), 4)
+        ranged = RangeMeasurement(10 * k, PEER, 10 * k + 3, (0.0, 0.0), (0.0, 0.0), metres, 0.125)
+        entry = GraphEntry(seq, None, (Keyframe(10 * k, 0, 5_000 * k, 0, 0),), (ranged,))
+        log[seq] = entry
+        writer.take(entry, SECOND * k // each_s)
+        seq += 1
+        if k % 1_000 < 80:
+            writer.on_states(OWN, [LogState(*OWN, 0, 0, seq)])
+        for said in writer.due(seq, SECOND * k // each_s, MANY):
+            assert said.chapter is not None
+            log[seq] = said
+            for first, end in said.chapter.replaces:
+                for gone in range(first, end):
+                    log.pop(gone, None)
+            assert messages.decode("GRAPH", messages.encode(HEADER, said)) == said
+            seq += 1
+    return log
+
+
+def test_as_a_log_ages_it_is_said_with_less_and_nothing_twice() -> None:
+    """Two hours: the last eleven minutes whole, then a keyframe every four seconds, then every
+    sixteen; of ranges four of a quarter of a minute, then of a minute."""
+    log = a_log(7_200)
+    said = [entry.chapter for entry in log.values() if entry.chapter]
+    frames = [k.n // 10 for chapter in said for k in chapter.keyframes]
+    places = [item.a_n // 10 for chapter in said for _, item in chapter.ranges]
+    for found in (frames, places):
+        assert len(found) == len(set(found))
+    whole = {entry.keyframes[0].n // 10 for entry in log.values() if entry.keyframes}
+    assert {*frames, *whole} >= set(range(7_200 - 680, 7_200))
+    # (where books of few entries met, one or two more were measured at)
+    assert 256 <= sum(k < 4_096 for k in frames) <= 1.1 * 256
+    assert 128 <= sum(k < 4_096 for k in places) <= 1.1 * 256
+    assert 144 / 4 <= sum(6_000 <= k < 6_144 for k in frames) <= 144 / 3
+    assert len(said) < 30
+
+
+def test_a_robot_that_says_much_makes_chapters_before_they_lie_too_far_back(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Twenty entries a second: half as many as a chapter may speak of take three minutes here, and
+    not a quarter of an hour."""
+    monkeypatch.setattr(chapter_writer, "MOST_LAG", 1 << 13)
+    log = a_log(5_000, each_s=20)
+    oldest = min(
+        first for entry in log.values() if entry.chapter for first, _ in entry.chapter.replaces[:1]
+    )
+    assert oldest == 0
+    frames = [k.n // 10 for e in log.values() if e.chapter for k in e.chapter.keyframes]
+    assert sum(k < 512 for k in frames) < 150
+    assert sum(2_048 <= k < 3_072 for k in frames) == 1_024
+
+
+def test_the_keyframes_that_others_name_are_asked_for_and_stay() -> None:
+    asked: list[tuple[int, int, int]] = []
+
+    def named(book: Book, level: Detail) -> set[int]:
+        asked.append((book.keyframes[0].n, book.keyframes[-1].n, level.cell_s))
+        return {50, 70}
+
     writer = ChapterWriter()
-    for entry in [busy(k, 3) for k in range(256)]:
-        writer.take(entry)
-    said = writer.due(256)
-    for entry in [*said, *(busy(k, 3) for k in range(256 + len(said), 511 + len(said)))]:
-        writer.take(entry)
-    assert writer.due(600) == []
+    for k in range(257):
+        writer.take(an_entry(k, 10 * k), 0)
+    writer.due(257, 0, replace(MANY, named=named))
+    for k in range(257, 513):
+        writer.take(an_entry(k, 10 * k), 700 * SECOND)
+    now, audience = 1_362 * SECOND, replace(MANY, named=named)
+    (new,) = writer.due(513, now, audience)
+    assert new.chapter is not None
+    assert new.chapter.replaces == ((257, 513),)
+    said = writer.due(514, now, audience)
+    assert not writer.due(514 + len(said), now, audience)
+    assert asked == [(0, 2_560, 16)]
+    frames = {k.n for entry in said if entry.chapter for k in entry.chapter.keyframes}
+    assert {50, 70} <= frames
+    assert 60 not in frames

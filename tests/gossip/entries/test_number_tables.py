@@ -61,7 +61,24 @@ def test_a_common_divisor_is_said_once() -> None:
     chance = random.Random(1)
     steps = [chance.randrange(4_000) for _ in range(800)]
     fine, coarse = (table(*((scale * k,) for k in steps)) for scale in (1, 1_000))
-    assert len(packed([coarse])) <= len(packed([fine])) + 6
+    assert len(packed([coarse])) <= len(packed([fine])) + 3
+
+
+def test_a_middle_costs_the_fewer_bits_the_coarser_it_is() -> None:
+    """Numbers of 31 binary digits, of which the last 14 are as good as none."""
+    chance = random.Random(2)
+    steps = [chance.randrange(64) << 14 for _ in range(20)]
+    coarse, fine = (table(*((2**30 + last + k,) for k in steps)) for last in (0, 8_191))
+    # (one bit says that nothing is beyond, 25 say what is)
+    assert len(packed([fine])) - len(packed([coarse])) == 3
+    assert back(fine)[0].tolist() == fine.rows.tolist()
+    # six bits each, a bit or two that say so; kind, middle of 17 bits and divisor
+    assert len(packed([coarse])) <= (20 * 8 + 9 + 18 + 8 + 1) / 8
+
+
+def test_columns_of_noughts_cost_three_bits_and_one() -> None:
+    nothing = table(*((0,) * 12 for _ in range(50)))
+    assert len(packed([nothing])) == 12 * (3 + 1) // 8
 
 
 def test_noise_costs_its_entropy_and_a_twentieth_more() -> None:

@@ -201,7 +201,7 @@ def test_a_recording_of_an_earlier_start_is_no_other_robot() -> None:
 
 
 def spoken(epoch: int, utime: int, robot: int = 3) -> Header:
-    return Header(2, robot, epoch, 1, utime)
+    return Header(3, robot, epoch, 1, utime)
 
 
 def namesakes(*words: tuple[int, int]) -> Namesakes:

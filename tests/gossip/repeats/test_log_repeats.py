@@ -316,20 +316,30 @@ def test_for_those_who_were_silent_for_half_a_minute_nothing_is_said_again() -> 
 # chapters
 
 
-def test_a_peer_that_lags_far_is_first_told_the_latest_chapter() -> None:
-    for complete, first in ((143, 400), (144, 144)):
-        logs = LogSync(3)
-        for seq in range(400):
-            logs.add(OWNER, seq, said(OWNER, seq), 0)
-        logs.add(OWNER, 400, said(OWNER, 400), 0, Chapter(0, 390, (0, 0, 1)))
-        logs.on_states(state(OWNER, complete), PEER.robot, T0)
-        assert repeated(logs, T0)[0] == said(OWNER, first)
-
-
-def test_a_peer_that_has_the_latest_chapter_beyond_a_gap_is_not_told_it_again() -> None:
-    logs = LogSync(3)
-    for seq in range(400):
+def with_chapters(robot: int, entries: int) -> LogSync:
+    """Entries 0 to 99 as a chapter in two parts, 110 and 111, and so many entries from 100 on."""
+    logs = LogSync(robot)
+    for seq in range(100, 100 + entries):
         logs.add(OWNER, seq, said(OWNER, seq), 0)
-    logs.add(OWNER, 400, said(OWNER, 400), 0, Chapter(0, 390, (0, 0, 1)))
-    logs.on_states(state(OWNER, 71) + state(OWNER, 401, first=400), PEER.robot, T0)
-    assert repeated(logs, T0)[0] == said(OWNER, 71)
+    logs.add(OWNER, 220, said(OWNER, 220), 0, Chapter(0))
+    logs.add(OWNER, 221, said(OWNER, 221), 0, Chapter(2, ((0, 100),)))
+    return logs
+
+
+def test_chapters_are_said_in_the_place_of_what_they_stand_for() -> None:
+    logs = with_chapters(OWNER.robot, 10)
+    logs.on_states(state(OWNER, 0, 222), PEER.robot, T0)
+    assert repeated(logs, T0)[:4] == [said(OWNER, seq) for seq in (220, 221, 100, 101)]
+
+
+@pytest.mark.parametrize(("entries", "others"), [(5, 5), (6, 0)])
+def test_of_entries_of_which_their_owner_makes_a_chapter_others_say_none(
+    entries: int, others: int
+) -> None:
+    logs = with_chapters(5, entries)
+    logs.on_states(state(OWNER, 0, 222), OWNER.robot, T0)
+    for k in range(2):
+        logs.on_states(state(OWNER, 0, 222), PEER.robot, T0 + k * SECOND)
+    found = repeated(logs, T0 + 4 * SECOND)
+    assert found[:2] == [said(OWNER, 220), said(OWNER, 221)]
+    assert len(found) == 2 + others

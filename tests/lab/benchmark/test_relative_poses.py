@@ -37,9 +37,9 @@ def test_every_bit_arrives(count: int) -> None:
 
 def test_the_bytes_are_those_that_its_module_describes() -> None:
     """Written down once more with struct."""
-    header = Header(2, 3, 11, 12, 13)
+    header = Header(3, 3, 11, 12, 13)
     message = relative_poses.encode(header, some(2))
-    expected = FINGERPRINT + struct.pack(">bhqiq", 2, 3, 11, 12, 13) + bytes(8)
+    expected = FINGERPRINT + struct.pack(">bhqiq", 3, 3, 11, 12, 13) + bytes(8)
     expected += struct.pack(">ih", 4, 254)
     for k in range(2):
         values = (math.pi / (k + 1), -math.e, 1e-300, 1e300, 0.1 + k)
@@ -62,7 +62,7 @@ def test_a_part_of_an_edge_is_refused() -> None:
 def test_the_daemons_seal_judges_it_like_any_message() -> None:
     payload, known = sealed(a_seal(3), some(2)), frozenset([FINGERPRINT])
     opened = a_seal(1).open(CHANNEL, payload, known, once=False)
-    assert opened == Header(2, 3, 1, 1, 17)
+    assert opened == Header(3, 3, 1, 1, 17)
     changed = payload[:-1] + bytes([payload[-1] ^ 1])
     assert a_seal(1).open(CHANNEL, changed, known, once=False) is SealFault.WRONG_TAG
     other = a_seal(1, secret=SECRET[::-1])

@@ -101,14 +101,14 @@ def test_what_a_stranger_is_believed_is_seen_and_what_it_is_not_is_counted() -> 
 
 def test_a_number_is_used_once_and_an_entry_may_be_said_again() -> None:
     numbers = Numbers()
-    header = Header(2, 3, 10, 1, 0)
+    header = Header(3, 3, 10, 1, 0)
     assert numbers.use(header, "GRAPH", b"entry") == ""
     assert numbers.use(header, "GRAPH", b"entry") == ""
     assert "again" in numbers.use(header, "GRAPH", b"another entry")
     assert "again" in numbers.use(header, "POSE", b"pose")
     assert numbers.use(replace(header, counter=2), "POSE", b"pose") == ""
-    assert numbers.use(Header(2, 3, 11, 1, 0), "POSE", b"pose") == ""
-    assert "after" in numbers.use(Header(2, 3, 10, 3, 0), "POSE", b"pose")
+    assert numbers.use(Header(3, 3, 11, 1, 0), "POSE", b"pose") == ""
+    assert "after" in numbers.use(Header(3, 3, 10, 3, 0), "POSE", b"pose")
 
 
 def test_a_fresh_robot_answers_as_the_first_one_did_unless_it_is_another() -> None:

@@ -106,8 +106,8 @@ def test_keyframes_that_contradict_each_other_are_settled_the_same_way_everywher
     one, other = Keyframe(10, 0, 5, 5, 5), Keyframe(10, 0, 5, 4, 9)
     rest = Keyframe(20, 0, 7, 7, 7)
     graphs = [
-        graph_of(*((A, GraphEntry(seq, keyframes=(k,))) for seq, k in enumerate(order)))
-        for order in itertools.permutations([one, other, rest])
+        graph_of(*((A, GraphEntry(seq, keyframes=(k,))) for seq, k in order))
+        for order in itertools.permutations(enumerate([one, other, rest]))
     ]
     assert {g.digest({0}) for g in graphs} == {graphs[0].digest({0})}
     assert np.allclose(

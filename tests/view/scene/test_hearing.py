@@ -12,6 +12,7 @@ from onlooked_team import Actor
 from drslamd.conventions import Chain
 from drslamd.events import ChannelMessage, Datagram
 from drslamd.gossip import lc02
+from drslamd.gossip.seal import VERSION
 from drslamd.view.scene.hearing import Hearing, Said
 
 MOST_COUNTED = 40
@@ -54,7 +55,7 @@ def test_what_was_seen_is_not_believed_again_with_a_key() -> None:
 
 def test_another_version_is_named_with_its_remedy() -> None:
     hearing = Hearing(None, False)
-    assert hearing.receive(of(*forged(a_status(), version=3))) is None
+    assert hearing.receive(of(*forged(a_status(), version=VERSION + 1))) is None
     assert "install the same version" in hearing.problems(0)[0]
 
 

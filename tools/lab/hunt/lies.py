@@ -20,7 +20,7 @@ from drslamd.gossip.message_types import (
     Status,
 )
 from drslamd.gossip.seal import Seal
-from drslamd.slam.graph.chapters import PER_ENTRY
+from drslamd.slam.graph.chapters.books import PER_ENTRY
 from drslamd.slam.graph.measurements import (
     Chapter,
     ClosureMeasurement,
@@ -95,8 +95,7 @@ class Liar:
         if self._rng.random() < 0.5:
             # who wants to be believed answers everybody's present start
             heard = tuple(Heard(*chain, 0) for chain in self._epochs.items())
-        numbers = [sorted(self._int(0, SAMPLES) for _ in range(3)) for _ in known]
-        logs = tuple(LogState(*self._chain(), *three) for three in numbers)
+        logs = {chain: self._rows(chain) for chain in (self._chain() for _ in known)}
         return Status(
             state=PoseState(self._int(0, 3)),
             frame=self._int(0, ROBOTS - 1),
@@ -106,8 +105,18 @@ class Liar:
             graph_hash=self._int(-(2**63), 2**63 - 1),
             heard=heard,
             ranged=tuple({self._int(0, ROBOTS - 1) for _ in known}),
-            logs=logs,
+            logs=tuple(row for rows in logs.values() for row in rows),
         )
+
+    def _rows(self, chain: Chain) -> list[LogState]:
+        """What it holds of a log: up to its first gap, and often beyond."""
+        first = self._int(0, SAMPLES)
+        longest = max(1, (SAMPLES - first) // 9)
+        steps = [self._int(k > 0, longest) for k in range(2 * self._int(0, 3) + 1)]
+        edges = [int(edge) for edge in np.minimum(np.cumsum([first, *steps]), SAMPLES)]
+        newest = edges[-1] + self._int(0, SAMPLES - edges[-1])
+        pairs = [pair for pair in zip(edges[::2], edges[1::2], strict=True) if pair[0] < pair[1]]
+        return [LogState(*chain, *pair, newest) for pair in pairs or [(first, first)]]
 
     def _odometry(self) -> OdometryBatch:
         n0, count = self._int(0, 2**30), self._int(1, 100)
@@ -144,12 +153,12 @@ class Liar:
         """Entry `seq` of a log, which says again what no other entry said."""
         first = max(0, seq - int(self._rng.integers(65)))
         is_last = seq - first >= 2 and self._rng.random() < 0.5
-        parts = (int(self._rng.integers(0, seq - first)), 0, 1) if is_last else (0, 0, 0)
+        parts = int(self._rng.integers(1, seq - first + 1)) if is_last else 0
+        end = int(self._rng.integers(first + 1, seq + 2 - parts)) if is_last else first
         models = ((first, RobotModel(OdometryNoise(0.5, 0.5, 0.5, 0.5))),)
         return Chapter(
-            0 if is_last else int(self._rng.integers(3)),
-            first,
             parts,
+            ((first, end),) if is_last else (),
             models[: self._int(0, 1)],
             tuple(self._keyframe() for _ in range(self._int(0, 5))),
             self._placed(self._range, first, seq),

@@ -13,7 +13,7 @@ from slam_scenes import BANDED, NOISE, closure, group_of, keyframes, model_of, r
 
 from drslamd.conventions import Chain
 from drslamd.slam.graph import team_frame
-from drslamd.slam.graph.chapters import PER_ENTRY
+from drslamd.slam.graph.chapters.books import PER_ENTRY
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.thinning import chain_view, thinned_pairs
