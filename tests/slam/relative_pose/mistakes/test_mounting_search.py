@@ -424,8 +424,8 @@ def test_a_pair_that_one_window_confirmed_is_watched_for_a_while() -> None:
         utime += QUICKLY_US
         assert search.is_due(utime, False), watched
         search.begin(utime, False)
-        question = cast(Any, Asked({}))
-        assert search.question(question, cast(Any, None), 0.1)() == (OUTPOSTS, BY_CHANCE)
+        told: Any = search.question(cast(Any, Asked({})), cast(Any, None), 0.1)()
+        assert told == (OUTPOSTS, BY_CHANCE)
         search.on_costs(unlike(0.0), FREE + 3, True)
     assert search.is_provisional
     assert not search.is_due(utime + QUICKLY_US, False)
