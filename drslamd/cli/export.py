@@ -9,6 +9,7 @@ from typing import Any
 
 from drslamd.cli.exit_codes import CANNOT_CREATE, OK, UNAVAILABLE
 from drslamd.cli.parser import Verbs, configured_verb
+from drslamd.host.unmade import unmade
 
 QUESTIONS = {
     "tum": ("trajectory",),
@@ -83,6 +84,6 @@ def _write(options: argparse.Namespace, answers: dict[str, Any]) -> int:
         print(error, file=sys.stderr)
         return UNAVAILABLE
     except OSError as error:
-        print(f"{options.to}: {error.strerror}", file=sys.stderr)
+        print(unmade(options.to, error), file=sys.stderr)
         return CANNOT_CREATE
     return OK

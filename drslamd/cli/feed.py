@@ -11,6 +11,7 @@ from typing import Any
 from drslamd.cli.ask import socket_of
 from drslamd.cli.exit_codes import CANNOT_CREATE, OK, UNAVAILABLE, USAGE
 from drslamd.cli.parser import Verbs, configured_verb, load
+from drslamd.host.unmade import unmade
 
 EXAMPLES = """\
   drslamd feed mavlink -c /etc/drslamd/3.toml --to 127.0.0.1:14550   ArduPilot, PX4
@@ -25,6 +26,15 @@ KINDS = {
     "dimos": "dimos-lcm",
 }
 """And the packages that they need."""
+REMEDIES = {
+    "mavlink": "correct --to HOST:PORT",
+    "foxglove": "give another place with --listen or --port",
+    "ros2": "give another domain with --domain",
+    "dimos": "correct --url",
+}
+"""Of a place where nothing can be told."""
+MOST_DOMAIN = 232
+"""Ports of the next ones do not exist (RTPS)."""
 LCM_URL = "udpm://239.255.76.67:7667?ttl=0"
 
 
@@ -60,6 +70,13 @@ def _feed(options: argparse.Namespace) -> int:
     if not host or not port.isdigit() or not 0 < int(port) < 65_536:
         print(f"drslamd feed: --to {options.to}: must be HOST:PORT", file=sys.stderr)
         return USAGE
+    for flag, value, most in (
+        ("--port", options.port, 65_535),
+        ("--domain", options.domain, MOST_DOMAIN),
+    ):
+        if not 0 <= value <= most:
+            print(f"drslamd feed: {flag} {value}: 0 to {most}", file=sys.stderr)
+            return USAGE
     robot, path = load(options.config).robot.id, near_path(socket_of(options.config))
     try:
         feed = _made(options, robot)(options)
@@ -67,23 +84,34 @@ def _feed(options: argparse.Namespace) -> int:
         remedy = f'needs {KINDS[options.kind]}: pip install "drslamd[{options.kind}]"'
         print(f"drslamd feed {options.kind} {remedy}", file=sys.stderr)
         return UNAVAILABLE
-    except (OSError, RuntimeError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        print(f"drslamd feed {options.kind}: {reason}", file=sys.stderr)
-        return CANNOT_CREATE if options.mcap else UNAVAILABLE
+    except OSError as error:
+        if options.mcap:
+            print(f"drslamd feed {options.kind}: {unmade(options.mcap, error)}", file=sys.stderr)
+            return CANNOT_CREATE
+        return _unheard(options, error.strerror or str(error))
+    except RuntimeError as error:
+        return _unheard(options, str(error))
     try:
         with ended_by_a_signal():
             for near in told(path):
                 feed.tell(near)
     except OSError as error:
         reason = error.strerror or str(error)
-        print(f"{path}: {reason}; is drslamd running for this configuration?", file=sys.stderr)
+        print(
+            f"no daemon answers at {path}: {reason}; start it: drslamd run -c {options.config}",
+            file=sys.stderr,
+        )
         return UNAVAILABLE
     except KeyboardInterrupt:
         return OK
     finally:
         feed.close()
     return OK
+
+
+def _unheard(options: argparse.Namespace, reason: str) -> int:
+    print(f"drslamd feed {options.kind}: {reason}; {REMEDIES[options.kind]}", file=sys.stderr)
+    return UNAVAILABLE
 
 
 def _made(options: argparse.Namespace, robot: int) -> Callable[[argparse.Namespace], Any]:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from drslamd.cli.exit_codes import CANNOT_CREATE, OK
 from drslamd.cli.parser import Verbs, verb
+from drslamd.host.unmade import unmade
 
 
 def add(verbs: Verbs) -> None:
@@ -28,7 +29,7 @@ def _keygen(options: argparse.Namespace) -> int:
     try:
         write_key(Path(options.file))
     except OSError as error:
-        print(f"{options.file}: {error.strerror}; keys are never overwritten", file=sys.stderr)
+        print(unmade(options.file, error), file=sys.stderr)
         return CANNOT_CREATE
     print(f"{options.file}: copy it to every robot of the team, mode 0600")
     return OK

@@ -15,6 +15,7 @@ from drslamd.cli.parser import Verbs, load, verb
 from drslamd.config import ConfigError, GossipSection
 from drslamd.config_faults import sentences
 from drslamd.config_wheels import Section
+from drslamd.host.unmade import unmade
 
 SAY_EVERY_S = 1.0
 
@@ -56,8 +57,8 @@ def _record(options: argparse.Namespace) -> int:
         log = GroupLog(section, path)
     except OSError as error:
         is_file = error.filename is not None
-        what = f"{path}: " if is_file else f"cannot join {where}: "
-        print(f"{what}{error.strerror or error}", file=sys.stderr)
+        reason = f"{error.strerror or error}; name one that is up: --interface (ip -br address)"
+        print(unmade(path, error) if is_file else f"cannot join {where}: {reason}", file=sys.stderr)
         return CANNOT_CREATE if is_file else UNAVAILABLE
     stopped: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -77,7 +78,7 @@ def _record(options: argparse.Namespace) -> int:
     try:
         log.run(is_over)
     except OSError as error:
-        print(f"\n{path}: ended: {error.strerror or error}", file=sys.stderr)
+        print(f"\n{unmade(path, error)}; what was heard before is kept", file=sys.stderr)
         code = CANNOT_CREATE
     log.close()
     for channel, count in sorted(log.channels.items()):

@@ -10,6 +10,7 @@ from pathlib import Path
 from drslamd.cli.ask import ask_daemon
 from drslamd.cli.exit_codes import CANNOT_CREATE, OK, UNAVAILABLE
 from drslamd.cli.parser import Verbs, configured_verb
+from drslamd.host.unmade import unmade
 
 
 def add(verbs: Verbs) -> None:
@@ -43,6 +44,6 @@ def _trajectory(options: argparse.Namespace) -> int:
         for path in write(Path(options.tum), answer):
             print(path)
     except OSError as error:
-        print(f"{options.tum}: {error.strerror}", file=sys.stderr)
+        print(unmade(options.tum, error), file=sys.stderr)
         return CANNOT_CREATE
     return OK

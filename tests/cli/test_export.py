@@ -96,7 +96,8 @@ def test_no_daemon_and_no_folder_are_sentences(
     (tmp_path / "file").write_text("")
     code = export(socket, tmp_path / "file", team_answers.answers(), "csv")
     assert code == CANNOT_CREATE
-    assert capsys.readouterr().err == f"{tmp_path}/file: File exists\n"
+    said = capsys.readouterr().err
+    assert said == f"{tmp_path}/file: File exists; it is not written over: name another one\n"
 
 
 def test_an_unknown_format_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import argparse
 import signal
 import socket
 import sys
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 from lab.play.real_team import free_port
@@ -13,12 +15,15 @@ from near_scenes import NEAR
 from telling import feeding
 
 from drslamd import cli
+from drslamd.cli import feed
 
 
 def test_without_a_daemon_it_says_so(config: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("pymavlink", reason="pymavlink is not installed")
     assert cli.main(["feed", "mavlink", "-c", str(config)]) == 69
-    assert "is drslamd running for this configuration?" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert said.startswith("no daemon answers at ")
+    assert said.endswith(f"; start it: drslamd run -c {config}\n")
 
 
 @pytest.mark.parametrize(
@@ -47,13 +52,54 @@ def test_a_place_that_is_none_is_wrong_usage(
     assert f"--to {to}: must be HOST:PORT" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("flags", "sentence"),
+    [
+        (("--port", "65536"), "--port 65536: 0 to 65535"),
+        (("--port", "-1"), "--port -1: 0 to 65535"),
+        (("--domain", "233"), "--domain 233: 0 to 232"),
+        (("--domain", "-1"), "--domain -1: 0 to 232"),
+    ],
+)
+def test_a_number_that_is_none_is_wrong_usage(
+    config: Path, capsys: pytest.CaptureFixture[str], flags: tuple[str, str], sentence: str
+) -> None:
+    assert cli.main(["feed", "ros2", "-c", str(config), *flags]) == 64
+    assert capsys.readouterr().err == f"drslamd feed: {sentence}\n"
+
+
+@pytest.mark.parametrize(
+    ("kind", "flag"),
+    [("mavlink", "--to"), ("foxglove", "--port"), ("ros2", "--domain"), ("dimos", "--url")],
+)
+@pytest.mark.parametrize("error", [OSError(98, "in use"), RuntimeError("in use")])
+def test_a_place_where_nothing_can_be_told_says_which_flag_names_another(
+    config: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    kind: str,
+    flag: str,
+    error: Exception,
+) -> None:
+    def refuse(_: argparse.Namespace) -> NoReturn:
+        raise error
+
+    monkeypatch.setattr(feed, "_made", lambda *_: refuse)
+    assert cli.main(["feed", kind, "-c", str(config)]) == 69
+    cause, _, remedy = capsys.readouterr().err.partition("; ")
+    assert cause == f"drslamd feed {kind}: in use"
+    assert flag in remedy
+
+
 def test_a_file_that_cannot_be_made_is_one_sentence(
     config: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     pytest.importorskip("mcap", reason="mcap is not installed")
     there = str(tmp_path / "no" / "run.mcap")
     assert cli.main(["feed", "ros2", "-c", str(config), "--mcap", there]) == 73
-    assert "No such file" in capsys.readouterr().err
+    assert f"No such file or directory; make its folder first: mkdir -p {tmp_path}/no" in (
+        capsys.readouterr().err
+    )
 
 
 @pytest.mark.slow

@@ -56,7 +56,9 @@ def test_a_file_that_is_there_ends_with_73(tmp_path: Path, capsys: Printed) -> N
     assert capsys.readouterr().err == f"{tmp_path}/log: is there already; give another name\n"
     code = cli.main(["record", str(tmp_path / "no" / "log"), "--interface", "127.0.0.1"])
     assert code == 73
-    assert "No such file or directory" in capsys.readouterr().err
+    assert f"No such file or directory; make its folder first: mkdir -p {tmp_path}/no" in (
+        capsys.readouterr().err
+    )
 
 
 def test_an_interface_that_is_not_there_ends_with_69(tmp_path: Path, capsys: Printed) -> None:

@@ -106,4 +106,4 @@ def test_a_folder_that_cannot_be_made_ends_with_73(
     (tmp_path / "file").write_text("")
     answer = told(team)
     assert ask(config, answer, "--tum", str(tmp_path / "file" / "tum")) == 73
-    assert "Not a directory" in capsys.readouterr().err
+    assert "Not a directory; a file stands where a folder should be" in capsys.readouterr().err

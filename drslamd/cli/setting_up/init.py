@@ -12,6 +12,7 @@ from drslamd.cli.exit_codes import CANNOT_CREATE, OK, USAGE
 from drslamd.cli.parser import Verbs, verb
 from drslamd.config import ConfigError, parse
 from drslamd.config_wheels import SOURCES
+from drslamd.host.unmade import unmade
 
 FOLDER = Path("/etc/drslamd")
 EXAMPLES = """\
@@ -112,9 +113,9 @@ def _write(path: Path, text: str, options: argparse.Namespace) -> int:
         write_whole(path, text, may_replace=options.force)
     except OSError as error:
         where = error.filename or path
-        remedy = "; try sudo" if isinstance(error, PermissionError) else ""
-        remedy = "; name it with --key" if str(where) == options.new_key else remedy
-        return _fail(f"{where}: {error.strerror}{remedy}", CANNOT_CREATE)
+        is_key = isinstance(error, FileExistsError) and str(where) == options.new_key
+        said = f"{where}: {error.strerror}; name it with --key" if is_key else unmade(where, error)
+        return _fail(said, CANNOT_CREATE)
     return OK
 
 
