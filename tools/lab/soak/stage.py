@@ -9,8 +9,9 @@ from functools import partial
 
 import numpy as np
 
-from drslamd.events import Datagram, Effect, Event, SaveDone
+from drslamd.events import SaveDone
 from drslamd.gossip.epochs import next_epoch
+from drslamd.robot import Robot
 from drslamd.slam.calibration.sensor_calibration import SensorCalibration
 from lab.play.playback import Chunk, Hardware, Wiring, equip, robot_config
 from lab.play.simulator import Clock, Disk, Member, Simulator
@@ -36,7 +37,8 @@ class Bench(Simulator):
     """A team whose robots can be switched off and on, with somebody else on the air.
 
     Attributes:
-        seen: the latest datagrams that each robot was given.
+        seen: the latest datagrams that each robot took: a copy of what it refused from somebody who
+            had not answered it yet is no replay, but that message itself, late.
         doubles: robots under an id that belongs to another, by that id.
     """
 
@@ -49,7 +51,6 @@ class Bench(Simulator):
         self.doubles: dict[int, Member] = {}
         self._extra = f'[team]\nkey_file = "team.key"\n{extra}'
         self._disks = {robot: Disk() for robot in self.hardware}
-        self.watchers.append(self._remember)
         for robot in self.hardware:
             self.switch_on(robot)
         for at_s, act in stage.acts:
@@ -107,17 +108,20 @@ class Bench(Simulator):
             data = line(self.now / 1e6, port, data)
         return data
 
-    def _remember(self, member: Member, event: Event, effects: list[Effect]) -> None:
-        if isinstance(event, Datagram) and event.sender != STRANGER:
-            self.seen[member.robot.own.robot].append(event.data)
-
     def arrive(self, member: Member, data: bytes, sender: str) -> None:
+        robot = member.robot
         is_foreign = sender == STRANGER or data in self.stage.radio.damaged
         self.stage.radio.damaged.discard(data)
-        before = imprint(member.robot) if is_foreign else b""
+        before, taken = imprint(robot) if is_foreign else b"", _taken(robot)
         super().arrive(member, data, sender)
-        if is_foreign and imprint(member.robot) != before:
-            raise Broken("P5", member.robot.own.robot, f"believed {data[:40]!r} of {sender}")
+        if is_foreign and imprint(robot) != before:
+            raise Broken("P5", robot.own.robot, f"believed {data[:40]!r} of {sender}")
+        if sender != STRANGER and _taken(robot) > taken:
+            self.seen[robot.own.robot].append(data)
+
+
+def _taken(robot: Robot) -> int:
+    return robot.team.accepted + robot.team.repeats_heard
 
 
 @dataclass
