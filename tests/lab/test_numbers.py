@@ -47,8 +47,10 @@ def test_other_numbers_too_and_not_a_number_is_none(text: str, value: float | No
     ],
 )
 def test_a_world_that_cannot_be_is_said_before_it_begins(
-    arguments: list[str], capsys: pytest.CaptureFixture[str]
+    arguments: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # or three hundred daemons would start
+    monkeypatch.setattr(demo, "_recording", lambda _: pytest.fail("it begins"))
     with pytest.raises(SystemExit) as ended:
         demo.main(arguments)
     assert ended.value.code == 2
