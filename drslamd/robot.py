@@ -206,6 +206,7 @@ class Robot:
         received = self.team.receive(event)
         if received is None:
             return []
+        self.back.on_start(received.origin)
         if isinstance(received.message, GraphEntry):
             self.back.insert(received.origin, received.message)
             if received.message.closures and self.back.estimate is None:

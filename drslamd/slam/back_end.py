@@ -86,6 +86,10 @@ class BackEnd:
         self.graph.insert(origin, entry)
         self._inserted += 1
 
+    def on_start(self, origin: Chain) -> None:
+        """A robot speaks, perhaps for the first time since it began again."""
+        self._inserted += self.graph.begin(origin)
+
     def digest(self) -> int:
         """Equal on two robots of a group when both hold the same graph of it."""
         return self.graph.digest(self._grouped)

@@ -60,7 +60,7 @@ class PoseGraph:
         self._view: GraphView | None = None
         self._steps: Steps | None = None
         """Of the view that is being made."""
-        self._waiting: list[tuple[Chain, GraphEntry]] = []
+        self._waiting: list[tuple[Chain, GraphEntry | None]] = []
         """What came meanwhile: of the ticks that follow each other until the view is made."""
         self._forgets = recent_s <= RECENT_S
         """What chapters leave out is needed where times are recent for longer than usual."""
@@ -100,7 +100,10 @@ class PoseGraph:
         still = self.frozen()
         waiting, self._waiting = self._waiting, []
         for origin, entry in waiting:
-            self.insert(origin, entry)
+            if entry is None:
+                self.begin(origin)
+            else:
+                self.insert(origin, entry)
         return still
 
     def frozen(self) -> PoseGraph:
@@ -113,6 +116,21 @@ class PoseGraph:
         still = PoseGraph()
         still._view = view
         return still
+
+    def begin(self, origin: Chain) -> bool:
+        """A start of a robot was heard of; did earlier ones say anything that counts no longer?
+
+        Logs begin anew with it. Of an old start nobody can learn what he lacks, so graphs that kept
+        it until the first entry of the new one would differ.
+        """
+        data = self.chains.get(origin.robot)
+        if data is None or origin.epoch <= data.chain.epoch:
+            return False
+        if self._steps is not None:
+            self._waiting.append((origin, None))
+        else:
+            self.forget(origin.robot)
+        return True
 
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
         """Take one entry of a robot's log."""

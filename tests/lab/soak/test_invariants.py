@@ -99,6 +99,18 @@ def test_what_a_stranger_is_believed_is_seen_and_what_it_is_not_is_counted() -> 
         team.arrive(team.members[0], true, STRANGER)
 
 
+def test_strangers_repeat_only_what_was_taken() -> None:
+    """A copy of what came before its sender had answered is that message itself, late."""
+    team, _ = bench()
+    team.run(3.0)
+    member = team.members[0]
+    count, taken = len(team.seen[0]), member.robot.team.accepted
+    team.arrive(member, b"nothing of ours", "robot 1")
+    assert (len(team.seen[0]), member.robot.team.accepted) == (count, taken)
+    team.run(4.0)
+    assert len(team.seen[0]) - count >= member.robot.team.accepted - taken > 0
+
+
 def test_a_number_is_used_once_and_an_entry_may_be_said_again() -> None:
     numbers = Numbers()
     header = Header(3, 3, 10, 1, 0)

@@ -130,6 +130,36 @@ def test_a_new_epoch_forgets_the_old_chain_and_what_it_measured() -> None:
     assert [(p.a.robot, p.b.robot) for p in graph.view.pairs] == [(1, 2)]
 
 
+def test_graphs_that_held_unlike_parts_of_an_old_start_are_alike_once_a_new_one_is_heard_of() -> (
+    None
+):
+    """Nobody repeats what an old start said: its log is gone with the first word of the new one."""
+    entries = some_entries()
+    whole, lacking = (
+        graph_of(*entries),
+        graph_of(*[e for e in entries if e[0] != A or e[1].seq < 4]),
+    )
+    assert whole.digest(EVERYBODY) != lacking.digest(EVERYBODY)
+    for graph in (whole, lacking):
+        assert not graph.begin(A)
+        assert not graph.begin(Chain(A.robot, A.epoch - 1))
+        assert graph.begin(Chain(A.robot, A.epoch + 1))
+        assert not graph.begin(Chain(A.robot, A.epoch + 1))
+        assert A.robot not in graph.chains
+    assert whole.digest(EVERYBODY) == lacking.digest(EVERYBODY)
+
+
+def test_a_start_that_is_heard_of_while_the_graph_is_looked_at_counts_after_that() -> None:
+    graph, same = graph_of(*some_entries()), graph_of(*some_entries())
+    again = Chain(A.robot, A.epoch + 1)
+    assert graph.look(0.5) is None
+    assert graph.begin(again)
+    assert A.robot in graph.chains
+    assert same.begin(again)
+    assert graph.digest(EVERYBODY) == same.digest(EVERYBODY)
+    assert A.robot not in graph.chains
+
+
 def test_an_old_epoch_is_not_listened_to() -> None:
     graph = graph_of((A, GraphEntry(0, keyframes=(Keyframe(3, 0, 1, 2, 3),))))
     graph.insert(Chain(0, 4), GraphEntry(1, keyframes=(Keyframe(4, 0, 1, 2, 3),)))

@@ -25,7 +25,7 @@ from drslamd.slam.graph.thinning.thinned_pairs import (
 )
 from drslamd.slam.graph.thinning.time_cells import ages, recent_s
 
-AT_ONCE = 48
+AT_ONCE = 24
 """Stretches of pairs that are thinned together."""
 
 Begun = tuple[list[Unthinned], Callable[[list[PairPart]], PairView]]

@@ -47,10 +47,6 @@ MOST = 7
 """Where so many do, no new closure is believed."""
 APART_US = 4 * SECOND_US
 """Between two windows that are asked; a window is up to a minute long."""
-MOST_SPARED = 4
-"""So many times as long is waited at most, twice as long each time, while one window has confirmed
-the pair and nothing seems better but by chance. An answer then stands for those that were spared:
-windows that are `APART_US` apart share nearly all of their data."""
 MOVED_M = 1.0
 """A robot that drove less in a window looks the same in a mirror."""
 FEWEST_ASKED, MOST_ASKED = 3, 12
@@ -105,7 +101,6 @@ class MountingSearch:
         self._asked_at: int | None = None
         self._asked_quickly_at: int | None = None
         self._is_quick = False
-        self._most_spared = self._stands_for = 1
         self._recent: deque[float] = deque(maxlen=STEADY - 1)
         self._worst = 0.0
         """Evidence against wheels that run backwards: of late, and the least ever."""
@@ -158,10 +153,8 @@ class MountingSearch:
         return self._is_due(utime, awaits) or self._is_quickly_due(utime, awaits)
 
     def _is_due(self, utime: int, awaits: bool) -> bool:
-        is_calm = self.poor < MANY and not awaits
-        apart_us = APART_US * (self._most_spared if is_calm else 1)
-        is_late = self._asked_at is None or utime - self._asked_at >= apart_us
-        is_doubtful = self.is_provisional or not is_calm
+        is_late = self._asked_at is None or utime - self._asked_at >= APART_US
+        is_doubtful = self.poor >= MANY or awaits or self.is_provisional
         is_open = self.found is None and not self._is_final and is_doubtful
         is_vague = self.found is not None and is_learned(self.found) and self.disagrees
         return is_late and (is_open or is_vague)
@@ -187,8 +180,6 @@ class MountingSearch:
         self._is_quick = not self._is_due(utime, awaits)
         self._asked_quickly_at = utime
         if not self._is_quick:
-            spans = 1 if self._asked_at is None else (utime - self._asked_at) // APART_US
-            self._stands_for = max(1, min(spans, self._most_spared))
             self._asked_at = utime
 
     @property
@@ -218,9 +209,7 @@ class MountingSearch:
             self._weigh(costs, measurements - 3, is_mirror_told)
         if self._is_quick:
             return False
-        self._answers.extend(self._stands_for * [_Answer(costs, measurements - 3)])
-        is_calm = self.is_provisional and bool(costs.min() >= costs[0] - BY_CHANCE)
-        self._most_spared = min(2 * self._most_spared, MOST_SPARED) if is_calm else 1
+        self._answers.append(_Answer(costs, measurements - 3))
         if self.found is not None:
             return self._refine(self.found)
         if self.is_provisional and costs.min() <= costs[0] - EXCLUDED:

@@ -42,7 +42,6 @@ from drslamd.slam.relative_pose.mistakes.mounting_search import (
     MANY,
     MOST,
     MOST_ASKED,
-    MOST_SPARED,
     QUICKLY_US,
     RECENT,
     SHARED,
@@ -437,55 +436,6 @@ def test_what_several_windows_say_finds_a_mistake_after_that() -> None:
         ask(search, {AS_IT_IS: GOOD + BETTER, TRACK: GOOD})
     assert ask(search, {AS_IT_IS: GOOD + BETTER, TRACK: GOOD})
     assert search.found == TRACK
-
-
-def calm() -> tuple[MountingSearch, int]:
-    """A window has confirmed it, and each that was asked since, until it is asked no less often;
-    and when the last of these was asked."""
-    search, utime, apart = sure(), APART_US, 1
-    while apart < MOST_SPARED:
-        # wheels that run backwards are hardly excluded by it
-        ask(search, {AS_IT_IS: GOOD, LEFT: GOOD + LITTLE})
-        apart = min(2 * apart, MOST_SPARED)
-        assert not search.is_due(utime + apart * APART_US - 1, False)
-        utime += apart * APART_US
-        assert search.is_due(utime, False)
-        search.begin(utime, False)
-    ask(search, {AS_IT_IS: GOOD, LEFT: GOOD + LITTLE})
-    return search, utime
-
-
-def test_who_was_confirmed_by_one_window_is_asked_less_often_while_nothing_disagrees() -> None:
-    search, utime = calm()
-    assert (search.is_confirmed, search.is_provisional) == (True, True)
-    assert not search.is_due(utime + MOST_SPARED * APART_US - 1, False)
-    assert search.is_due(utime + MOST_SPARED * APART_US, False)
-
-
-def test_and_as_often_as_before_as_soon_as_something_does() -> None:
-    search, utime = calm()
-    assert not search.is_due(utime + APART_US, False)
-    assert search.is_due(utime + APART_US, True)
-    for _ in range(MANY):
-        search.on_verdict(Verdict.POOR_FIT)
-    assert search.is_due(utime + APART_US, False)
-    unsure, utime = calm()
-    ask(unsure, {AS_IT_IS: GOOD + EXCLUDED + LITTLE, TRACK: GOOD})
-    assert not unsure.is_provisional
-    assert unsure.is_due(utime + APART_US, True)
-
-
-@pytest.mark.parametrize(("waited", "more"), [(1, 4), (2, 3), (3, 2), (4, 1), (9, 1)])
-def test_an_answer_stands_for_those_that_were_spared(waited: int, more: int) -> None:
-    """So who looks the same in a mirror is believed after as long as with all of them."""
-    search, utime = calm()
-    assert 1 + 2 + MOST_SPARED + 5 == MOST_ASKED
-    for apart in (waited, *[1] * more):
-        assert search.is_provisional
-        utime += apart * APART_US
-        search.begin(utime, True)
-        ask(search, {AS_IT_IS: GOOD, LEFT: GOOD + LITTLE})
-    assert (search.is_confirmed, search.is_provisional) == (True, False)
 
 
 class Asked:
