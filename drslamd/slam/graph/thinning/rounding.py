@@ -10,7 +10,7 @@ RESOLUTION = 1e-6
 """m, rad and their squares: what differs by less counts as equal in a digest, because sines and
 cosines of different processors differ in their last digits."""
 MOST = 2.0**62
-"""Times that: whatever is more, a way to the end of all numbers, counts as this, on any processor."""
+"""Times that: whatever is more counts as this, on any processor."""
 
 
 def as_digested(values: Array) -> bytes:
