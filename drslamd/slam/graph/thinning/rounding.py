@@ -16,4 +16,4 @@ MOST = 2.0**62
 def as_digested(values: Array) -> bytes:
     """What two arrays share whose values are nearly the same."""
     steps = np.nan_to_num(np.rint(values / RESOLUTION))
-    return np.clip(steps, -MOST, MOST).astype(np.int64).tobytes()
+    return bytes(np.clip(steps, -MOST, MOST).astype(np.int64).tobytes())
