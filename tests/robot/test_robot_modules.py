@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from message_builders import a_status
 from pair_scenes import BESIDE, asked_at, estimate_of
 from robot_scenes import RobotScene, sends, solves
 from slam_scenes import NOISE, closure
@@ -116,6 +117,20 @@ def test_who_waits_for_its_turn_begins_as_soon_as_a_neighbour_has_moved(
     scene.robot.back.exchange.wait(scene.utime)
     scene.hear(4, replace(public, round=2))
     assert begun == [1]
+
+
+def test_what_a_peer_said_before_it_began_again_is_gone_with_its_first_word() -> None:
+    """Logs begin anew with it, and nobody can learn any more what he lacks of the old one."""
+    scene, said = RobotScene(), GraphEntry(0, keyframes=(Keyframe(10, 0, 0, 0, 0),))
+    scene.meet(4)
+    scene.hear(4, said)
+    scene.meet(4)
+    assert scene.robot.back.graph.chains[4].chain == Chain(4, 1)
+    # (only a robot that was silent for a while may begin again)
+    scene.later(10)
+    scene.hear(4, a_status((), uwb_id=4), epoch=2)
+    assert scene.robot.team.peers[4].chain == Chain(4, 2)
+    assert 4 not in scene.robot.back.graph.chains
 
 
 # our log

@@ -289,6 +289,16 @@ def test_two_robots_of_a_group_that_hold_the_same_say_the_same_of_it(team: Small
     assert one.digest() != other.digest()
 
 
+def test_a_robot_that_began_again_is_news_and_one_that_goes_on_is_none(team: SmallTeam) -> None:
+    back, _ = settled(team, 0)
+    chain = team.chains[2]
+    back.on_start(chain)
+    assert begin(back) is None
+    back.on_start(Chain(chain.robot, chain.epoch + 1))
+    assert chain.robot not in back.graph.chains
+    assert begin(back, {0, 1}) is not None
+
+
 def test_what_is_said_of_a_graph_is_of_when_module_3_looked_at_it(team: SmallTeam) -> None:
     back, _ = settled(team, 0)
     assert back.said_digest() == back.digest()

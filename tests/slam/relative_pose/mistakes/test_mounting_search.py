@@ -415,6 +415,19 @@ def test_what_several_windows_confirmed_is_not_contested() -> None:
     assert not search.is_contested
 
 
+def test_windows_of_that_time_are_asked_about_tracks_and_no_longer_about_backwards() -> None:
+    """What confirms the pair once more, should it come to that, is as much as before."""
+    search = sure(watched=0)
+    search.begin(APART_US + QUICKLY_US, False)
+    search.on_costs(excluding(-3.0), FREE + 3, True)
+    search.begin(2 * APART_US, False)
+    assert ask(search, {AS_IT_IS: GOOD + EXCLUDED + LITTLE, TRACK: GOOD})
+    assert not search.is_confirmed
+    search.begin(2 * APART_US + QUICKLY_US, True)
+    search.on_costs(excluding(SURELY + LITTLE), FREE + 3, True)
+    assert search.is_confirmed
+
+
 def test_a_pair_that_one_window_confirmed_is_watched_for_a_while() -> None:
     """Each second, and all that may win is asked; after that every few seconds are enough."""
     search, utime = sure(watched=0), APART_US
