@@ -296,7 +296,7 @@ def test_a_robot_that_began_again_is_news_and_one_that_goes_on_is_none(team: Sma
     assert begin(back) is None
     back.on_start(Chain(chain.robot, chain.epoch + 1))
     assert chain.robot not in back.graph.chains
-    assert begin(back, {0, 1}) is not None
+    assert begin(back) is not None
 
 
 def test_what_is_said_of_a_graph_is_of_when_module_3_looked_at_it(team: SmallTeam) -> None:
