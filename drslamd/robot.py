@@ -189,7 +189,7 @@ class Robot:
         self.ports[event.port] = event
         level = Level.INFO if event.condition is PortCondition.OPEN else Level.WARNING
         fields = {"state": event.condition.value, "detail": event.detail}
-        return [Note(level, f"{event.port}.port", fields)]
+        return [Note(level, f"{event.port}.port", fields), *diagnosis.diagnose(self, event.utime)]
 
     def _poll_wheels(self, utime: int) -> list[Effect]:
         data = self.wheels.poll(utime)
@@ -200,7 +200,8 @@ class Robot:
     def _on_network(self, event: NetworkState) -> list[Effect]:
         self.network = event
         level = Level.INFO if event.up else Level.WARNING
-        return [Note(level, "network.up" if event.up else "network.down", {"detail": event.detail})]
+        name = "network.up" if event.up else "network.down"
+        return [Note(level, name, {"detail": event.detail}), *diagnosis.diagnose(self, event.utime)]
 
     def _on_message(self, event: Datagram | ChannelMessage) -> list[Effect]:
         received = self.team.receive(event)
@@ -312,8 +313,7 @@ class Robot:
         self.front.watch_ranges(self.neighbours(utime), self.back.graph, self.back.estimate, utime)
         self.back.exchange.keep({peer.chain for peer in self.team.peers.values()})
         self._remember(utime)
-        found = diagnosis.conditions(self, utime)
-        notes: list[Effect] = [n for key, why in found for n in self.health.set(key, why, utime)]
+        notes: list[Effect] = [*diagnosis.diagnose(self, utime)]
         above = self.team.superseded_by
         if above is None or self.team.namesakes.is_own_id_heard(utime):
             return notes

@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol
 
 from drslamd.conditions import contradictions, turns
+from drslamd.conditions.health import Health
 from drslamd.conditions.ports import port_cause, port_remedy
 from drslamd.config import Config
 from drslamd.config_wheels import SerialWheelSection
 from drslamd.conventions import SECOND_US
-from drslamd.events import NetworkState, Port, PortCondition, PortState, Slept
+from drslamd.events import NetworkState, Note, Port, PortCondition, PortState, Slept
 from drslamd.gossip.message_types import PoseState
 from drslamd.gossip.outbox import Outbox
 from drslamd.gossip.team import Team
@@ -58,6 +59,7 @@ class Stages(Protocol):
     standing: Standing
     outbox: Outbox
     ports: dict[str, PortState]
+    health: Health
     network: NetworkState | None
     slept: Slept | None
     memory: Memory
@@ -66,6 +68,14 @@ class Stages(Protocol):
     def neighbours(self, utime: int) -> list[PeerInRange]: ...
 
     def whereabouts(self, utime: int) -> Whereabouts: ...
+
+
+def diagnose(robot: Stages, utime: int) -> list[Note]:
+    """State all conditions anew, what should be logged about them; each second, and as soon as a
+    port changes: no answer says both that it is open and why it cannot be opened.
+    """
+    found = conditions(robot, utime)
+    return [note for key, why in found for note in robot.health.set(key, why, utime)]
 
 
 def conditions(robot: Stages, utime: int) -> Iterator[Condition]:

@@ -81,10 +81,18 @@ def test_the_state_of_a_port_is_remembered_and_noted(
 ) -> None:
     scene = RobotScene()
     state = PortState(scene.utime, "uwb", condition, "/dev/uwb")
-    assert scene.robot.handle(state) == [
-        Note(level, "uwb.port", {"state": condition.value, "detail": "/dev/uwb"})
-    ]
+    note = Note(level, "uwb.port", {"state": condition.value, "detail": "/dev/uwb"})
+    assert scene.robot.handle(state)[0] == note
     assert scene.robot.ports == {"uwb": state}
+
+
+def test_of_a_port_that_opens_nobody_reads_any_longer_why_it_was_shut() -> None:
+    """Both stand in one answer to `status`, also between two looks at the health."""
+    scene = RobotScene()
+    scene.robot.handle(PortState(scene.utime, "uwb", PortCondition.BUSY, "/dev/uwb"))
+    assert scene.robot.health.sentences()["uwb"].startswith("uwb: in use by another program")
+    scene.robot.handle(PortState(scene.utime + 1, "uwb", PortCondition.OPEN, "/dev/uwb"))
+    assert "uwb" not in scene.robot.health.sentences()
 
 
 @pytest.mark.parametrize(
@@ -97,7 +105,8 @@ def test_the_state_of_a_port_is_remembered_and_noted(
 def test_the_state_of_the_network_is_remembered_and_noted(up: bool, note: Note) -> None:
     scene = RobotScene()
     state = NetworkState(scene.utime, up, "eth0")
-    assert scene.robot.handle(state) == [note]
+    assert scene.robot.handle(state)[0] == note
+    assert ("network" in scene.robot.health.sentences()) is not up
     assert scene.robot.network is state
 
 
