@@ -24,6 +24,9 @@ MAX_NODES = 256
 """Modules without a robot; a radio cell holds 64, and a team drives through some cells."""
 MAX_PLACES = 512
 """Where one of them stood: whoever carries it about all day comes to less."""
+MAX_WAITING = 8_192
+"""Entries that wait while the graph is looked at: a minute of a team of 128. Who hears more in the
+seconds that a look takes is flooded, and the rest of the look is then made in one go."""
 ALL = 2**31
 """Work: more than any view is."""
 
@@ -61,7 +64,7 @@ class PoseGraph:
         self._steps: Steps | None = None
         """Of the view that is being made."""
         self._waiting: list[tuple[Chain, GraphEntry | None]] = []
-        """What came meanwhile: of the ticks that follow each other until the view is made."""
+        """What came meanwhile, `MAX_WAITING` at most."""
         self._forgets = recent_s <= RECENT_S
         """What chapters leave out is needed where times are recent for longer than usual."""
 
@@ -123,6 +126,7 @@ class PoseGraph:
         Logs begin anew with it. Of an old start nobody can learn what he lacks, so graphs that kept
         it until the first entry of the new one would differ.
         """
+        self._make_room()
         data = self.chains.get(origin.robot)
         if data is None or origin.epoch <= data.chain.epoch:
             return False
@@ -134,6 +138,7 @@ class PoseGraph:
 
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
         """Take one entry of a robot's log."""
+        self._make_room()
         if self._steps is not None:
             self._waiting.append((origin, entry))
             return
@@ -165,6 +170,11 @@ class PoseGraph:
             for pair in self.pairs.values():
                 if pair.a == origin:
                     pair.replace(replaced)
+
+    def _make_room(self) -> None:
+        """For one more that waits."""
+        if self._steps is not None and len(self._waiting) >= MAX_WAITING:
+            self.look(ALL)
 
     def _pair(self, a: Chain, b: Chain, b_n: int) -> PairData | None:
         """The pair's data; None for a start of b that is already past, for a pair of one, and for

@@ -11,6 +11,7 @@ import pytest
 from slam_scenes import NOISE, closure, keyframes, model_of, range_item, small_team, wander
 
 from drslamd.conventions import Chain, Segment
+from drslamd.slam.graph import pose_graph
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.graph.pose_graph import PoseGraph
 
@@ -158,6 +159,20 @@ def test_a_start_that_is_heard_of_while_the_graph_is_looked_at_counts_after_that
     assert same.begin(again)
     assert graph.digest(EVERYBODY) == same.digest(EVERYBODY)
     assert A.robot not in graph.chains
+
+
+@pytest.mark.parametrize(("count", "is_looking"), [(3, True), (4, False)])
+def test_one_more_than_may_wait_ends_the_look_and_nothing_is_lost(
+    count: int, is_looking: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pose_graph, "MAX_WAITING", 3)
+    news = [(C, GraphEntry(k, keyframes=(Keyframe(1_000 + k, 1, 0, 0, 0),))) for k in range(count)]
+    graph = graph_of(*some_entries())
+    assert graph.look(0.5) is None
+    for origin, entry in news:
+        graph.insert(origin, entry)
+    assert (1_000 not in graph.chains[C.robot].keyframes.n) is is_looking
+    assert graph.digest(EVERYBODY) == graph_of(*some_entries(), *news).digest(EVERYBODY)
 
 
 def test_an_old_epoch_is_not_listened_to() -> None:
