@@ -6,9 +6,10 @@ The conversations and figures are those of `lab.healing`, which plays longer cas
 from __future__ import annotations
 
 import pytest
-from lab.healing import Conversation, heal, joined, parted, restarted
+from lab.healing import Case, Conversation, heal, joined, parted, restarted
 from places import Recorded
 
+from drslamd.conventions import Chain
 from drslamd.slam.graph.chapters.books import LEVELS
 
 SPAN = LEVELS[0].entries
@@ -41,6 +42,32 @@ def test_a_newcomer_gets_chapters_and_not_the_whole_log() -> None:
     log = talk.mates[2].team.logs._logs[0]
     assert len(log.sealed) < SPAN < 2 * SPAN < log.end
     talk.settle()
+    assert len(talk.digests()) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.row("N6")
+def test_a_newcomer_to_a_team_with_twenty_minutes_behind_it_has_its_graph_within_half_a_minute(
+    record_property: Recorded,
+) -> None:
+    found = Case("newcomer", 5, 0.0, joined(0), 30, remembered=20).play(seed=1, limit=60)
+    assert found.seconds is not None
+    assert found.seconds <= 30
+    assert found.peak < 2.1
+    assert found.graphs == 1
+    record_property("measured", f"healed in {found.seconds} s, busiest second {found.peak:.2f} x")
+
+
+def test_what_a_team_remembers_was_never_on_the_air_and_nobody_lacks_any_of_it() -> None:
+    talk = Conversation(3, seed=1)
+    talk.remember(1)
+    assert sum(talk.bytes) == 0
+    for mate in talk.mates.values():
+        ends = [mate.team.logs.known_below(Chain(robot, 1)) for robot in talk.mates]
+        assert ends == [60, 60, 60]
+    # and a radio goes on from there
+    talk.seconds(10)
+    assert talk.is_healed()
     assert len(talk.digests()) == 1
 
 

@@ -16,6 +16,7 @@ import sys
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Set
 from typing import NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 
@@ -42,6 +43,7 @@ FRESH_S = 5
 PARTNERS = 10
 """Robots that one robot of a large team ranges to."""
 Link = Callable[[int, int], bool]
+Measured = tuple[list[Keyframe], list[RangeMeasurement], list[ClosureMeasurement]]
 
 
 class Mate:
@@ -103,6 +105,42 @@ class Conversation:
                 mate.graph.insert(received.origin, received.message)
 
     def drive(self, robot: int, mate: Mate, partners: Iterable[Chain]) -> None:
+        """Another second of a robot, which it tells the others."""
+        team = mate.team
+        for entry in team.entries(UNTOLD, *self._measure(mate, partners)):
+            decoded, sealed = team.append(entry, self.utime)
+            self.said.append((team.own, decoded.seq, self.utime))
+            mate.graph.insert(team.own, decoded)
+            self._carry(robot, team.send_sealed(robot, sealed))
+        for entry in team.write_chapters(self.utime, mate.graph, aloud=True):
+            mate.graph.insert(team.own, entry)
+
+    def remember(self, minutes: float) -> None:
+        """Let a team have driven for so long and heard all: entries go from hand to hand, and one
+        graph serves everybody, so hours of many robots take minutes."""
+        graph = PoseGraph()
+        for mate in self.mates.values():
+            mate.graph = graph
+        with patch.object(Team, "living", return_value=range(1, len(self.mates))):
+            for _ in range(round(60 * minutes)):
+                self.utime += SECOND
+                for robot, mate in self.mates.items():
+                    near = range(robot + 1, min(robot + 1 + PARTNERS, len(self.mates)))
+                    partners = [self.mates[peer].team.own for peer in near]
+                    self._hand_over(mate, self._measure(mate, partners))
+
+    def _hand_over(self, mate: Mate, measured: Measured) -> None:
+        team, logs = mate.team, [other.team.logs for other in self.mates.values()]
+        entries = [team.append(e, self.utime)[0] for e in team.entries(UNTOLD, *measured)]
+        while entries:
+            for entry in entries:
+                mate.graph.insert(team.own, entry)
+                sealed = team.logs._logs[team.own.robot].sealed[entry.seq]
+                for log in logs:
+                    log.add(team.own, entry.seq, sealed, self.utime, entry.chapter)
+            entries = team.write_chapters(self.utime, mate.graph, aloud=False)
+
+    def _measure(self, mate: Mate, partners: Iterable[Chain]) -> Measured:
         """A keyframe, a range to each partner, a closure now and then."""
         chance, n = self._chance, self.utime // STEP
         mate.place += [chance.gauss(3_000, 500), chance.gauss(0, 500), chance.gauss(100, 300)]
@@ -122,15 +160,7 @@ class Conversation:
                 closures.append(
                     ClosureMeasurement(mate.numbers[peer.robot], True, n, peer, n, pose, covariance)
                 )
-        keyframe = Keyframe(n, 0, x, y, theta)
-        team = mate.team
-        for entry in team.entries(UNTOLD, [keyframe], ranges, closures):
-            decoded, sealed = team.append(entry, self.utime)
-            self.said.append((team.own, decoded.seq, self.utime))
-            mate.graph.insert(team.own, decoded)
-            self._carry(robot, team.send_sealed(robot, sealed))
-        for entry in team.write_chapters(self.utime, mate.graph, aloud=True):
-            mate.graph.insert(team.own, entry)
+        return [Keyframe(n, 0, x, y, theta)], ranges, closures
 
     def _partners(self, robot: int, mate: Mate) -> Iterator[Chain]:
         """Whom it ranges to: the next ones in a large team, all that are above it in a small."""
@@ -264,6 +294,13 @@ class Case(NamedTuple):
     fault: Callable[[Conversation], None]
     limit: int
     """Seconds in which it shall be healed."""
+    remembered: float = 0.0
+    """Minutes that the team has behind it."""
+
+    def play(self, seed: int, limit: int) -> Healed:
+        talk = Conversation(self.robots, self.loss, seed)
+        talk.remember(self.remembered)
+        return heal(talk, self.fault, limit)
 
 
 SMALL = [
@@ -279,7 +316,7 @@ SMALL = [
 LARGE = [
     Case("parted 60 min, loss 0%", 5, 0.0, parted(60, 2), 30),
     Case("newcomer after 60 min, loss 0%", 5, 0.0, joined(60), 30),
-    Case("newcomer to 50 after 15 min, loss 0%", 50, 0.0, joined(15), 30),
+    Case("newcomer to 50 after 60 min, loss 0%", 50, 0.0, joined(0), 30, remembered=60),
 ]
 
 
@@ -290,7 +327,7 @@ def main() -> int:
     chosen = parser.parse_args()
     rows = [("case", "healed after", "shall", "busiest second", "more than steady", "graphs")]
     for case in SMALL + (LARGE if chosen.all else []):
-        found = heal(Conversation(case.robots, case.loss, 1), case.fault, 20 * case.limit)
+        found = case.play(seed=1, limit=20 * case.limit)
         when = "never" if found.seconds is None else f"{found.seconds} s"
         rows.append(
             (case.name, when, f"{case.limit} s", f"{found.peak:.1f} x steady (2)",
