@@ -143,7 +143,7 @@ class RangeWatch:
     @property
     def gap_m(self) -> float:
         """By how much we may be elsewhere: as far as any range is off to a partner that is not
-        known to slip itself, or several are together, or as far as our wheels jumped."""
+        known to slip itself, or as those of some seconds are together, or as our wheels jumped."""
         return max(self._gap_m, self._together_m, self._jump_m, *self._late_m, 0.0)
 
     @property
