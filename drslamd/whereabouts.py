@@ -75,8 +75,8 @@ def whereabouts(
         track: its odometry.
         most_mps: what its wheels can do.
         doubt: what speaks against that pose.
-        gap_m: how far all ranges of this second are off: the pose is as wrong as that, whatever the
-            reason, and long before anybody can say which.
+        gap_m: how far ranges of this second, or of several together, are off: the pose is as wrong
+            as that, whatever the reason, and long before anybody can say which.
         by_ranges: where it is without odometry, as ranges have it.
         is_point: is its heading unknown?
         valid_us: how long a pose is that of now.

@@ -2,12 +2,14 @@
 
 Module 3 knows that something is wrong once its graph shows it, which takes seconds. What it solved
 last, carried on by both odometries, says what each range must be now; a range that is far off for
-two seconds is doubt, long before anybody can say who is wrong.
+two seconds is doubt, long before anybody can say who is wrong. Ranges that are a little off, second
+after second, are no doubt yet, but a pose may be as wrong as they are.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from statistics import median
 from typing import NamedTuple
 
@@ -36,6 +38,11 @@ LEAST_M = 1e-3
 """Antennas that touch have no direction."""
 MOST_BIAS_M = 1.0
 """Of which nothing is known yet."""
+AT_LENGTH = 3
+"""Seconds of ranges to each partner that are looked at together ..."""
+UNLIKELY = 4.0
+"""... and the sum of their squared sigmas, in the mean of all partners, that is no chance. Sigmas
+are configured for any room: healthy teams have more in 1 % of the time."""
 AT_ONCE = 5
 """Tenths of a second whose median is looked at."""
 
@@ -126,6 +133,9 @@ class RangeWatch:
         self.off: dict[int, int] = {}
         self._gap_m, self._jump_m = 0.0, 0.0
         self._late_m: deque[float] = deque(maxlen=LASTS)
+        self._lately: dict[int, deque[_Gap]] = {}
+        """By partner that was looked at without a break."""
+        self._together_m = 0.0
         self._believed = -1
         self._known: dict[int, _Known] = {}
         """By partner."""
@@ -133,8 +143,8 @@ class RangeWatch:
     @property
     def gap_m(self) -> float:
         """By how much we may be elsewhere: as far as any range is off to a partner that is not
-        known to slip itself, or as far as our wheels jumped."""
-        return max(self._gap_m, self._jump_m, *self._late_m, 0.0)
+        known to slip itself, or as those of some seconds are together, or as our wheels jumped."""
+        return max(self._gap_m, self._together_m, self._jump_m, *self._late_m, 0.0)
 
     @property
     def doubted(self) -> frozenset[int]:
@@ -167,6 +177,9 @@ class RangeWatch:
         far_m = [abs(g.metres) for r, g in gaps.items() if g.is_far and r not in slipping]
         self._gap_m = max(far_m, default=0.0)
         self._late_m.append(self._gap_m if self.doubted else 0.0)
+        before = self._lately
+        self._lately = {r: deque([*before.get(r, ()), g], AT_LENGTH) for r, g in gaps.items()}
+        self._together_m = _together_m([g for r, g in self._lately.items() if r not in slipping])
         self._jump_m = self._feared(jumps.feared(own.track), estimate, own, list(gaps.values()))
 
     def _feared(
@@ -239,6 +252,16 @@ class RangeWatch:
         variance += min(bias.sigma, MOST_BIAS_M) ** 2
         off = measured - distance - bias.value - strong
         return _Gap(off, float(np.sqrt(variance)), u, distance)
+
+
+def _together_m(lately: Sequence[Sequence[_Gap]]) -> float:
+    """How far the ranges of some seconds are off, root mean square, to the partner to whom they are
+    off most; 0 where those to all partners together may be noise."""
+    seen = [late for late in lately if len(late) == AT_LENGTH]
+    squares = [sum((gap.metres / gap.sigma) ** 2 for gap in late) for late in seen]
+    if sum(squares) < UNLIKELY * max(len(seen), 1):
+        return 0.0
+    return max(float(np.sqrt(np.mean([gap.metres**2 for gap in late]))) for late in seen)
 
 
 def _newest(own: PairEnd, partner: Partner, utime: int) -> tuple[int, int] | None:

@@ -20,11 +20,13 @@ from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.odometry.track import Track
 from drslamd.slam.range_model import LINKTRACK
 from drslamd.slam.range_watch import (
+    AT_LENGTH,
     FAR_SIGMAS,
     IN_A_ROW,
     LASTS,
     LATE_US,
     MOST_BIAS_M,
+    UNLIKELY,
     Partner,
     RangeWatch,
 )
@@ -346,9 +348,9 @@ TWIN = 7
 """Another partner, that drives where the first one does."""
 
 
-def gap_m(**metres_off: float) -> float:
+def gap_m(scene: Scene | None = None, **metres_off: float) -> float:
     """Of one second in which ranges to the partner, to its twin, or to both are so far off."""
-    scene = Scene()
+    scene = scene or Scene()
     twin = ChainData(Chain(TWIN, 1))
     twin.take_model(0, MODELS[1])
     for n in range(SOLVED, NEWEST + 1, 10):
@@ -402,6 +404,74 @@ def test_a_gap_that_was_doubt_is_feared_for_some_seconds() -> None:
         assert scene.watch.gap_m == pytest.approx(2.0, abs=1e-3)
     scene.look(solved())
     assert scene.watch.gap_m == 0.0
+
+
+# second after second
+
+
+def after(scene: Scene, sigmas: list[float | None], estimate: TeamEstimate | None = None) -> float:
+    """How far off the pose may be after seconds whose ranges are so many sigmas too long, or not
+    there."""
+    for off in sigmas:
+        scene.ranges = RangeBuffer(10.0)
+        if off is not None:
+            scene.hear(measured(between(), off, SIGMA), NEWEST - 8, NEWEST + 1)
+        scene.look(estimate or solved())
+    return scene.watch.gap_m
+
+
+def metres(sigmas: float) -> float:
+    """Of a range that is so many too long, in the plane."""
+    high = MODELS[1].antenna_z_m - MODELS[0].antenna_z_m
+    return math.sqrt(measured(between(), sigmas, SIGMA) ** 2 - high**2) - between()
+
+
+EACH = math.sqrt(UNLIKELY / AT_LENGTH)
+"""Sigmas that ranges must be off in every second."""
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_ranges_that_are_a_little_off_for_some_seconds_are_a_gap(sign: float) -> None:
+    over, under = sign * (EACH + 0.01), sign * (EACH - 0.01)
+    assert after(Scene(), [over] * AT_LENGTH) == pytest.approx(abs(metres(over)), abs=1e-3)
+    assert after(Scene(), [under] * AT_LENGTH) == 0.0
+    assert after(Scene(), [over] * (AT_LENGTH - 1)) == 0.0
+    # and nobody doubts for that
+    scene = Scene()
+    after(scene, [over] * 10)
+    assert scene.watch.doubted == frozenset()
+
+
+def test_such_a_gap_is_the_root_mean_square_of_its_seconds_and_ends_with_them() -> None:
+    off = [2.0, 0.5, -1.0]
+    scene = Scene()
+    expected = math.sqrt(sum(metres(sigmas) ** 2 for sigmas in off) / 3)
+    assert after(scene, [0.0, 0.0, *off]) == pytest.approx(expected, abs=1e-3)
+    # 0.25 and 1 and 0 are less than four
+    assert after(scene, [0.0]) == 0.0
+
+
+def test_seconds_without_ranges_part_those_that_are_looked_at_together() -> None:
+    assert after(Scene(), [2.0, 2.0, None, 2.0, 2.0]) == 0.0
+    assert after(Scene(), [None, 2.0, 2.0, 2.0]) == pytest.approx(metres(2.0), abs=1e-3)
+
+
+@pytest.mark.parametrize(("twin", "is_gap"), [(EACH - 0.01, True), (EACH - 0.03, False)])
+def test_ranges_to_all_partners_count_together(twin: float, is_gap: bool) -> None:
+    """One is off by 0.02 sigmas more than it takes."""
+    scene, off = Scene(), {"partner": metres(EACH + 0.02), "twin": metres(twin)}
+    found = [gap_m(scene, **off) for _ in range(AT_LENGTH)]
+    assert found[:-1] == [0.0] * (AT_LENGTH - 1)
+    assert found[-1] == pytest.approx(metres(EACH + 0.02) if is_gap else 0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(("level", "is_theirs"), [(MUCH_WORSE - 0.01, False), (MUCH_WORSE, True)])
+def test_such_a_gap_is_not_ours_where_the_partner_is_known_to_slip(
+    level: float, is_theirs: bool
+) -> None:
+    estimate = replace(solved(), late_level={PARTNER: level})
+    expected = 0.0 if is_theirs else metres(2.0)
+    assert after(Scene(), [2.0] * AT_LENGTH, estimate) == pytest.approx(expected, abs=1e-3)
 
 
 # wheels that jumped
