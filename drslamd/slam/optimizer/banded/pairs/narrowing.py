@@ -2,14 +2,17 @@
 
 The noise of a pair's ranges is held at that of the others, and that at what is configured, so much
 as a handful of independent ranges would say; likewise the odometry of each robot (`misfit.DOUBT`).
-With that noise the same system is taken apart once more, and each pair gets one factor, by which
-its covariance is smaller in the mean of all directions. It is never above 1: what is wrong beyond
-what is configured is for the covariances of all. Constants of sensors are feared as configured,
-since few ranges tell of them.
+Biases are feared to differ from each other as those of the team were seen to, and to be off alike
+as configured; so are scales, since few ranges tell of them. With that noise the same system is
+taken apart once more, and each pair gets one factor, by which its covariance is smaller in the mean
+of all directions. It is never above 1: what is wrong beyond what is configured is for the
+covariances of all.
 """
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -26,8 +29,9 @@ from drslamd.slam.se2 import Array
 ALIKE = 1.7
 """Ranges, one a second, whose squares say as much as one: squares of errors resemble those of their
 neighbours by the square of what the errors do (0.64 exp(-t / 2.5 s), see `RangeModel`)."""
-PRIOR_RANGES = 5 * ALIKE
-"""That say what is configured, which leaves that uncertain by a third."""
+PRIOR_RANGES = (5 - 2) * ALIKE
+"""That say what is configured, as five independent ones would, which leaves that uncertain by a
+third. Of a variance that n of them tell, the mean of what it may be is their squares over n - 2."""
 LEAST_FEARED = 0.1
 """Of the variance of odometry that is configured: so much is feared however well it fits."""
 LEAST_SHARE = 0.2
@@ -43,10 +47,18 @@ class SeenNoise(NamedTuple):
     Attributes:
         scatter: (pairs,) sigma of ranges over the configured one.
         feared: (robots,) variance of odometry over the configured one.
+        own_bias: sigma of what the biases of pairs have of their own, m.
     """
 
     scatter: Array
     feared: Array
+    own_bias: float
+
+    def of_biases(self, problem: Problem) -> Problem:
+        """The problem with biases as far as they are feared to differ."""
+        priors = problem.priors
+        bias = replace(priors.bias, own_sigma=self.own_bias)
+        return replace(problem, priors=replace(priors, bias=bias))
 
 
 def may_narrow(problem: Problem, poses: int) -> bool:
@@ -55,24 +67,27 @@ def may_narrow(problem: Problem, poses: int) -> bool:
 
 
 def seen_noise(
-    equations: Equations, point: Point, factor: Solver, ratio: Array
+    equations: Equations, point: Point, factor: Solver, ratio: Array, biases: Array
 ) -> SeenNoise | None:
     """None where the matrix gives no solution.
 
     Args:
         factor: see `expected_squares`.
         ratio: (robots,) s / g of odometry, see `misfit`.
+        biases: (pairs,) how wrong they may be, m.
     """
     expected = expected_squares(equations, point, factor)
     if expected is None:
         return None
-    variance = held_variances(squares_of_ranges(equations.problem, point), expected)
-    return SeenNoise(np.sqrt(variance), np.maximum(ratio, LEAST_FEARED))
+    problem, calibration = equations.problem, point.calibration
+    variance = held_variances(squares_of_ranges(problem, point), expected)
+    own = calibration.bias - calibration.team_bias[0]
+    own_bias = math.sqrt(problem.priors.bias.seen_variance(own, biases**2))
+    return SeenNoise(np.sqrt(variance), np.maximum(ratio, LEAST_FEARED), own_bias)
 
 
 def held_variances(squares: Array, expected: Array) -> Array:
-    """(pairs,) variances of ranges over the configured one, and one sigma more of what is uncertain
-    of that: nothing is narrowed on the word of a few ranges.
+    """(pairs,) variances of ranges over the configured one: the mean of what they may be.
 
     Args:
         squares: (pairs,) of what is left of ranges, by their weights.
@@ -80,9 +95,7 @@ def held_variances(squares: Array, expected: Array) -> Array:
     """
     rest, expected_rest = squares.sum() - squares, expected.sum() - expected
     others = (PRIOR_RANGES + rest) / (PRIOR_RANGES + expected_rest)
-    likeliest = (PRIOR_RANGES * others + squares) / (PRIOR_RANGES + expected)
-    unsure = np.sqrt(2 * ALIKE / (PRIOR_RANGES + expected.sum()))
-    return np.asarray((1 + unsure) * likeliest)
+    return np.asarray((PRIOR_RANGES * others + squares) / (PRIOR_RANGES + expected))
 
 
 def shares(poses: Array, claimed: Array, seen: Array) -> Array:

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from slam_problems import team_problem
+from scipy.stats import invgamma
+from slam_problems import BIAS, team_problem
 from slam_scenes import Array
 
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
@@ -24,38 +25,33 @@ from drslamd.slam.optimizer.banded.pairs.narrowing import (
     seen_noise,
     shares,
 )
+from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.problem import Freed
 from drslamd.slam.optimizer.sensor_priors import Calibration
 
-FIVE = 8.5
-"""Ranges, one a second, whose squares say as much as five independent ones: 1.7 each."""
+THREE = 5.1
+"""Ranges, one a second, whose squares say as much as three independent ones: 1.7 each."""
 
 
 def test_a_pair_is_held_at_the_others_and_those_at_what_is_configured() -> None:
     squares, expected = np.array([10.0, 50.0]), np.array([40.0, 100.0])
-    unsure = 1 + math.sqrt(3.4 / (FIVE + 140))
-    others = (FIVE + 50) / (FIVE + 100), (FIVE + 10) / (FIVE + 40)
+    others = (THREE + 50) / (THREE + 100), (THREE + 10) / (THREE + 40)
     right = [
-        unsure * (FIVE * other + s) / (FIVE + e)
+        (THREE * other + s) / (THREE + e)
         for other, s, e in zip(others, squares, expected, strict=True)
     ]
     assert held_variances(squares, expected) == pytest.approx(right)
 
 
-@pytest.mark.parametrize(
-    ("ranges", "least", "most"), [(0, 1.6, 1.7), (30, 0.5, 0.6), (900, 0.25, 0.3)]
-)
-def test_nothing_is_narrowed_on_the_word_of_a_few_ranges(
-    ranges: int, least: float, most: float
-) -> None:
-    """Of one pair, whose ranges have a quarter of the variance that is configured."""
-    (found,) = held_variances(np.array([ranges / 4]), np.array([float(ranges)]))
-    assert least < found < most
-
-
-def test_a_pair_alone_counts_its_ranges_once() -> None:
-    (found,) = held_variances(np.array([0.0]), np.array([FIVE]))
-    assert found == pytest.approx((1 + math.sqrt(3.4 / (2 * FIVE))) / 2)
+@pytest.mark.parametrize("ranges", [0, 17, 340])
+def test_the_variance_of_a_pair_is_the_mean_of_what_it_may_be(ranges: int) -> None:
+    """What is configured says as much as five independent ranges (chi-squared with five degrees of
+    freedom, and the configured variance for its mean)."""
+    squares = ranges / 4
+    freedom, sum_of = (5 + ranges / 1.7) / 2, (3 + squares / 1.7) / 2
+    (found,) = held_variances(np.array([squares]), np.array([float(ranges)]))
+    assert found == pytest.approx(invgamma(freedom, scale=sum_of).mean())
+    assert 0.25 < found <= 1.0
 
 
 def wide(seed: int, count: int) -> Array:
@@ -113,12 +109,18 @@ def test_ranges_and_odometry_that_are_better_than_configured_are_seen_to_be() ->
     point = descend(equations, Calibration.zero(problem.pairs, 3), 60)
     factor = BandFactor.of(equations.weighed(point))
     assert factor is not None
-    seen = seen_noise(equations, point, factor, np.array([0.02, 0.5, 1.7]))
+    ratio, biases = np.array([0.02, 0.5, 1.7]), np.array([0.1, 0.2, 0.3])
+    seen = seen_noise(equations, point, factor, ratio, biases)
     assert seen is not None
     # errors of this problem are white, of which more is left than of slow ones; a third as large
     # as sent, held at that
     assert ((seen.scatter > 0.4) & (seen.scatter < 0.8)).all()
     assert seen.feared.tolist() == [LEAST_FEARED, 0.5, 1.7]
+    # of Student's distribution with three degrees of freedom, 0.3 m wide, and three pairs
+    own = point.calibration.bias - point.calibration.team_bias
+    squares = 3 * 0.3**2 + float(own @ own) + 0.1**2 + 0.2**2 + 0.3**2
+    assert seen.own_bias == pytest.approx(math.sqrt(squares / 4))
+    assert seen.of_biases(problem).priors.bias == replace(BIAS, own_sigma=seen.own_bias)
 
 
 def told(range_error: float, robots: int = 3, count: int = 40, link_error: float = 1.0) -> Array:
@@ -134,6 +136,15 @@ def test_pairs_are_narrowed_where_sensors_are_better_and_not_where_they_are_as_c
     pairs = np.triu_indices(3, 1)
     assert (better[pairs] < 0.82).all()
     assert (usual[pairs] > 0.85).all()
+
+
+def test_pairs_are_narrower_where_biases_of_a_team_are_alike(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    alike = told(0.01)
+    monkeypatch.setattr(BiasPrior, "seen_variance", lambda *_: math.inf)
+    pairs = np.triu_indices(3, 1)
+    assert (alike[pairs] < told(0.01)[pairs]).all()
 
 
 def test_a_model_that_is_not_one_of_what_was_measured_narrows_nobody() -> None:
