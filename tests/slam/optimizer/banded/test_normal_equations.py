@@ -261,7 +261,7 @@ def test_biases_are_claimed_to_be_as_much_alike_as_they_were_seen_to_be() -> Non
         system = equations.claimed(point_at(each, poses, calibration, threshold), claims)
         found.append(dense(system, equations.layout))
         assert close(found[-1], claimed_information(each, x, threshold, claims), 1e-5)
-    assert not close(*found, 1e-5)
+    assert not close(found[0], found[1], 1e-5)
 
 
 def test_what_the_factors_weigh_is_the_same_with_the_priors_of_the_estimate() -> None:
