@@ -29,9 +29,8 @@ from drslamd.slam.se2 import Array
 ALIKE = 1.7
 """Ranges, one a second, whose squares say as much as one: squares of errors resemble those of their
 neighbours by the square of what the errors do (0.64 exp(-t / 2.5 s), see `RangeModel`)."""
-PRIOR_RANGES = (5 - 2) * ALIKE
-"""That say what is configured, as five independent ones would, which leaves that uncertain by a
-third. Of a variance that n of them tell, the mean of what it may be is their squares over n - 2."""
+PRIOR_RANGES = 5 * ALIKE
+"""That say what is configured, which leaves that uncertain by a third."""
 LEAST_FEARED = 0.1
 """Of the variance of odometry that is configured: so much is feared however well it fits."""
 LEAST_SHARE = 0.2
@@ -87,7 +86,8 @@ def seen_noise(
 
 
 def held_variances(squares: Array, expected: Array) -> Array:
-    """(pairs,) variances of ranges over the configured one: the mean of what they may be.
+    """(pairs,) variances of ranges over the configured one, and one sigma more of what is uncertain
+    of that: nothing is narrowed on the word of a few ranges.
 
     Args:
         squares: (pairs,) of what is left of ranges, by their weights.
@@ -95,7 +95,9 @@ def held_variances(squares: Array, expected: Array) -> Array:
     """
     rest, expected_rest = squares.sum() - squares, expected.sum() - expected
     others = (PRIOR_RANGES + rest) / (PRIOR_RANGES + expected_rest)
-    return np.asarray((PRIOR_RANGES * others + squares) / (PRIOR_RANGES + expected))
+    likeliest = (PRIOR_RANGES * others + squares) / (PRIOR_RANGES + expected)
+    unsure = np.sqrt(2 * ALIKE / (PRIOR_RANGES + expected.sum()))
+    return np.asarray((1 + unsure) * likeliest)
 
 
 def shares(poses: Array, claimed: Array, seen: Array) -> Array:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import invgamma
 from slam_problems import BIAS, team_problem
 from slam_scenes import Array
 
@@ -29,29 +28,35 @@ from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.problem import Freed
 from drslamd.slam.optimizer.sensor_priors import Calibration
 
-THREE = 5.1
-"""Ranges, one a second, whose squares say as much as three independent ones: 1.7 each."""
+FIVE = 8.5
+"""Ranges, one a second, whose squares say as much as five independent ones: 1.7 each."""
 
 
 def test_a_pair_is_held_at_the_others_and_those_at_what_is_configured() -> None:
     squares, expected = np.array([10.0, 50.0]), np.array([40.0, 100.0])
-    others = (THREE + 50) / (THREE + 100), (THREE + 10) / (THREE + 40)
+    unsure = 1 + math.sqrt(3.4 / (FIVE + 140))
+    others = (FIVE + 50) / (FIVE + 100), (FIVE + 10) / (FIVE + 40)
     right = [
-        (THREE * other + s) / (THREE + e)
+        unsure * (FIVE * other + s) / (FIVE + e)
         for other, s, e in zip(others, squares, expected, strict=True)
     ]
     assert held_variances(squares, expected) == pytest.approx(right)
 
 
-@pytest.mark.parametrize("ranges", [0, 17, 340])
-def test_the_variance_of_a_pair_is_the_mean_of_what_it_may_be(ranges: int) -> None:
-    """What is configured says as much as five independent ranges (chi-squared with five degrees of
-    freedom, and the configured variance for its mean)."""
-    squares = ranges / 4
-    freedom, sum_of = (5 + ranges / 1.7) / 2, (3 + squares / 1.7) / 2
-    (found,) = held_variances(np.array([squares]), np.array([float(ranges)]))
-    assert found == pytest.approx(invgamma(freedom, scale=sum_of).mean())
-    assert 0.25 < found <= 1.0
+@pytest.mark.parametrize(
+    ("ranges", "least", "most"), [(0, 1.6, 1.7), (30, 0.5, 0.6), (900, 0.25, 0.3)]
+)
+def test_nothing_is_narrowed_on_the_word_of_a_few_ranges(
+    ranges: int, least: float, most: float
+) -> None:
+    """Of one pair, whose ranges have a quarter of the variance that is configured."""
+    (found,) = held_variances(np.array([ranges / 4]), np.array([float(ranges)]))
+    assert least < found < most
+
+
+def test_a_pair_alone_counts_its_ranges_once() -> None:
+    (found,) = held_variances(np.array([0.0]), np.array([FIVE]))
+    assert found == pytest.approx((1 + math.sqrt(3.4 / (2 * FIVE))) / 2)
 
 
 def wide(seed: int, count: int) -> Array:
