@@ -235,11 +235,15 @@ def range_weights(problem: Problem, x: Array, threshold: Array) -> Array:
 
 def claimed_information(problem: Problem, x: Array, threshold: Array, claims: Array) -> Array:
     """Ranges so many times less certain, and every prior as wide as configured; but those of
-    mountings are as they are believed, and a yaw rate is as uncertain as it is far off."""
+    mountings are as they are believed, a yaw rate is as uncertain as it is far off, and biases may
+    be held beside what they have in common."""
     weights = range_weights(problem, x, threshold) / claims[problem.ranges.pair] ** 2
     information = information_of(problem, x, weights) + mounting_curvature(problem, x)
     biases, scales = bias_places(problem), scale_places(problem)
     information[biases, biases] += problem.priors.bias.sigma**-2
+    apart = np.column_stack([np.eye(problem.pairs), -np.ones(problem.pairs)])
+    alike = apart.T @ apart / problem.priors.bias.own_sigma**2
+    information[np.ix_(biases, biases)] += alike
     information[scales, scales] += problem.priors.scale**-2.0
     yaws = yaw_places(problem)
     information[yaws, yaws] += yaw_weights(problem, x)

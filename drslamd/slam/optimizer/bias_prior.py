@@ -21,6 +21,7 @@ these distributions (`sigmas`), and not on the curvatures of their costs.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -52,12 +53,15 @@ class BiasPrior:
         spread: half width of what pairs have of their own, m.
         dof: degrees of freedom of its distribution.
         team: half width of what all pairs have in common, m.
+        own_sigma: of what pairs have of their own, m, where claims rest on what was seen of it;
+            beside it `sigma` holds as ever. Infinite where they do not.
     """
 
     sigma: float
     spread: float
     dof: float
     team: float
+    own_sigma: float = math.inf
 
     @staticmethod
     def of(sigma: float, model: RangeModel) -> BiasPrior:
@@ -116,23 +120,30 @@ class BiasPrior:
         """What a pair may have of its own, m^2, where nothing was measured of it.
 
         Student's distribution is Gauss's with a variance that is unknown, of 1 / chi-squared. What
-        the pairs that were measured have of their own tells of it, and those that were not tell
-        nothing; it is the mean of
-
-            (dof spread^2 + sum (own^2 + variance of own)) / (dof + pairs - 2).
+        the pairs that were measured have of their own tells of it (`seen_variance`), and those that
+        were not tell nothing.
 
         Args:
             own: (pairs,) m; told: (pairs,) the information with which it was measured, 1/m^2.
         """
-        least, count = self.dof * self.spread**2, self.dof + len(own) - 2
-        variance = least / (self.dof - 2)
+        variance = self.dof * self.spread**2 / (self.dof - 2)
         for _ in range(ROUNDS):
             before = variance
-            left = 1 / (told + 1 / before)
-            variance = (least + float(np.sum(own**2 + left))) / count
+            variance = self.seen_variance(own, 1 / (told + 1 / before))
             if abs(variance - before) < SAME * before:
                 break
         return variance
+
+    def seen_variance(self, own: Array, left: Array) -> float:
+        """The mean of the variances that may be, m^2:
+
+            (dof spread^2 + sum (own^2 + variance of own)) / (dof + pairs - 2).
+
+        Args:
+            own, left: (pairs,) what was seen of them, m, and the variance of that, m^2.
+        """
+        squares = self.dof * self.spread**2 + float(np.sum(own**2 + left))
+        return squares / (self.dof + len(own) - 2)
 
     @property
     def team_variance(self) -> float:

@@ -80,7 +80,7 @@ def solve(
         converged=nominal.converged or problem.is_blocked,
         scatter=scatter,
         joint=joint,
-        shares=_shares(explained, joint, wanted, known),
+        shares=_shares(explained, joint, biases, wanted, known),
         spread=spread,
         bias_sigmas=biases,
         odometry_level=level,
@@ -96,19 +96,27 @@ def solve(
 
 
 def _shares(
-    explained: Explanation, joint: Array, wanted: Index, known: Array | None = None
+    explained: Explanation,
+    joint: Array,
+    biases: Array,
+    wanted: Index,
+    known: Array | None = None,
 ) -> Array:
-    """See `Solution.shares`: where all is as modelled."""
+    """See `Solution.shares`: where all is as modelled.
+
+    Args:
+        biases: (pairs,) how wrong they may be, m.
+    """
     equations, point, ratio = explained.equations, explained.point, explained.ratio
     if ratio is None or not narrowing.may_narrow(equations.problem, len(wanted)):
         return np.ones((0, 0))
     if known is not None:
         return known
     factor = BandFactor.of(equations.weighed(point))
-    seen = factor and narrowing.seen_noise(equations, point, factor, ratio)
+    seen = factor and narrowing.seen_noise(equations, point, factor, ratio, biases)
     if not seen:
         return np.ones((0, 0))
-    problem = equations.problem
+    problem = seen.of_biases(equations.problem)
     feared = raised(problem, seen.feared[problem.odometry.robot], point)
     narrow = claims.covariances(Equations(feared, like=equations), point, seen.scatter, wanted)[0]
     return narrowing.shares(point.poses[wanted], joint, narrow)

@@ -132,6 +132,8 @@ class Equations:
         layout, priors = self.layout, self.problem.priors
         system.add_prior(layout.bias, priors.bias.sigma**-2)
         system.add_prior(layout.team_bias, priors.bias.sigma**-2)
+        alike = priors.bias.own_sigma**-2 * np.eye(len(layout.bias))
+        system.add_difference(layout.bias, layout.team_bias, alike)
         system.add_prior(layout.scale, priors.scale**-2.0)
         system.add_prior(layout.yaw, priors.yaw_claim(calibration.yaw))
         self._add_mounting_priors(system, calibration, LEAST_CURVATURE)

@@ -188,7 +188,8 @@ def _solved(
     if joint is None or spread is None or downwards is None or held is None:
         return None
     since = kept.sure if kept and known else sure
-    shares = _shares(team, last, kept, JustSolved(equations, point, current, ratio, joint))
+    solved = JustSolved(equations, point, current, ratio, joint, spread[1])
+    shares = _shares(team, last, kept, solved)
     after = Kept(downwards, held, since, variances, checked, shares)
     said = _said(equations, point, scatter, sure.feared, joint, *spread)
     return replace(said, shares=shares.left), after
@@ -200,6 +201,7 @@ class JustSolved(NamedTuple):
     Attributes:
         matrix: that led there; ratio: (robots,) s / g of odometry.
         joint: (3 k, 3 k) covariance of the poses that are wanted, as it is claimed.
+        biases: (pairs,) how wrong they may be, m.
     """
 
     equations: Equations
@@ -207,6 +209,7 @@ class JustSolved(NamedTuple):
     matrix: Current
     ratio: Array
     joint: Array
+    biases: Array
 
 
 def _shares(
@@ -219,10 +222,11 @@ def _shares(
         return kept.shares
     if not narrowing.may_narrow(problem, len(last)):
         return nothing
-    noise = narrowing.seen_noise(seen.equations, point, seen.matrix, seen.ratio)
+    noise = narrowing.seen_noise(seen.equations, point, seen.matrix, seen.ratio, seen.biases)
     if noise is None:
         return nothing
-    believed = Sureness.of(team, noise.scatter, noise.feared).believed(problem, point)
+    sure = Sureness.of(team, noise.scatter, noise.feared)
+    believed = sure.believed(noise.of_biases(problem), point)
     claimed = _matrix(None, believed, team.pairs, with_blocks=False)
     wanted = np.array(last, dtype=int)
     joint = None if claimed is None else kept_claims.kept_covariance(claimed, wanted)

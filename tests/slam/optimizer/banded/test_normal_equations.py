@@ -248,6 +248,22 @@ def test_what_is_claimed_are_dense_ranges_made_wider_and_priors_as_configured(ki
     assert close(dense(system, equations.layout), expected, 1e-5)
 
 
+def test_biases_are_claimed_to_be_as_much_alike_as_they_were_seen_to_be() -> None:
+    problem = small(3)
+    poses, calibration = somewhere(problem, 5)
+    threshold, claims = THRESHOLD[:3], np.ones(3)
+    bias = replace(problem.priors.bias, own_sigma=0.05)
+    seen = replace(problem, priors=replace(problem.priors, bias=bias))
+    found = []
+    for each in (problem, seen):
+        x = packed(poses, calibration, each.doubted)
+        equations = Equations(each)
+        system = equations.claimed(point_at(each, poses, calibration, threshold), claims)
+        found.append(dense(system, equations.layout))
+        assert close(found[-1], claimed_information(each, x, threshold, claims), 1e-5)
+    assert not close(found[0], found[1], 1e-5)
+
+
 def test_what_the_factors_weigh_is_the_same_with_the_priors_of_the_estimate() -> None:
     problem = small(3)
     poses, calibration = somewhere(problem, 5, 0.3)

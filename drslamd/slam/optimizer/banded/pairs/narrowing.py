@@ -2,14 +2,17 @@
 
 The noise of a pair's ranges is held at that of the others, and that at what is configured, so much
 as a handful of independent ranges would say; likewise the odometry of each robot (`misfit.DOUBT`).
-With that noise the same system is taken apart once more, and each pair gets one factor, by which
-its covariance is smaller in the mean of all directions. It is never above 1: what is wrong beyond
-what is configured is for the covariances of all. Constants of sensors are feared as configured,
-since few ranges tell of them.
+Biases are feared to differ from each other as those of the team were seen to, and to be off alike
+as configured; so are scales, since few ranges tell of them. With that noise the same system is
+taken apart once more, and each pair gets one factor, by which its covariance is smaller in the mean
+of all directions. It is never above 1: what is wrong beyond what is configured is for the
+covariances of all.
 """
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -43,10 +46,18 @@ class SeenNoise(NamedTuple):
     Attributes:
         scatter: (pairs,) sigma of ranges over the configured one.
         feared: (robots,) variance of odometry over the configured one.
+        own_bias: sigma of what the biases of pairs have of their own, m.
     """
 
     scatter: Array
     feared: Array
+    own_bias: float
+
+    def of_biases(self, problem: Problem) -> Problem:
+        """The problem with biases as far as they are feared to differ."""
+        priors = problem.priors
+        bias = replace(priors.bias, own_sigma=self.own_bias)
+        return replace(problem, priors=replace(priors, bias=bias))
 
 
 def may_narrow(problem: Problem, poses: int) -> bool:
@@ -55,19 +66,23 @@ def may_narrow(problem: Problem, poses: int) -> bool:
 
 
 def seen_noise(
-    equations: Equations, point: Point, factor: Solver, ratio: Array
+    equations: Equations, point: Point, factor: Solver, ratio: Array, biases: Array
 ) -> SeenNoise | None:
     """None where the matrix gives no solution.
 
     Args:
         factor: see `expected_squares`.
         ratio: (robots,) s / g of odometry, see `misfit`.
+        biases: (pairs,) how wrong they may be, m.
     """
     expected = expected_squares(equations, point, factor)
     if expected is None:
         return None
-    variance = held_variances(squares_of_ranges(equations.problem, point), expected)
-    return SeenNoise(np.sqrt(variance), np.maximum(ratio, LEAST_FEARED))
+    problem, calibration = equations.problem, point.calibration
+    variance = held_variances(squares_of_ranges(problem, point), expected)
+    own = calibration.bias - calibration.team_bias[0]
+    own_bias = math.sqrt(problem.priors.bias.seen_variance(own, biases**2))
+    return SeenNoise(np.sqrt(variance), np.maximum(ratio, LEAST_FEARED), own_bias)
 
 
 def held_variances(squares: Array, expected: Array) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from slam_problems import team_problem
+from slam_problems import BIAS, team_problem
 from slam_scenes import Array
 
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
@@ -24,6 +24,7 @@ from drslamd.slam.optimizer.banded.pairs.narrowing import (
     seen_noise,
     shares,
 )
+from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.problem import Freed
 from drslamd.slam.optimizer.sensor_priors import Calibration
 
@@ -113,12 +114,18 @@ def test_ranges_and_odometry_that_are_better_than_configured_are_seen_to_be() ->
     point = descend(equations, Calibration.zero(problem.pairs, 3), 60)
     factor = BandFactor.of(equations.weighed(point))
     assert factor is not None
-    seen = seen_noise(equations, point, factor, np.array([0.02, 0.5, 1.7]))
+    ratio, biases = np.array([0.02, 0.5, 1.7]), np.array([0.1, 0.2, 0.3])
+    seen = seen_noise(equations, point, factor, ratio, biases)
     assert seen is not None
     # errors of this problem are white, of which more is left than of slow ones; a third as large
     # as sent, held at that
     assert ((seen.scatter > 0.4) & (seen.scatter < 0.8)).all()
     assert seen.feared.tolist() == [LEAST_FEARED, 0.5, 1.7]
+    # of Student's distribution with three degrees of freedom, 0.3 m wide, and three pairs
+    own = point.calibration.bias - point.calibration.team_bias
+    squares = 3 * 0.3**2 + float(own @ own) + 0.1**2 + 0.2**2 + 0.3**2
+    assert seen.own_bias == pytest.approx(math.sqrt(squares / 4))
+    assert seen.of_biases(problem).priors.bias == replace(BIAS, own_sigma=seen.own_bias)
 
 
 def told(range_error: float, robots: int = 3, count: int = 40, link_error: float = 1.0) -> Array:
@@ -134,6 +141,15 @@ def test_pairs_are_narrowed_where_sensors_are_better_and_not_where_they_are_as_c
     pairs = np.triu_indices(3, 1)
     assert (better[pairs] < 0.82).all()
     assert (usual[pairs] > 0.85).all()
+
+
+def test_pairs_are_narrower_where_biases_of_a_team_are_alike(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    alike = told(0.01)
+    monkeypatch.setattr(BiasPrior, "seen_variance", lambda *_: math.inf)
+    pairs = np.triu_indices(3, 1)
+    assert (alike[pairs] < told(0.01)[pairs]).all()
 
 
 def test_a_model_that_is_not_one_of_what_was_measured_narrows_nobody() -> None:
