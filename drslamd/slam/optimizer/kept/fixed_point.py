@@ -5,7 +5,8 @@ of the last steps makes that faster: the combination of them whose next step wou
 measured by M (Walker and Ni, SIAM J. Numer. Anal. 49, 2011). Since M F = -g, products by M cost
 nothing: (F_i, F_j)_M = -F_i' g_j.
 
-The end is where the gradient is zero, whatever M is.
+The end is where the gradient is zero, whatever M is. x are steps of a `TurningChart`, where M stays
+right when the team turns.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from drslamd.slam import headway
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.banded.turning.chart import AROUND, TurningChart
 from drslamd.slam.optimizer.kept.exact_gradient import exact_gradient
 from drslamd.slam.optimizer.kept.kept_factor import Current
 from drslamd.slam.se2 import Array
@@ -39,13 +41,15 @@ def approach(
         tolerance: m and rad of the last step, see `newton_descent.TOLERANCE`.
     """
     problem, layout = equations.problem, equations.layout
-    point, at = start, layout.vector(start.poses, start.calibration)
+    chart = TurningChart(start.poses, problem.gauge, AROUND * len(problem.priors.scale))
+    point, at = start, layout.vector(np.zeros_like(start.poses), start.calibration)
     places: list[Array] = []
     steps: list[Array] = []
     gradients: list[Array] = []
     for count in range(most):
         headway.mark()
         gradient = exact_gradient(equations, point)
+        gradient[layout.poses] = chart.pulled(gradient[layout.poses], at[layout.poses])
         step = matrix.solved(-gradient)
         size = float(np.abs(step[layout.poses]).max())
         if not size < FARTHEST:
@@ -55,8 +59,8 @@ def approach(
             for kept, new in ((places, at), (steps, step), (gradients, gradient))
         )
         at = at + step if size < tolerance else _mixed(places, steps, gradients)
-        calibration = layout.calibration(at)
-        point = Point.of(problem, at[layout.poses], calibration, steps=count + 1)
+        poses, calibration = chart.poses(at[layout.poses]), layout.calibration(at)
+        point = Point.of(problem, poses, calibration, steps=count + 1)
         if size < tolerance:
             is_lower = equations.cost(point, start.threshold) <= equations.cost(
                 start, start.threshold
