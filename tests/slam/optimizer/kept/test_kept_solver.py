@@ -210,4 +210,3 @@ def test_a_team_that_turns_is_not_solved_from_what_is_kept(
     _, after = kept_solver.solve(team, last, 1e-6, kept)
     assert len(tried) == (0 if is_turning else 1)
     assert isinstance(after, kept_solver.KeptShares)
-    assert not after.is_turning
