@@ -37,6 +37,12 @@ class System:
         wide = entries[of_band:].reshape(b, n + b).T
         return System(entries[:of_band].reshape(n, layout.width).T, wide[:n], wide[n:])
 
+    def add(self, other: System) -> None:
+        """Add another one of the same layout."""
+        self.band += other.band
+        self.border += other.border
+        self.corner += other.corner
+
     def add_prior(self, unknowns: Index, stiffness: Array | float) -> None:
         """Add independent priors by the information with which they hold unknowns (k,)."""
         n = len(self.border)

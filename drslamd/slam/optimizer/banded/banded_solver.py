@@ -50,8 +50,7 @@ def solve(
         problem: one connected group.
         start: calibration to start from (zero when left out).
         marginals: poses whose joint covariance is wanted.
-        most: bound on steps.
-        tolerance: see `newton_descent.TOLERANCE`.
+        most: bound on steps; tolerance: see `newton_descent.TOLERANCE`.
         known: `Solution.shares` that hold still.
     """
     equations, before = Equations(problem), len(problem.freed)
@@ -92,6 +91,7 @@ def solve(
         blocked=blocked(problem, point),
         doubted=claims.still_doubted(problem.doubted, point.calibration, spread),
         freed=freed,
+        is_turning=nominal.is_turning,
     )
 
 

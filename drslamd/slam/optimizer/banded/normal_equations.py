@@ -11,6 +11,7 @@ from drslamd.slam.optimizer.banded.assembly import Assembly, System
 from drslamd.slam.optimizer.banded.layout import BandLayout
 from drslamd.slam.optimizer.banded.linearised import Linearised
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.banded.turning import curvature
 from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
 from drslamd.slam.optimizer.factor_errors import pose_errors
 from drslamd.slam.optimizer.mounting_prior import ANTENNA, TRACK
@@ -52,6 +53,14 @@ class Equations:
             return Assembly(layout, [*sets, layout.range_unknowns(ranges)])
         plain = layout.range_unknowns(ranges.chosen(~ranges.is_carried))
         return Assembly(layout, [*sets, plain, layout.carried_unknowns(ranges)])
+
+    @cached_property
+    def _turning(self) -> Assembly:
+        """Of ways from each pose to the next in time."""
+        if self._like:
+            return self._like._turning
+        poses = self.layout.poses
+        return Assembly(self.layout, [np.hstack([poses[:-1], poses[1:]])])
 
     @property
     def _has_antennas(self) -> bool:
@@ -112,6 +121,15 @@ class Equations:
         self.add_gaussian_priors(system)
         self.add_pull_of_priors(gradient, point)
         return system, gradient
+
+    def add_curvature(self, system: System, point: Point, gradient: Array) -> None:
+        """Add to what `at` says what makes it the second derivative, if heavy tails are `WHOLE`, in
+        the coordinates of a `TurningChart` with nobody around."""
+        parts = curvature.of_factors(self.problem, point, self._has_antennas)
+        system.add(self._assembly.matrix(parts))
+        pulls = gradient[self.layout.poses]
+        turning = curvature.of_turning(point.poses, pulls, self.problem.gauge)
+        system.add(self._turning.matrix([turning]))
 
     def claimed(self, point: Point, claims: Array) -> System:
         """What is known at the solution: a system whose inverse is the covariance to be claimed.

@@ -5,7 +5,8 @@ of the last steps makes that faster: the combination of them whose next step wou
 measured by M (Walker and Ni, SIAM J. Numer. Anal. 49, 2011). Since M F = -g, products by M cost
 nothing: (F_i, F_j)_M = -F_i' g_j.
 
-The end is where the gradient is zero, whatever M is.
+The end is where the gradient is zero, whatever M is. Where the team turns, x are steps of a
+`TurningChart`, in which M stays right.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ from dataclasses import replace
 import numpy as np
 
 from drslamd.slam import headway
+from drslamd.slam.optimizer.banded.newton_descent import TURNS
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.banded.turning.chart import AROUND, TurningChart
 from drslamd.slam.optimizer.kept.exact_gradient import exact_gradient
 from drslamd.slam.optimizer.kept.kept_factor import Current
 from drslamd.slam.se2 import Array
@@ -39,24 +42,31 @@ def approach(
         tolerance: m and rad of the last step, see `newton_descent.TOLERANCE`.
     """
     problem, layout = equations.problem, equations.layout
-    point, at = start, layout.vector(start.poses, start.calibration)
+    chart = TurningChart(start.poses, problem.gauge, AROUND * len(problem.priors.scale))
+    is_turning = False
+    point, at = start, layout.vector(np.zeros_like(start.poses), start.calibration)
     places: list[Array] = []
     steps: list[Array] = []
     gradients: list[Array] = []
     for count in range(most):
         headway.mark()
         gradient = exact_gradient(equations, point)
+        if is_turning:
+            gradient[layout.poses] = chart.pulled(gradient[layout.poses], at[layout.poses])
         step = matrix.solved(-gradient)
         size = float(np.abs(step[layout.poses]).max())
         if not size < FARTHEST:
             return None
+        if not count:
+            is_turning = size > TURNS * chart.own_size(step[layout.poses])
         places, steps, gradients = (
             [*kept[-DEPTH:], new]
             for kept, new in ((places, at), (steps, step), (gradients, gradient))
         )
         at = at + step if size < tolerance else _mixed(places, steps, gradients)
-        calibration = layout.calibration(at)
-        point = Point.of(problem, at[layout.poses], calibration, steps=count + 1)
+        moved, calibration = at[layout.poses], layout.calibration(at)
+        poses = chart.poses(moved) if is_turning else start.poses + moved
+        point = Point.of(problem, poses, calibration, steps=count + 1)
         if size < tolerance:
             is_lower = equations.cost(point, start.threshold) <= equations.cost(
                 start, start.threshold

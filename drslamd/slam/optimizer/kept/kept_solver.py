@@ -90,11 +90,14 @@ class KeptShares:
     Attributes:
         robots: of whose last poses; links: of odometry, so many.
         left: (k, k), or of none.
+        is_turning: did the team turn as a whole of late? A kept factor is one of how it stood, so
+            it is solved anew until it does not.
     """
 
     robots: tuple[int, ...]
     links: int
     left: Array
+    is_turning: bool = False
 
     @staticmethod
     def of(team: TeamProblem, last: tuple[int, ...], left: Array) -> KeptShares:
@@ -137,7 +140,8 @@ def solve(
         tolerance: see `newton_descent.TOLERANCE`.
         kept: what came of the solution before.
     """
-    if team.is_near and len(team.problem.n) >= FEW:
+    is_turning = isinstance(kept, KeptShares) and kept.is_turning
+    if team.is_near and len(team.problem.n) >= FEW and not is_turning:
         for before in (kept, None) if isinstance(kept, Kept) else (None,):
             found = _solved(team, last, tolerance, before)
             if found is not None:
@@ -146,7 +150,8 @@ def solve(
     known = shares if isinstance(shares, KeptShares) and shares.hold(_none(team, last)) else None
     left = known.left if known else None
     solution = banded_solver.solve(team.problem, team.start, last, tolerance=tolerance, known=left)
-    return solution, known or KeptShares.of(team, last, solution.shares)
+    after = known or KeptShares.of(team, last, solution.shares)
+    return solution, replace(after, is_turning=solution.is_turning)
 
 
 def _none(team: TeamProblem, last: tuple[int, ...]) -> KeptShares:

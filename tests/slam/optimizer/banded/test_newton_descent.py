@@ -139,6 +139,45 @@ def test_who_is_not_as_near_as_was_thought_goes_as_from_anywhere() -> None:
     assert np.array_equal(found.poses, cautious.poses)
 
 
+def hardly_held() -> Problem:
+    """Three robots of whose first two seconds little is known, and how far they turned there."""
+    problem, _ = team_problem(3, robots=3, count=60, closures=0)
+    links, ranges = problem.odometry, problem.ranges
+    covariance = links.covariance.copy()
+    covariance[links.i < 6] = 100 * np.eye(3)
+    later = ranges.chosen((ranges.i >= 9) & (ranges.j >= 9))
+    return replace(problem, odometry=replace(links, covariance=covariance), ranges=later)
+
+
+def turned(poses: Array, angle: float) -> Array:
+    """All but the first three seconds about the first pose."""
+    out: Array = poses.copy()
+    later = slice(9, None)
+    places = (poses[later, :2] - poses[0, :2]) @ [1, 1j] * np.exp(1j * angle)
+    out[later, :2] = np.column_stack([places.real, places.imag]) + poses[0, :2]
+    out[later, 2] += angle
+    return out
+
+
+@pytest.mark.parametrize("angle", [0.03, 0.3])
+def test_a_team_that_is_hardly_held_turns_to_its_place_in_some_steps(angle: float) -> None:
+    """Straight steps do not get there within hundreds."""
+    problem = hardly_held()
+    right = from_start(problem)
+    away = replace(problem, initial=turned(right.poses, angle), gauge=0)
+    assert np.abs(away.initial - right.poses).max() > 10 * angle
+    found = descend(Equations(away), right.calibration, 30, is_near=True)
+    assert right.converged
+    assert found.converged
+    assert found.is_turning
+    assert np.abs(found.poses - right.poses).max() < 1e-6
+
+
+def test_who_knows_where_the_team_is_turned_to_does_not_call_it_turning() -> None:
+    problem, known, _ = driven_on(0.01)
+    assert not descend(Equations(problem), known, MOST, is_near=True).is_turning
+
+
 @pytest.mark.parametrize("fault", ["no factor", "no better"])
 def test_a_first_step_in_vain_is_made_anew_with_the_usual_damping(
     fault: str, monkeypatch: pytest.MonkeyPatch

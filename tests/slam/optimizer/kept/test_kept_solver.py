@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
+from kept_scenes import a_team_problem
 from lab.benchmark.met_team import MetTeam, begun
 
 from drslamd.conventions import Chain
@@ -194,3 +195,18 @@ def test_shares_are_not_found_each_second(few: int, monkeypatch: pytest.MonkeyPa
         monkeypatch.setattr(narrowing, "seen_noise", counted)
     # (the first second has nothing kept; the fourth is 7 % further than the first)
     assert len(times) <= 1
+
+
+@pytest.mark.parametrize("is_turning", [False, True])
+def test_a_team_that_turns_is_not_solved_from_what_is_kept(
+    is_turning: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A matrix is one of how the team stood."""
+    tried = []
+    monkeypatch.setattr(kept_solver, "_solved", lambda *args: tried.append(args))
+    team = replace(a_team_problem(), is_near=True)
+    last = tuple(int(np.flatnonzero(team.problem.robot == robot)[-1]) for robot in range(3))
+    kept = replace(kept_solver.KeptShares.of(team, last, np.ones((0, 0))), is_turning=is_turning)
+    _, after = kept_solver.solve(team, last, 1e-6, kept)
+    assert len(tried) == (0 if is_turning else 1)
+    assert isinstance(after, kept_solver.KeptShares)
