@@ -36,8 +36,11 @@ def turned(packed: Iterable[Any], cos: float, sin: float) -> Packed:
 
 
 def added_up(a: Iterable[Any], b: Iterable[Any]) -> Packed:
-    return tuple(x + y for x, y in zip(a, b, strict=True))
+    a_xx, a_xy, a_xt, a_yy, a_yt, a_tt = a
+    xx, xy, xt, yy, yt, tt = b
+    return a_xx + xx, a_xy + xy, a_xt + xt, a_yy + yy, a_yt + yt, a_tt + tt
 
 
 def times(factor: float, packed: Iterable[Any]) -> Packed:
-    return tuple(factor * value for value in packed)
+    xx, xy, xt, yy, yt, tt = packed
+    return factor * xx, factor * xy, factor * xt, factor * yy, factor * yt, factor * tt

@@ -61,15 +61,19 @@ class Relatives:
         if len(self.poses) <= FEW:
             return self._few_seen_from(pose, added)
         x, y, theta = pose
-        dx, dy = self.poses[:, 0] - x, self.poses[:, 1] - y
         cos, sin = math.cos(theta), math.sin(theta)
-        seen = np.empty_like(self.poses)
+        away = self.poses - (x, y, theta)
+        seen = np.empty_like(away)
+        dx, dy, turn = away.T
         seen[:, 0], seen[:, 1] = cos * dx + sin * dy, cos * dy - sin * dx
-        seen[:, 2] = se2.wrap(self.poses[:, 2] - theta)
-        covariance = np.empty_like(self.known)
-        for row, here in enumerate(moved(added, dx, dy)):
-            covariance[row] = self.known[row] + here
-        return seen, np.array(turned(covariance, cos, sin))
+        seen[:, 2] = se2.wrap(turn)
+        # `moved` and `turned` are linear in covariances: each is one product for all peers
+        powers = np.empty((6, len(away)))
+        powers[0], powers[1], powers[2] = 1.0, dx, dy
+        np.multiply(powers[1:3], dx, out=powers[3:5])
+        np.multiply(dy, dy, out=powers[5])
+        here = self.known + np.array(_moves(added)) @ powers
+        return seen, np.array(_turns(cos, sin)) @ here
 
     def _few_seen_from(self, pose: Sequence[float], added: Packed) -> tuple[Array, Array]:
         """The same one by one, in plain numbers."""
@@ -83,6 +87,32 @@ class Relatives:
             covariances.append(turned(added_up(known, moved(added, dx, dy)), cos, sin))
         of_each: Array = np.array(covariances).reshape(-1, 6)
         return np.array(seen).reshape(-1, 3), np.ascontiguousarray(of_each.T)
+
+
+def _moves(packed: Packed) -> list[tuple[float, ...]]:
+    """(6, 6) `packed.moved` by d, as factors of 1, dx, dy, dx dx, dx dy, dy dy."""
+    xx, xy, xt, yy, yt, tt = packed
+    return [
+        (xx, 0.0, -2 * xt, 0.0, 0.0, tt),
+        (xy, xt, -yt, 0.0, -tt, 0.0),
+        (xt, 0.0, -tt, 0.0, 0.0, 0.0),
+        (yy, 2 * yt, 0.0, tt, 0.0, 0.0),
+        (yt, tt, 0.0, 0.0, 0.0, 0.0),
+        (tt, 0.0, 0.0, 0.0, 0.0, 0.0),
+    ]
+
+
+def _turns(cos: float, sin: float) -> list[tuple[float, ...]]:
+    """(6, 6) `packed.turned`, by which packed covariances are multiplied."""
+    cc, cs, ss = cos * cos, cos * sin, sin * sin
+    return [
+        (cc, 2 * cs, 0.0, ss, 0.0, 0.0),
+        (-cs, cc - ss, 0.0, cs, 0.0, 0.0),
+        (0.0, 0.0, cos, 0.0, sin, 0.0),
+        (ss, -2 * cs, 0.0, cc, 0.0, 0.0),
+        (0.0, 0.0, -sin, 0.0, cos, 0.0),
+        (0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
+    ]
 
 
 def _wrapped(angle: float) -> float:

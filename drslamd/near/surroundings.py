@@ -22,7 +22,7 @@ from drslamd.events import Send
 from drslamd.gossip.team import Team
 from drslamd.near.leg import Leg
 from drslamd.near.near_message import NO_WALL, Near, Wall, encode, is_near, near_channel
-from drslamd.near.packed import added_up, moved, times
+from drslamd.near.packed import Packed, added_up, moved, times
 from drslamd.near.peers_around import PeersAround
 from drslamd.sensors.samples import Motion
 from drslamd.slam import se2
@@ -82,6 +82,8 @@ class Surroundings:
         self._peers = PeersAround(own.robot, back, team)
         self._where, self._where_at = NOWHERE, 0
         self._resets, self._is_lost = 0, False
+        self._known: Packed | None = None
+        """Covariance of our pose in the solution."""
         self._boldness = 1.0
         """See `Revisions`; it moves with solutions."""
 
@@ -129,12 +131,12 @@ class Surroundings:
         self._renew(utime)
         odom, (speed, turn) = self._odom, self._speeds()
         estimate, leg, where = self._estimate, self._leg, self._where
-        known = estimate.covariance(self.own.robot) if estimate is not None else None
+        known = self._known
         if estimate is None or leg is None or known is None or where.pose is None:
             return Near(self.utime, odom, speed, turn, *wall, resets=self._resets)
         bold, gap = self._boldness, self._front.watch.gap_m**2
         added = added_up(times(bold, leg.added), (gap, 0.0, 0.0, gap, 0.0, 0.0))
-        covariance = added_up(times(bold, moved(se2.packed(known), *leg.lever)), added)
+        covariance = added_up(times(bold, moved(known, *leg.lever)), added)
         return Near(
             self.utime,
             odom,
@@ -170,6 +172,9 @@ class Surroundings:
             elif self._leg is not None:
                 self._is_lost = True
             self._estimate, self._leg = estimate, leg
+        if is_new:
+            known = estimate.covariance(self.own.robot) if estimate is not None else None
+            self._known = None if known is None else se2.packed(known)
         if is_new or utime - self._where_at >= SECOND_US:
             self._where, self._where_at = self._standing.whereabouts(utime), utime
         if estimate is not None and self._leg is not None:
@@ -180,12 +185,12 @@ class Surroundings:
         before, old = self._estimate, self._leg
         if before is None or old is None:
             return self._is_lost
-        known = before.covariance(self.own.robot)
+        known = self._known
         if before.frame != estimate.frame or known is None:
             return True
         apart = np.array(leg.end) - np.array(old.end)
         apart[2] = se2.wrap(apart[2])
-        carried = added_up(moved(se2.packed(known), *old.lever), old.added)
+        carried = added_up(moved(known, *old.lever), old.added)
         covariance = se2.unpacked(carried) + RESOLUTION**2 * np.eye(3)
         return bool(apart @ np.linalg.solve(covariance, apart) > JUMP)
 

@@ -32,5 +32,6 @@ def test_rows_of_many_are_what_each_is() -> None:
 
 
 def test_sums_and_multiples_are_those_of_each_number() -> None:
-    assert added_up((1.0, 2.0), (3.0, 5.0)) == (4.0, 7.0)
-    assert times(3.0, (1.0, 2.0)) == (3.0, 6.0)
+    one, other = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (10.0, 30.0, 50.0, 70.0, 90.0, 110.0)
+    assert added_up(one, other) == (11.0, 32.0, 53.0, 74.0, 95.0, 116.0)
+    assert times(3.0, one) == (3.0, 6.0, 9.0, 12.0, 15.0, 18.0)
