@@ -189,7 +189,8 @@ class Robot:
         self.ports[event.port] = event
         level = Level.INFO if event.condition is PortCondition.OPEN else Level.WARNING
         fields = {"state": event.condition.value, "detail": event.detail}
-        return [Note(level, f"{event.port}.port", fields), *diagnosis.diagnose(self, event.utime)]
+        notes = diagnosis.diagnose(self, event.utime, event.port)
+        return [Note(level, f"{event.port}.port", fields), *notes]
 
     def _poll_wheels(self, utime: int) -> list[Effect]:
         data = self.wheels.poll(utime)
@@ -199,9 +200,9 @@ class Robot:
 
     def _on_network(self, event: NetworkState) -> list[Effect]:
         self.network = event
-        level = Level.INFO if event.up else Level.WARNING
-        name = "network.up" if event.up else "network.down"
-        return [Note(level, name, {"detail": event.detail}), *diagnosis.diagnose(self, event.utime)]
+        level, name = (Level.INFO, "network.up") if event.up else (Level.WARNING, "network.down")
+        notes = diagnosis.diagnose(self, event.utime, "network")
+        return [Note(level, name, {"detail": event.detail}), *notes]
 
     def _on_message(self, event: Datagram | ChannelMessage) -> list[Effect]:
         received = self.team.receive(event)
@@ -292,8 +293,7 @@ class Robot:
             return []
         if pair.connected and not pair.is_refused:
             return self._tell_at_once(utime)
-        is_answered = module == RELATIVE_POSE
-        return self.modules.consistency(utime, pair) if is_answered else []
+        return self.modules.consistency(utime, pair) if module == RELATIVE_POSE else []
 
     def _tell_at_once(self, utime: int) -> list[Effect]:
         return [*self._extend_log(utime), *self.modules.optimize_soon(utime)]

@@ -70,12 +70,15 @@ class Stages(Protocol):
     def whereabouts(self, utime: int) -> Whereabouts: ...
 
 
-def diagnose(robot: Stages, utime: int) -> list[Note]:
-    """State all conditions anew, what should be logged about them; each second, and as soon as a
-    port changes: no answer says both that it is open and why it cannot be opened.
+def diagnose(robot: Stages, utime: int, key: str | None = None) -> list[Note]:
+    """State the conditions anew, what should be logged about them.
+
+    Args:
+        key: this one alone, because a port or the network has just changed: no answer says both
+            that it is open and why it cannot be opened. Others may not have been tried yet.
     """
-    found = conditions(robot, utime)
-    return [note for key, why in found for note in robot.health.set(key, why, utime)]
+    found = ((k, why) for k, why in conditions(robot, utime) if key in (None, k))
+    return [note for k, why in found for note in robot.health.set(k, why, utime)]
 
 
 def conditions(robot: Stages, utime: int) -> Iterator[Condition]:
