@@ -298,6 +298,7 @@ class Case(NamedTuple):
     """Minutes that the team has behind it."""
 
     def play(self, seed: int, limit: int) -> Healed:
+        """What becomes of it, looked at for so many seconds after the fault at most."""
         talk = Conversation(self.robots, self.loss, seed)
         talk.remember(self.remembered)
         return heal(talk, self.fault, limit)
