@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import fields
 
 import pytest
-from lab.trust import promises, table
+from lab.trust import play, promises, table
 from lab.trust.cases import CASES, QUICK
 from lab.trust.figures import Figures
 from lab.trust.promises import Check, Promise
+from lab.trust.watch import Run
 
 NAN, INF = float("nan"), float("inf")
 
@@ -106,3 +107,15 @@ def test_the_table_says_which_promises_are_kept_in_columns_that_line_up() -> Non
     assert len({len(line) for line in lines}) == 1
     bars = [[k for k, c in enumerate(line) if c == "|"] for line in lines]
     assert all(bar == bars[0] for bar in bars)
+
+
+def test_seeds_without_an_error_on_record_are_held_against_the_rest_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(play, "_run", lambda _: Run())
+    recorded, unseen = (play.trusted({"recorded": 1}, 1, first)[0] for first in (None, 2000))
+    assert "ate_x_today" in {check.promise.figure for check in recorded.checks}
+    assert {check.promise.figure for check in unseen.checks} == {
+        promise.figure for promise in CASES["recorded"].promises
+    } - {"ate_x_today"}
+    assert (list(recorded.runs), list(unseen.runs)) == ([100], [2000])

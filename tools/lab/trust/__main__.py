@@ -22,6 +22,7 @@ examples:
   tools/trust                              everything, about an hour of one core
   tools/trust --quick                      a few cases with a seed or two, under 40 s
   tools/trust slip blocked --seeds 3       these cases, three seeds each
+  tools/trust slip --seeds 5 --first 2000  drives that nobody has looked at yet
   tools/trust clean-3 --json clean.json    also every figure, ATE and sentence for a program
   tools/trust --list                       the names of all cases
 """
@@ -37,7 +38,7 @@ def main(arguments: list[str] | None = None) -> int:
     usual = QUICK if options.quick else {name: case.seeds for name, case in CASES.items()}
     names = options.case or list(usual)
     seeds = {name: options.seeds or usual.get(name, 1) for name in names}
-    found = play.trusted(seeds, options.jobs)
+    found = play.trusted(seeds, options.jobs, options.first)
     print("\n".join(page(found)))
     code = keep(options.json, json.dumps(play.as_json(found), indent=1) + "\n")
     kept = [check.is_kept for trusted in found for check in trusted.checks]
@@ -68,6 +69,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--quick", action="store_true", help="a few cases, few seeds")
     parser.add_argument(
         "--seeds", type=whole(1), metavar="N", help="of each case, not its usual number"
+    )
+    parser.add_argument(
+        "--first", type=whole(), metavar="N", help="seed of each case, not its usual one"
     )
     parser.add_argument(
         "--jobs", type=whole(1), default=os.cpu_count() or 1, metavar="N", help="at once"
