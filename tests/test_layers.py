@@ -86,6 +86,7 @@ OPTIMIZER_ORDER = [
     "factor_errors",
     "complex_factors",
     "vertex_cover",
+    "mirror_factors",
     "factors",
     "contract",
     "banded",

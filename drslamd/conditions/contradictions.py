@@ -73,6 +73,20 @@ def _of_one(robot: int, repair: Repair) -> str:
     return f"the wheels of robot {robot} {CHECK[repair.fault]}"
 
 
+def only_place(is_mirrored: bool) -> str:
+    """Why no heading of the own pose is known.
+
+    Args:
+        is_mirrored: do its wheels tell the mirror image of its way?
+    """
+    why = (
+        f"its wheels {CHECK[Fault.MIRRORED]}, and until they are set nobody knows which"
+        if is_mirrored
+        else "it stands, and other robots have found it; drive a metre or two"
+    )
+    return f"its place is known and its heading is not: {why}"
+
+
 def doubt(found: Doubt | None) -> str | None:
     """One sentence on the own pose; None while nothing speaks against it."""
     if found is None:

@@ -197,9 +197,9 @@ def _why_not_localised(robot: Stages, where: Whereabouts, utime: int) -> str | N
     if robot.team.namesakes.is_own_id_used(utime):
         return "not localised: another robot uses the id of this one; no other reason counts"
     if where.state is PoseState.POSITION:
-        return (
-            "its place is known and its heading is not: it stands, and other robots have found it; "
-            "drive a metre or two"
+        estimate = robot.back.estimate
+        return contradictions.only_place(
+            estimate is not None and robot.front.own.robot in estimate.mirrored
         )
     if where.is_old:
         return _why_old(robot, where.age_us, utime)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from drslamd.events import Effect, Note, Restart, Save, Send, Solve, Write
-from drslamd.slam.consistency.pair import Checked
+from drslamd.slam.consistency.checked import Checked
 
 
 def of_effect(effect: Effect, digest: int = 0) -> int:

@@ -17,7 +17,7 @@ from drslamd.history import pose_history
 from drslamd.reports import clock_report, point_report
 from drslamd.robot import Robot
 from drslamd.slam import se2, settings
-from drslamd.slam.graph import standing_points, team_frame
+from drslamd.slam.graph import mirror_images, standing_points, team_frame
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
@@ -76,7 +76,8 @@ def _problem(robot: Robot, estimate: TeamEstimate) -> TeamProblem | None:
     )
     if estimate.frame not in members:
         return None
-    group = Group(members, estimate.frame, points)
+    members, mirrored = mirror_images.with_mirrored(estimate.frame, members, held)
+    group = Group(members, estimate.frame, points, mirrored)
     return build_problem(held, group, estimate, settings.banded_optimizer(robot.config))
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from drslamd.config import Config
 from drslamd.conventions import Chain, Segment
 from drslamd.slam import settings
-from drslamd.slam.graph import standing_points, team_frame
+from drslamd.slam.graph import mirror_images, standing_points, team_frame
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.history import History
 from drslamd.slam.graph.measurements import GraphEntry
@@ -181,16 +181,18 @@ class BackEnd:
         if not members and self.beside:
             members = team_frame.group_with(self.beside, graph)
         points: frozenset[Segment] = frozenset()
+        mirrored: frozenset[Segment] = frozenset()
         if self._looks_back:
+            members, mirrored = mirror_images.with_mirrored(current, members, graph)
             members, points = standing_points.with_points(current, members, graph)
-        everything = members | points
+        everything = members | points | mirrored
         self._is_beside = not self._is_in(everything)
         self.group = set() if self._is_beside else everything
         gauge = team_frame.gauge_segment(members, present)
         if gauge is None:
             self.estimate = self.onlooked = None
             return None
-        return Group(members, gauge, points)
+        return Group(members, gauge, points, mirrored)
 
     def _is_in(self, group: set[Segment]) -> bool:
         return any(segment.chain == self._own for segment in group)

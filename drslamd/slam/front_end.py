@@ -12,8 +12,9 @@ from drslamd.slam import settings
 from drslamd.slam.calibration.sensor_calibration import UNLEARNED, SensorCalibration
 from drslamd.slam.calibration.window_calibration import PairCalibration
 from drslamd.slam.closure_method import PairWindow
+from drslamd.slam.consistency.checked import Checked
 from drslamd.slam.consistency.measurable import Measurable, behind_lapses
-from drslamd.slam.consistency.pair import Checked, PairTracker
+from drslamd.slam.consistency.pair import PairTracker
 from drslamd.slam.doubt import Partners
 from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import ClosureMeasurement, Keyframe, RangeMeasurement
@@ -77,8 +78,7 @@ class FrontEnd:
             last: where we were then.
         """
         section = config.relative_pose
-        self.own = own
-        self._known, self._range_model = known, tuning.ranges
+        self.own, self._known, self._range_model = own, known, tuning.ranges
         self._method = settings.closure_method(section, tuning)
         self._range_sigma, self._bias_sigma = section.range_sigma_m, section.range_bias_sigma_m
         self._delta = section.delta

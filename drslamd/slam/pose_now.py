@@ -1,7 +1,8 @@
 """Where a robot is now: its last solved pose, carried on by odometry.
 
 Of a point nobody knows the heading. When it begins to drive, odometry says how far it comes and not
-where to.
+where to; of a robot that is one because its wheels tell the mirror image of its way, the image says
+that as well.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import numpy as np
 
 from drslamd.conventions import GRID_US
 from drslamd.slam import se2
+from drslamd.slam.graph import standing_points
 from drslamd.slam.graph.estimate import PoseNow, TeamEstimate
 from drslamd.slam.odometry.noise import OdometryNoise, covariance_between, growth
 from drslamd.slam.odometry.track import Track
@@ -32,17 +34,20 @@ def pose_now(
         return None
     way = estimate.correction(robot).path(track.poses[last - track.n0 : now - track.n0 + 1])
     step = se2.between(way[:1], way)
-    if robot in estimate.points:
+    is_mirrored = robot in estimate.mirrored
+    if robot in estimate.points and not is_mirrored:
         aside = float(np.hypot(*step[-1, :2]))
         wide = known + np.diag([aside**2, aside**2, 0.0])
         return PoseNow(now * GRID_US, solved.poses[-1].copy(), wide)
     pose = se2.compose(solved.poses[-1], step[-1])
     level, left = estimate.odometry_level.get(robot, 1.0), estimate.noise_left(robot, noise)
-    return PoseNow(
-        now * GRID_US,
-        np.append(pose[:2], se2.wrap(pose[2])),
-        carried(known, float(solved.poses[-1, 2]), step, left, level, last),
-    )
+    if is_mirrored:
+        known = known.copy()
+        known[2, 2] = estimate.mirrored[robot]
+    covariance = carried(known, float(solved.poses[-1, 2]), step, left, level, last)
+    if is_mirrored:
+        covariance = standing_points.without_headings(covariance, np.array([True]))
+    return PoseNow(now * GRID_US, np.append(pose[:2], se2.wrap(pose[2])), covariance)
 
 
 def carried(

@@ -9,7 +9,8 @@ import pytest
 from pair_scenes import asked_at
 from robot_scenes import RobotScene, notes, sends, solves, status_in
 
-from drslamd.conditions.diagnosis import conditions
+from drslamd import report
+from drslamd.conditions.diagnosis import conditions, why_not_localised
 from drslamd.events import JobDone
 from drslamd.gossip import messages
 from drslamd.gossip.message_types import Pose, PoseState
@@ -151,3 +152,20 @@ def test_a_search_rests_four_times_as_long_as_it_computed(
     (solve,) = solves(scene.tick(1), WHAT_IF)
     scene.robot.handle(JobDone(scene.utime, solve.job_id, solve.run(), took_us))
     assert bool(solves(scene.tick(1), WHAT_IF)) is goes_on
+
+
+def test_a_robot_that_turns_the_other_way_says_where_it_is_and_which_keys_to_set() -> None:
+    scene = localised()
+    estimate = scene.robot.back.estimate
+    assert estimate is not None
+    odd = replace(estimate, points=frozenset({0}), mirrored={0: 0.01})
+    scene.robot.back.on_solution(odd)
+    status = report.status(scene.robot, scene.utime)
+    assert (status["pose"]["state"], status["pose"]["theta_deg"]) == ("position", None)
+    why = why_not_localised(scene.robot, scene.utime) or ""
+    assert "wheels.reverse_left" in why
+    assert "wheels.swap_channels" in why
+    scene.robot.back.on_solution(replace(odd, mirrored={}))
+    why = why_not_localised(scene.robot, scene.utime) or ""
+    assert why.startswith("its place is known")
+    assert "wheels." not in why

@@ -458,3 +458,26 @@ def test_what_pairs_are_narrowed_by_is_held_against_what_solutions_moved(
     back.on_solution(replace(back.estimate, narrower={(0, 1): 0.5}))
     assert asked == [{(0, 1): 0.5}]
     assert back.estimate.narrower == held
+
+
+@pytest.mark.parametrize("robot", [0, 1, 2])
+@pytest.mark.parametrize("algorithm", ["banded", "closures"])
+def test_whose_way_is_a_mirror_image_is_in_the_group_where_module_3_solves_by_ranges(
+    robot: int, algorithm: str
+) -> None:
+    """Robot 0 is, so the frame is that of robot 1."""
+    team = small_team(0, count=20)
+    odd = (0.0, 0.0, 0.0, -2.0)
+    for k, (chain, entry) in enumerate(team.entries):
+        if chain.robot == 0:
+            said = tuple(replace(c, corrected=odd) for c in entry.closures)
+            team.entries[k] = chain, replace(entry, closures=said)
+    back, asked = back_end(team, robot, f'[optimizer]\nalgorithm = "{algorithm}"\n')
+    begin(back)
+    first, others = Segment(0, 10, 0), FIRST - {Segment(0, 10, 0)}
+    if algorithm == "banded":
+        assert asked.groups == [Group(others, min(others), mirrored=frozenset({first}))]
+        assert back.group == FIRST
+    else:
+        assert asked.groups == ([] if robot == 0 else [Group(others, min(others))])
+        assert back.group == (set() if robot == 0 else others)

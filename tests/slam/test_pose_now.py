@@ -12,6 +12,7 @@ from slam_scenes import EXACT, NOISE, Array, product, same_pose, wander
 from drslamd.conventions import GRID_US, Chain, Segment
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import Learned, PoseNow, TeamEstimate, Trajectory
+from drslamd.slam.graph.tables import NO_HEADING
 from drslamd.slam.odometry.gyro_noise import GyroNoise
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.odometry.track import RESOLUTION, Track
@@ -201,3 +202,20 @@ def test_a_way_whose_heading_a_gyro_gave_is_as_uncertain_as_the_gyro() -> None:
     found = pose_now(team, 4, track_of(path), replace(EXACT, gyro=late))
     assert found is not None
     assert found.covariance[2, 2] == pytest.approx(0.01**2 / 2 + 0.001**2, rel=1e-6)
+
+
+def test_of_a_robot_whose_wheels_tell_the_mirror_image_the_image_says_where_it_goes() -> None:
+    """And nothing is claimed of its heading, for it may stand the other way round."""
+    odd = replace(
+        estimate(), points=frozenset([4]), mirrored={4: 0.0025}, turn={4: Learned(-2.0, 0.1)}
+    )
+    found, twin = known(team=odd), PATH * [1, -1, -1]
+    way = product(se2.inverse(twin[10]), twin[-1])
+    assert same_pose(found.pose, product(SOLVED, way), 1e-3)
+    assert found.covariance[2, 2] == NO_HEADING
+    assert not found.covariance[:2, 2].any()
+    right = pose_now(estimate(), 4, track_of(twin), NOISE)
+    assert right is not None
+    apart = right.covariance[:2, :2] - found.covariance[:2, :2]
+    # what place and heading have in common is not known of it
+    assert np.abs(apart).max() < 0.05

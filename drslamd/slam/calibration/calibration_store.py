@@ -61,7 +61,7 @@ class CalibrationStore:
         Args:
             owned: peers of the pairs that robot `own` owns.
         """
-        if estimate is None or not estimate.converged:
+        if estimate is None or not estimate.converged or estimate.correction(own).is_mirrored:
             return
         used, kept, latest = self.used, self._kept, self.latest
         biases = dict(latest.bias)

@@ -24,7 +24,7 @@ import numpy as np
 from drslamd.slam import se2
 from drslamd.slam.graph.estimate import LEAST_SCALE, Learned, TeamEstimate
 from drslamd.slam.odometry.correction import Correction
-from drslamd.slam.odometry.mounting import LEARNED, Repair
+from drslamd.slam.odometry.mounting import CORRECTED, Repair
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.range_model import RangeNoise
 from drslamd.slam.relative_pose.estimate import PairNoise
@@ -63,8 +63,8 @@ class EndCalibration(NamedTuple):
 
     @staticmethod
     def repaired(repair: Repair) -> EndCalibration:
-        """Where a search for mistakes has found one that is learned."""
-        if repair.fault not in LEARNED:
+        """Where a search for mistakes has found one that is taken out."""
+        if repair.fault not in CORRECTED:
             return EndCalibration()
         return EndCalibration(Learned(1 - repair.way), repair.turn - 1)
 

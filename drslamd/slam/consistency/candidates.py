@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from drslamd.slam import se2
@@ -10,8 +12,9 @@ from drslamd.slam.consistency.pcm import Candidate
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import ClosureMeasurement
 from drslamd.slam.odometry.correction import Correction
+from drslamd.slam.odometry.noise import MIRRORED_SUMS
 from drslamd.slam.relative_pose.estimate import RelativePoseEstimate
-from drslamd.slam.relative_pose.pair_end import at_keyframes
+from drslamd.slam.relative_pose.pair_end import Anchor, at_keyframes
 from drslamd.slam.relative_pose.window_request import WindowRequest
 from drslamd.slam.se2 import Array
 
@@ -41,12 +44,14 @@ def candidates(
         correction.path(data.keyframes.poses[: row[0] + 1])[-1]
         for correction, data, row in zip(corrections, (own, peer), (a, b), strict=True)
     )
+    sums = (own.sums[a[0]], peer.sums[b[0]])
+    a_sums, b_sums = map(corrected_sums, corrections, sums)
+    ends = map(_corrected_anchor, corrections, (request.a, request.b))
+    a_end, b_end = ends
     scales, turns = zip(*((c.scale, c.turn) for c in corrections), strict=True)
     out = []
     for hypothesis in estimate.hypotheses:
-        pose, covariance = at_keyframes(
-            hypothesis.a_T_b, hypothesis.covariance, request.a, request.b
-        )
+        pose, covariance = at_keyframes(hypothesis.a_T_b, hypothesis.covariance, a_end, b_end)
         x, y, theta = pose.tolist()
         measurement = ClosureMeasurement(
             number=number,
@@ -64,11 +69,22 @@ def candidates(
             covariance=covariance,
             a_pose=a_pose,
             b_pose=b_pose,
-            a_sums=own.sums[a[0]],
-            b_sums=peer.sums[b[0]],
+            a_sums=a_sums,
+            b_sums=b_sums,
         )
         out.append((candidate, measurement))
     return out
+
+
+def corrected_sums(correction: Correction, sums: Array) -> Array:
+    """(..., 13) `noise.growth` along a chain, of its mirror image if that is the way."""
+    return sums * MIRRORED_SUMS if correction.is_mirrored else sums
+
+
+def _corrected_anchor(correction: Correction, known: Anchor) -> Anchor:
+    """Where a body was, seen from its keyframe."""
+    way = np.stack([np.zeros(3), known.keyframe_T_body])
+    return replace(known, keyframe_T_body=correction.path(way)[-1])
 
 
 def decided(estimate: RelativePoseEstimate, freedom: int) -> float:

@@ -7,7 +7,7 @@ The owner is the robot with the lower id, or the other one when the lower one me
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from drslamd.conventions import Chain, Segment
 from drslamd.slam.consistency.candidates import candidates, decided
+from drslamd.slam.consistency.checked import Checked, extended
 from drslamd.slam.consistency.pcm import Candidate, PairConsistency
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import ClosureMeasurement
@@ -22,7 +23,7 @@ from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.relative_pose.estimate import RelativePoseEstimate
 from drslamd.slam.relative_pose.mistakes.mounting_search import MOVED_M, MountingSearch
-from drslamd.slam.relative_pose.mistakes.what_if import is_learned
+from drslamd.slam.relative_pose.mistakes.what_if import MIRROR, is_corrected
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 from drslamd.slam.relative_pose.range_sampler import RangeSampler
 from drslamd.slam.relative_pose.window_request import WindowRequest
@@ -65,46 +66,6 @@ class WindowAnswer:
     number: int
     utime: int
     estimate: RelativePoseEstimate
-
-
-@dataclass
-class Checked:
-    """Module 2 has run: the consistent set, and whose hypothesis each of its vertices is.
-
-    Attributes:
-        decided: evidence of each window for its best hypothesis against its others, by number.
-    """
-
-    segments: tuple[Segment, Segment]
-    consistency: PairConsistency
-    measurements: list[ClosureMeasurement]
-    decided: dict[int, float]
-
-    def kept(self) -> tuple[ClosureMeasurement, ...]:
-        """Closures of the consistent set."""
-        return tuple(self.measurements[v] for v in self.consistency.kept_vertices())
-
-    def rivals(self, decides: float) -> int:
-        """Size of the largest set that contradicts what is kept.
-
-        Once the newest window has decided for what is kept, sets count only as far as windows had
-        decided for them: it holds what those held that had not, and more.
-
-        Args:
-            decides: evidence with which a window does.
-        """
-        best = {m.number: v for v, m in reversed([*enumerate(self.measurements)])}
-        sure = [v for number, v in best.items() if self.decided.get(number, 0.0) >= decides]
-        newest = best[max(best)]
-        is_decided = newest in sure and newest in self.consistency.kept_vertices()
-        return self.consistency.rivals(sure if is_decided else None)
-
-    def renew_sums(self, own: ChainData, peer: ChainData) -> None:
-        """Keyframes that came late may lie between those of the candidates."""
-        a, a_there = own.keyframes.find(np.array([m.a_n for m in self.measurements]))
-        b, b_there = peer.keyframes.find(np.array([m.b_n for m in self.measurements]))
-        both = a_there & b_there
-        self.consistency.renew_sums(np.flatnonzero(both), own.sums[a[both]], peer.sums[b[both]])
 
 
 class PairTracker:
@@ -177,7 +138,12 @@ class PairTracker:
     def is_refused(self) -> bool:
         """Is a robot of the pair wired so that nothing of the pair can be believed?"""
         found = self.search.found
-        return found is not None and not is_learned(found)
+        return found is not None and not is_corrected(found)
+
+    @property
+    def is_mirrored(self) -> bool:
+        """Does one of both robots turn the other way?"""
+        return self.search.found == MIRROR
 
     @property
     def awaits_confirmation(self) -> bool:
@@ -242,7 +208,7 @@ class PairTracker:
             consistency = PairConsistency(noise, peer.model.noise, self._epsilon)
             checked = Checked(self._segments, consistency, [], {})
         else:
-            checked.renew_sums(own, peer)
+            checked.renew_sums(own, peer, self._corrections)
         self._is_busy, self._checked = True, None
         return partial(extended, checked, work, sure)
 
@@ -294,6 +260,9 @@ class PairTracker:
         if self._checked is None:
             return gone
         believed = self.connected and not self.is_refused
+        if every and self.is_mirrored:
+            # module 3 has no ranges, and knows no way but the one that odometry tells
+            believed = False
         kept = {m.number: m for m in self.kept} if believed else {}
         remembered = min((m.number for m in self._checked.measurements), default=0)
         gone += [
@@ -324,20 +293,3 @@ class PairTracker:
 def _differ(one: tuple[Correction, Correction], other: tuple[Correction, Correction]) -> bool:
     apart = (np.array(one) - np.array(other)) * OVER_A_WAY
     return bool(np.abs(apart).max() > ANOTHER_WAY)
-
-
-def extended(
-    checked: Checked,
-    work: list[tuple[Candidate, ClosureMeasurement]],
-    sure: Mapping[int, float],
-) -> Checked:
-    """Equation (3) for each new hypothesis; `sure` as in `Checked.decided`."""
-    for candidate, measurement in work:
-        forgotten = checked.consistency.forgotten
-        checked.consistency.add(candidate)
-        del checked.measurements[: checked.consistency.forgotten - forgotten]
-        checked.measurements.append(measurement)
-    oldest = checked.measurements[0].number if checked.measurements else 0
-    known = {**checked.decided, **sure}
-    checked.decided = {number: value for number, value in known.items() if number >= oldest}
-    return checked

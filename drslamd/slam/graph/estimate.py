@@ -118,7 +118,9 @@ class TeamEstimate:
         lifted: state of the relaxation, with `rbcd`.
         nodes: by number, the places of modules that no robot carries.
         left: those of modules that stand elsewhere since, nobody knows where.
-        points: what stands, and of which only the place is known: every node, and parked robots.
+        points: of which only the place is known: every node, parked robots, and mirrored ones.
+        mirrored: robots whose odometry is the mirror image of their way (`mirror_images`), and what
+            is the variance of the heading of its end.
         is_as_modelled: was it explained with odometry as it is configured, and sight that was free?
         kept: what the solver keeps of it for the next one.
     """
@@ -153,6 +155,7 @@ class TeamEstimate:
     nodes: dict[int, Trajectory] = field(default_factory=dict)
     left: dict[int, Trajectory] = field(default_factory=dict)
     points: frozenset[int] = frozenset()
+    mirrored: dict[int, float] = field(default_factory=dict)
     is_as_modelled: bool = True
     kept: object = field(default=None, repr=False, compare=False)
 

@@ -216,6 +216,11 @@ class ClosureTable:
         return self.rows[:, 14:]
 
     @property
+    def is_mirrored(self) -> NDArray[np.bool_]:
+        """(k,) were they found with one of both turning the other way?"""
+        return np.asarray((self.corrected[:, 1::2] < -1).any(axis=1))
+
+    @property
     def covariance(self) -> Array:
         """(k, 3, 3) of x, y, theta in the frame of a."""
         return np.asarray(self.packed[:, [[0, 1, 2], [1, 3, 4], [2, 4, 5]]])

@@ -21,7 +21,7 @@ from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.tables import KeyframeTable
 from drslamd.slam.graph.thinning.joints import Joint
-from drslamd.slam.odometry.correction import Correction
+from drslamd.slam.odometry.correction import MIRROR, Correction
 from drslamd.slam.se2 import Array, Index
 
 NO_CORRECTIONS: Mapping[int, Correction] = MappingProxyType({})
@@ -35,23 +35,36 @@ class Group:
     Attributes:
         members: its segments; frame: the one whose odometry frame is the team's.
         points: what stands, and has a place in it and no heading.
+        mirrored: whose odometry is the mirror image of its way, see `mirror_images`.
     """
 
     members: set[Segment]
     frame: Segment
     points: frozenset[Segment] = frozenset()
+    mirrored: frozenset[Segment] = frozenset()
 
     @property
     def everything(self) -> set[Segment]:
-        """Members and points."""
-        return self.members | self.points
+        """All of these."""
+        return self.members | self.points | self.mirrored
+
+    @property
+    def places_only(self) -> frozenset[int]:
+        """Robots and modules whose heading is not known."""
+        standing = {segment.robot for segment in self.points}
+        whole = {segment.robot for segment in self.members}
+        return frozenset(standing - whole) | self.mirrored_robots
+
+    @property
+    def mirrored_robots(self) -> frozenset[int]:
+        return frozenset(segment.robot for segment in self.mirrored)
 
 
 def groups(graph: PoseGraph) -> list[set[Segment]]:
     """Sets of segments that closures join; a segment without closure is in none."""
     group_of: dict[Segment, set[Segment]] = {}
     for joint in joints(graph):
-        if joint.tells_place_only:
+        if joint.tells_place_only or joint.is_mirrored:
             continue
         one, other = group_of.get(joint.a, {joint.a}), group_of.get(joint.b, {joint.b})
         if one is other:
@@ -121,7 +134,7 @@ def placed(
     if group.frame not in out:
         out = {group.frame: _corrected(graph, group.frame, corrections).poses}
     while len(out) < len(group.everything):
-        segment, n, poses = _next_to_place(graph, group.everything, out)
+        segment, n, poses = _next_to_place(graph, group, out)
         keyframes = _corrected(graph, segment, corrections)
         anchors = keyframes.chosen(np.searchsorted(keyframes.n, n))
         out[segment] = by_odometry(keyframes, anchors, poses)
@@ -179,7 +192,7 @@ def by_odometry(keyframes: KeyframeTable, anchors: KeyframeTable, w_T_anchor: Ar
 
 
 def _next_to_place(
-    graph: PoseGraph, members: set[Segment], done: dict[Segment, Array]
+    graph: PoseGraph, group: Group, done: dict[Segment, Array]
 ) -> tuple[Segment, Index, Array]:
     """The segment that most closures join to what is placed: its anchors (m,), their poses."""
 
@@ -187,14 +200,15 @@ def _next_to_place(
         return np.asarray(done[segment][np.searchsorted(graph.view.segment(segment).n, n)])
 
     found: dict[Segment, dict[int, Array]] = {}
+    everything = group.everything
     for joint in joints(graph):
         a, b = joint.a in done, joint.b in done
-        if a == b or not {joint.a, joint.b} <= members:
+        if a == b or not {joint.a, joint.b} <= everything:
             continue
         new = found.setdefault(joint.b if a else joint.a, {})
-        for a_n, b_n, a_T_b in zip(
-            joint.closures.a_n, joint.closures.b_n, joint.closures.a_T_b, strict=True
-        ):
+        # (what was found with b turning the other way is the mirror image where a does)
+        seen = joint.closures.a_T_b * (MIRROR if joint.a in group.mirrored else 1.0)
+        for a_n, b_n, a_T_b in zip(joint.closures.a_n, joint.closures.b_n, seen, strict=True):
             if a:
                 new[int(b_n)] = se2.compose(pose(joint.a, a_n), a_T_b)
             else:

@@ -55,12 +55,13 @@ class PlacesLeft:
 
 
 def places_left(pair: PairTracker, a: PairEnd, b: PairEnd, sigma: float) -> PlacesLeft | None:
-    """None where the pair is connected, or module 1 has not named any place of late.
+    """None where the pair is connected, or one of it is wired wrongly, or module 1 has not named
+    any place of late.
 
     Args:
         a, b: our end of the pair, and the peer's; sigma: of a range, m.
     """
-    if pair.connected or pair.is_refused:
+    if pair.connected or pair.is_mirrored or pair.is_refused:
         return None
     answer = next((w for w in reversed(pair.history) if w.estimate.hypotheses), None)
     if answer is None:

@@ -37,6 +37,8 @@ class Fault(Enum):
 
 LEARNED = (Fault.TRACK, Fault.SCALE)
 """Faults that module 3 learns once it is close."""
+CORRECTED = (*LEARNED, Fault.MIRRORED)
+"""Faults that are taken out of a way that was already told, of which keyframes are left."""
 
 
 FINER = 1.06

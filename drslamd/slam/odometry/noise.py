@@ -47,6 +47,9 @@ WHEELS, GYRO, PATH, SUMS = slice(0, 6), slice(6, 12), 12, 13
 """Which of the sums of `growth` are those of the heading by wheels and by gyro and the length of
 the path, and how many there are."""
 
+MIRRORED_SUMS = np.array([*(1, -1, 1, 1, -1, 1) * 2, 1.0])
+"""Times these sums, those of the mirror image of a way in the axis of x."""
+
 
 @dataclass(frozen=True)
 class OdometryNoise:

@@ -22,8 +22,9 @@ from drslamd.slam.graph.tables import (
 from drslamd.slam.graph.team_frame import NO_CORRECTIONS, Group
 from drslamd.slam.graph.thinning.chain_view import ChainView
 from drslamd.slam.graph.thinning.pair_view import PairView
-from drslamd.slam.odometry.correction import Correction
+from drslamd.slam.odometry.correction import MIRRORED, Correction
 from drslamd.slam.odometry.noise import OdometryNoise, by_yaw_rate, link_covariance
+from drslamd.slam.optimizer import mirror_factors
 from drslamd.slam.optimizer.problem import (
     BetweenFactors,
     CarriedEnds,
@@ -53,11 +54,13 @@ class Numbering:
     Attributes:
         robot, n: (k,) whose keyframe each one is, and which.
         place: for each robot, the place of every row of its chain, -1 where it is left out.
+        mirrored: robots whose odometry is the mirror image of their way.
     """
 
     robot: Index
     n: Index
     place: dict[int, Index]
+    mirrored: Set[int] = frozenset()
 
     def of_robot(self, robot: int) -> Index:
         """Places of all numbered keyframes of a robot, in the order of time."""
@@ -74,7 +77,10 @@ class Numbering:
 
 
 def numbering(
-    graph: PoseGraph, members: set[Segment], points: Set[Segment] = frozenset()
+    graph: PoseGraph,
+    members: set[Segment],
+    points: Set[Segment] = frozenset(),
+    mirrored: Set[int] = frozenset(),
 ) -> Numbering:
     """Number all keyframes of `members`, and those of `points` where they stand."""
     place, when, robots, keyframes = {}, [], [], []
@@ -94,21 +100,31 @@ def numbering(
     robot_of, n_of = robot_of[order], n_of[order]
     for robot, places in place.items():
         places[places == 0] = np.flatnonzero(robot_of == robot)
-    return Numbering(robot_of, n_of, place)
+    return Numbering(robot_of, n_of, place, mirrored)
 
 
 def corrections(
-    graph: PoseGraph, robots: list[int], previous: TeamEstimate | None
+    graph: PoseGraph,
+    robots: list[int],
+    previous: TeamEstimate | None,
+    mirrored: Set[int] = frozenset(),
 ) -> dict[int, Correction]:
     """Of robots that are not mounted as configured, as far as that is known before a solver starts.
 
     The last solution tells; of who was not in it, the closures do, which were found with it.
+
+    Args:
+        mirrored: whose odometry is the mirror image of their way; closures do not tell of which
+            of two it is.
     """
     out: dict[int, Correction] = {}
     for robot in robots:
-        if previous is not None and robot in previous.trajectories:
-            if robot in previous.turn:
-                out[robot] = previous.correction(robot)
+        known = previous.correction(robot) if previous is not None else Correction()
+        if known.is_mirrored != (robot in mirrored):
+            known = Correction(turn=MIRRORED if robot in mirrored else 0.0)
+        if known.turn:
+            out[robot] = known
+        if known.turn or (previous is not None and robot in previous.trajectories):
             continue
         found = [
             pair.closures.corrected[:, at]
@@ -117,6 +133,7 @@ def corrections(
             if chain.robot == robot
         ]
         rows = np.concatenate([np.zeros((0, 2)), *found])
+        rows = rows[rows[:, 1] > -1]
         if rows.any():
             scale, turn = np.median(rows, axis=0).tolist()
             out[robot] = Correction(scale=scale, turn=turn)
@@ -171,7 +188,9 @@ def odometry(graph: PoseGraph, numbers: Numbering, robots: list[int]) -> Odometr
         rows = np.flatnonzero(np.array([chain.model.noise == noise for chain in chains])[of])
         covariance[rows] = _link_covariance(noise.random_part(), measured[rows], sums[rows])
         by_yaw[rows] = by_yaw_rate(sums[rows], measured[rows, :2], noise)
-    return OdometryFactors(i, j, measured, covariance, of, by_yaw, by_turn)
+    found = OdometryFactors(i, j, measured, covariance, of, by_yaw, by_turn)
+    odd = np.isin(robots, list(numbers.mirrored))[of]
+    return mirror_factors.mirrored_odometry(found, odd) if odd.any() else found
 
 
 def chain_links(chain: ChainView, calibrated: bool) -> BetweenFactors:
@@ -212,7 +231,10 @@ def closures(graph: PoseGraph, numbers: Numbering) -> BetweenFactors:
     used = np.asarray((ends >= 0).all(axis=0))
     i, j = ends[:, used]
     table = table.chosen(used)
-    return BetweenFactors(i, j, table.a_T_b, table.covariance)
+    found = BetweenFactors(i, j, table.a_T_b, table.covariance)
+    # (those were found with b turning the other way)
+    odd = np.isin(numbers.robot[i], list(numbers.mirrored))
+    return mirror_factors.mirrored_between(found, odd) if odd.any() else found
 
 
 def ranges(graph: PoseGraph, numbers: Numbering) -> tuple[RangeFactors, list[tuple[int, int]]]:
@@ -249,6 +271,9 @@ def ranges(graph: PoseGraph, numbers: Numbering) -> tuple[RangeFactors, list[tup
         pair=named[of_pair],
         carried=CarriedEnds(carried, moves[carried]),
     )
+    for robot in sorted(numbers.mirrored):
+        antenna = graph.view.chains[robot].model.antenna
+        factors = mirror_factors.mirrored_ranges(factors, number[robot], antenna)
     return factors, names
 
 

@@ -225,6 +225,8 @@ def _hole(estimate: TeamEstimate | None, own: Own, track: Track, utime: int) -> 
     solved = estimate.trajectories.get(own.robot) if estimate else None
     if estimate is None or solved is None or not len(solved.n) or not len(track):
         return None
+    if estimate.correction(own.robot).is_mirrored:
+        return None
     known, last, now = estimate.covariance(own.robot), int(solved.n[-1]), track.end - 1
     if known is None or not track.n0 <= last <= now:
         return None

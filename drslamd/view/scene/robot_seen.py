@@ -135,7 +135,9 @@ def _state(seen: RobotSeen) -> list[str]:
     if seen.state is PoseState.STALE:
         return ["has no odometry: the pose is its last one; cable and power of the base"]
     if seen.state is PoseState.POSITION:
-        return ["stands, and others have found its place: its heading is known once it drives"]
+        return [
+            "its place is known, its heading is not: it stands, or its wheels are wired wrongly"
+        ]
     return []
 
 

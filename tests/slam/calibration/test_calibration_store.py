@@ -156,3 +156,12 @@ def test_the_disk_is_written_when_something_changed(
     assert memory.is_news() == is_news
     memory.on_saved()
     assert not memory.is_news()
+
+
+@pytest.mark.parametrize(("turn", "is_kept"), [(-0.5, True), (-2.0, False)])
+def test_of_wheels_that_turn_the_other_way_nothing_is_kept(turn: float, is_kept: bool) -> None:
+    """It is of the mirror image, and they will be set right before the next start."""
+    memory = CalibrationStore(SensorCalibration(), True)
+    learned = estimate(scale=Learned(0.15, 0.005), yaw=Learned(0.01, 1e-4))
+    memory.update(replace(learned, turn={5: Learned(turn, 0.02)}), 5, [2])
+    assert (memory.latest != SensorCalibration()) is is_kept

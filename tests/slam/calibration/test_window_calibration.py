@@ -21,6 +21,7 @@ from drslamd.slam.graph.estimate import LEAST_SCALE, Learned, TeamEstimate
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.range_model import LINKTRACK, RangeNoise
 from drslamd.slam.relative_pose.estimate import PairNoise
+from drslamd.slam.relative_pose.mistakes.what_if import MIRROR
 from drslamd.slam.relative_pose.solver import solve
 from drslamd.slam.relative_pose.window import Window
 
@@ -249,3 +250,20 @@ def test_a_pair_is_found_whoever_owns_it() -> None:
     assert sensors.b == EndCalibration(turn=0.3)
     # where module 3 has not come to an end, nothing has been learned
     assert PairCalibration.of(replace(estimate, converged=False), 2, 1) == PairCalibration()
+
+
+def test_a_peer_that_turns_the_other_way_is_seen_in_the_mirror_until_module_3_knows_more() -> None:
+    """As soon as it does, also of scale and yaw rate."""
+    flip = np.array([1.0, -1.0, -1.0])
+    real, _ = mounted(2, 30)
+    told = replace(real, b_poses=real.b_poses * flip)
+    known = PairCalibration.of(None, 1, 2, MIRROR)
+    better, noise = calibrated_window(told, SENSORS, known)
+    assert better.b_poses == pytest.approx(real.b_poses)
+    assert np.array_equal(better.a_poses, real.a_poses)
+    assert noise == SENSORS
+    assert known.b.correction.is_mirrored
+    learned = TeamEstimate(
+        Segment(0, 1, 0), {}, scale={2: Learned(0.1, 0.01)}, turn={2: Learned(-2.0, 0.01)}
+    )
+    assert PairCalibration.of(learned, 1, 2, MIRROR).b.scale.value == 0.1

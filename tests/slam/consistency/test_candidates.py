@@ -59,3 +59,17 @@ def least_when_rounded(covariance: tuple[float, ...]) -> float:
     """Smallest eigenvalue of six numbers that travel with 32 bits."""
     rounded = np.array(covariance, dtype=np.float32).astype(float)
     return float(np.linalg.eigvalsh(se2.unpacked(tuple(rounded)))[0])
+
+
+def test_the_short_way_to_a_keyframe_is_corrected_as_the_long_one_is() -> None:
+    """b is 1 m ahead of its keyframe and on its left, or on its right where it turns the other
+    way: seen from there it is at the same place."""
+    pair = OwnedPair(Agreement(1, 0, confirms=False))
+    odd = asked_at(20, bodies=((0, 0, 0), (1.0, 0.5, 0.3)))
+    right = asked_at(20, bodies=((0, 0, 0), (1.0, -0.5, -0.3)))
+    known = Correction(), Correction(turn=-2.0)
+    ((_, found),) = candidates(7, odd, estimate_of(BESIDE), pair.own, pair.peer, known)
+    ((_, twin),) = candidates(7, right, estimate_of(BESIDE), pair.own, pair.peer, AS_THEY_ARE)
+    assert found.a_T_b == pytest.approx(twin.a_T_b)
+    assert found.covariance == pytest.approx(twin.covariance)
+    assert found.corrected == (0.0, 0.0, 0.0, -2.0)

@@ -82,9 +82,22 @@ def test_of_a_pair_whose_wheels_run_backwards_nothing_more_is_told_and_what_was_
     pair.tracker.search.found = Case(b=TRACKS[0])
     assert not pair.tracker.is_refused
     assert pair.told() == []
-    pair.tracker.search.found = MIRROR
+    pair.tracker.search.found = Case(b=SIDES[0])
     assert pair.tracker.is_refused
+    assert not pair.tracker.is_mirrored
     assert pair.told() == [(0, False), (1, False)]
+
+
+@pytest.mark.parametrize("has_ranges", [True, False])
+def test_the_mirror_image_of_a_way_is_told_where_module_3_solves_by_ranges(
+    has_ranges: bool,
+) -> None:
+    pair = OwnedPair(TWO)
+    search(pair, MIRROR)
+    assert (pair.tracker.is_mirrored, pair.tracker.is_refused) == (True, False)
+    pair.see(BESIDE, 2)
+    assert pair.tracker.connected
+    assert bool(pair.tracker.tell(every=not has_ranges)) is has_ranges
 
 
 def test_a_closure_says_with_which_scales_and_turns_it_was_found() -> None:

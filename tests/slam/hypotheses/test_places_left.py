@@ -15,6 +15,7 @@ from drslamd.slam.closure_method import AGREEMENT
 from drslamd.slam.consistency.pair import Agreement
 from drslamd.slam.hypotheses.deciding_motion import deciding_motion
 from drslamd.slam.hypotheses.places_left import PlacesLeft, places_left
+from drslamd.slam.relative_pose.mistakes.what_if import MIRROR
 
 SIGMA = 0.1
 KNOWN = 0.05
@@ -173,3 +174,11 @@ def test_our_body_now_is_what_turns_count_from() -> None:
     assert straight.mover == about.motion.mover == 0
     ours, then = about.motion.right, straight.left
     assert (ours[0] + ours[1]) / 2 + (then[0] + then[1]) / 2 == pytest.approx(math.pi, abs=0.15)
+
+
+def test_of_a_pair_of_which_one_turns_the_other_way_nothing_is_said() -> None:
+    """Where it looks is not known."""
+    pair = OwnedPair(Agreement(least=2, outnumber=2, confirms=False))
+    pair.see(BESIDE, 1, first=190)
+    pair.tracker.search.found = MIRROR
+    assert left_of(pair) is None

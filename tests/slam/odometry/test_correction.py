@@ -122,3 +122,31 @@ def test_each_piece_of_a_corrected_track_is_the_piece_corrected() -> None:
     back_there, back = inverted(whole[0]), inverted(rest[0])
     for there, here in zip(whole, rest, strict=True):
         assert same_pose(product(back_there, there), product(back, here), 1e-9)
+
+
+@pytest.mark.parametrize(("turn", "is_mirrored"), [(-0.99, False), (-1.01, True)])
+def test_who_turns_the_other_way_tells_the_mirror_image(turn: float, is_mirrored: bool) -> None:
+    known = Correction(turn=turn)
+    assert known.is_mirrored is is_mirrored
+    # a turn of 0.5 rad is one of 0.5 (1 + turn), by either of the two
+    sign = -1 if is_mirrored else 1
+    assert sign * (1 + known.longer) * 0.5 == pytest.approx((1 + turn) * 0.5)
+
+
+def test_the_mirror_image_is_exact_however_rarely_a_way_was_told() -> None:
+    """Sharp bends between two poses, which are no arcs."""
+    path = wander(np.random.default_rng(4), 30, 0.8)
+    path[:, 2] += np.random.default_rng(5).normal(0, 0.5, 30)
+    told = Correction(turn=-2.0).path(path)
+    first = inverted(path[0])
+    for pose, seen in zip(path, told, strict=True):
+        x, y, theta = product(first, pose)
+        assert same_pose(seen, product(path[0], (x, -y, -theta)))
+
+
+def test_what_else_was_learned_is_of_the_mirror_image() -> None:
+    true = driven(START, SPEED, RATE, 0, 0, 0)
+    measured = driven(START, SPEED, RATE, 0.1, 0.03, 0.2)
+    odd = Correction(turn=-2.0).path(measured)
+    better = Correction(0.1, 0.03, -2.2).path(odd)
+    assert np.hypot(*(better - true)[:, :2].T).max() < 0.02

@@ -312,6 +312,19 @@ def test_of_who_was_in_the_last_solution_that_is_believed_and_not_the_closures()
     }
 
 
+def test_who_turns_the_other_way_is_said_and_closures_do_not_tell_of_which_of_two_it_is() -> None:
+    odd = (0.0, 0.0, 0.0, -2.0)
+    graph = found_with((0.0, 0.0, 0.1, 0.2), odd, odd)
+    known = corrections(graph, [0, 1], None, {0})
+    assert known == {0: Correction(turn=-2.0), 1: Correction(0.1, 0.0, 0.2)}
+    # what was learned since is kept, for as long as it is so
+    solved = solved_for((0, 1), {0: Learned(-2.1, 0.1)})
+    learned = Correction(0.03, 0.001, -2.1)
+    assert corrections(graph, [0, 1], solved, {0}) == {0: learned}
+    assert corrections(graph, [0, 1], solved) == {}
+    assert corrections(graph, [0, 1], solved, {1}) == {1: Correction(turn=-2.0)}
+
+
 # edges that reach far
 
 

@@ -5,11 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from lab.recordings import world
+from slam_scenes import NOISE
 from teams import EASY, VirtualTeam
 
 from drslamd import report
+from drslamd.conventions import GRID_US, Chain, Segment
 from drslamd.gossip.message_types import PoseState
+from drslamd.slam.graph.estimate import Learned, TeamEstimate, Trajectory
+from drslamd.slam.odometry.track import Track
+from drslamd.slam.range_model import LINKTRACK
+from drslamd.slam.relocation import relocation
 from drslamd.slam.relocation.relocation import ANY_HEADING_RAD, FIRST_NUMBER
+from drslamd.slam.relocation.sightings import Own
+from drslamd.slam.robot_model import RobotModel
 
 
 @pytest.mark.slow
@@ -58,3 +66,17 @@ def test_it_has_a_position_without_a_heading_and_is_back_within_seconds() -> Non
         assert other is not None
         for number, path in one.trajectories.items():
             assert path.poses == pytest.approx(other.trajectories[number].poses, abs=1e-6)
+
+
+@pytest.mark.parametrize(("turn", "is_lost"), [(0.0, True), (-2.0, False)])
+def test_who_turns_the_other_way_is_not_placed_after_a_hole_by_its_way(
+    turn: float, is_lost: bool
+) -> None:
+    """Where it looks was not known before it either."""
+    track = Track(1000)
+    for n in (0, 1, 2, 6, 7):
+        track.append(n, np.zeros(3))
+    solved = Trajectory(Chain(4, 1), np.array([1]), np.zeros((1, 3)))
+    team = TeamEstimate(Segment(4, 1, 0), {4: solved}, np.eye(3), turn={4: Learned(turn, 0.1)})
+    own = Own(4, RobotModel(NOISE), 0.1, LINKTRACK)
+    assert (relocation._hole(team, own, track, 7 * GRID_US) is not None) is is_lost

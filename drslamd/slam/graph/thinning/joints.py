@@ -18,12 +18,14 @@ class Joint(NamedTuple):
 
     Attributes:
         tells_place_only: do these say where b stood and nothing of its heading?
+        is_mirrored: were they found with b turning the other way?
     """
 
     a: Segment
     b: Segment
     closures: ClosureTable
     tells_place_only: bool = False
+    is_mirrored: bool = False
 
 
 def joints_of(chains: Mapping[int, ChainView], pairs: list[PairView]) -> list[Joint]:
@@ -46,8 +48,12 @@ def joints_of(chains: Mapping[int, ChainView], pairs: list[PairView]) -> list[Jo
 
 
 def _joint(pair: PairView, one: int, other: int, these: ClosureTable) -> Joint:
-    """Of two segments; who says a whole pose is believed before who says but a place."""
-    whole = ~these.tells_place_only
-    says_any = bool(whole.any())
-    found = these.chosen(whole) if says_any and not whole.all() else these
-    return Joint(Segment(*pair.a, one), Segment(*pair.b, other), found, not says_any)
+    """Of two segments; who says a whole pose is believed before who says but a place, and wheels as
+    configured before any that turn the other way."""
+    place_only, mirrored = these.tells_place_only, these.is_mirrored
+    kinds = (~place_only & ~mirrored, ~place_only, np.ones(len(these), dtype=bool))
+    best = next(kind for kind in kinds if kind.any())
+    found = these if best.all() else these.chosen(best)
+    says_pose, is_mirrored = not place_only[best].any(), bool(mirrored[best].all())
+    ends = Segment(*pair.a, one), Segment(*pair.b, other)
+    return Joint(*ends, found, not says_pose, says_pose and is_mirrored)

@@ -23,7 +23,7 @@ from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.noise import OdometryNoise
-from drslamd.slam.optimizer import factors
+from drslamd.slam.optimizer import factors, mirror_factors
 from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.banded.banded_solver import SETTLED
 from drslamd.slam.optimizer.banded.lapses.known_lapses import freed_again, lapse_of
@@ -125,13 +125,14 @@ def build_problem(
     graph: PoseGraph, group: Group, previous: TeamEstimate | None, numbers: BandedOptimizer
 ) -> TeamProblem:
     """Number the group's poses by time and collect its factors."""
-    places = factors.numbering(graph, group.members, group.points)
+    mirrored = group.mirrored_robots
+    places = factors.numbering(graph, group.members | group.mirrored, group.points, mirrored)
     robots = sorted({s.robot for s in group.everything})
     chains = [graph.view.chains[robot] for robot in robots]
     ranges, pairs = factors.ranges(graph, places)
     closures = factors.closures(graph, places)
     hints = replace(closures, covariance=closures.covariance + HINT * np.eye(3))
-    known = factors.corrections(graph, robots, previous)
+    known = factors.corrections(graph, robots, previous, mirrored)
     priors = Priors(
         bias=BiasPrior.of(numbers.bias_sigma, numbers.model),
         scale=np.array([data.model.noise.scale for data in chains]),
@@ -218,7 +219,7 @@ def _start(
     return replace(
         start,
         scale=np.array([correction.scale for correction in odometry]),
-        turn=np.array([correction.turn for correction in odometry]),
+        turn=np.array([correction.longer for correction in odometry]),
     )
 
 
@@ -247,7 +248,7 @@ def _doubted(
 ) -> Doubted:
     """What the last solution let go, and what closures were found with."""
     antennas = previous.antenna_m if previous else {}
-    turns = [robot in known and known[robot].turn != 0 for robot in robots]
+    turns = [robot in known and known[robot].longer != 0 for robot in robots]
     return Doubted(np.array(turns), np.array([robot in antennas for robot in robots]))
 
 
@@ -281,9 +282,8 @@ def solved(
     learned, spread, doubted = solution.calibration, solution.spread, solution.doubted
     assert spread is not None
     n, poses = team.problem.n, solution.poses
-    each = ((chain, mine[chain.robot]) for chain in team.chains)
-    paths = {chain.robot: Trajectory(chain, n[rows], poses[rows]) for chain, rows in each}
-    points = frozenset(s.robot for s in group.points) - {s.robot for s in group.members}
+    paths = {c.robot: Trajectory(c, n[mine[c.robot]], poses[mine[c.robot]]) for c in team.chains}
+    points, mirrored = group.places_only, group.mirrored_robots
     turn = _named(list(mine), learned.turn, spread.turn)
     yaw = _named(list(mine), learned.yaw, spread.yaw)
     x, y = (_named(list(mine), learned.antenna[:, k], spread.antenna[:, k]) for k in (0, 1))
@@ -293,6 +293,7 @@ def solved(
         nodes={number: paths[number] for number in stays if is_node(number)},
         left={number: paths[number] for number in team.left},
         points=points,
+        mirrored=mirror_factors.headings(solution.joint, stays, mirrored),
         narrower=narrower(stays, solution.shares),
         joint=standing_points.without_headings(solution.joint, np.isin(stays, list(points))),
         bias_m=_named(team.pairs, learned.bias, spread.bias),
@@ -302,7 +303,7 @@ def solved(
         gyro_rate={robot: yaw[robot] for robot in team.by_gyro},
         near_bias_m=Learned(float(learned.near_bias[0]), float(spread.near_bias[0])),
         team_bias_m=Learned(float(learned.team_bias[0]), float(spread.team_bias[0])),
-        turn={robot: turn[robot] for robot in compress(mine, doubted.track)},
+        turn=mirror_factors.turns(turn, compress(mine, doubted.track), mirrored),
         antenna_m={robot: (x[robot], y[robot]) for robot in compress(mine, doubted.antenna)},
         scatter=dict(zip(team.pairs, solution.scatter.tolist(), strict=True)),
         odometry_level=_latest(team, solution.feared_level),

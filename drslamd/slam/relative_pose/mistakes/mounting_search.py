@@ -35,6 +35,7 @@ from drslamd.slam.relative_pose.mistakes.what_if import (
     CASES,
     OUTPOSTS,
     Case,
+    is_corrected,
     is_learned,
 )
 from drslamd.slam.se2 import Array
@@ -232,7 +233,7 @@ class MountingSearch:
         if case is None or self._is_final:
             return False
         self.found, self.is_clear = case, is_clear
-        self.is_confirmed, self.is_provisional = is_learned(case), False
+        self.is_confirmed, self.is_provisional = is_corrected(case), False
         # windows with the repair speak for themselves
         self._fits.clear()
         self._answers.clear()

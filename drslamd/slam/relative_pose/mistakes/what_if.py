@@ -18,6 +18,7 @@ from drslamd.slam.odometry import mounting
 from drslamd.slam.odometry.mounting import (
     AS_CONFIGURED,
     COARSE_SCALES,
+    CORRECTED,
     CURVES,
     LEARNED,
     LEAST_BEND,
@@ -79,6 +80,11 @@ others change no verdict on 120 teams, healthy and faulty, and half of the time 
 def is_learned(case: Case) -> bool:
     """Are these mistakes that module 3 learns?"""
     return all(repair.fault in (Fault.NONE, *LEARNED) for repair in case)
+
+
+def is_corrected(case: Case) -> bool:
+    """Are these mistakes that are taken out of a way which was told already?"""
+    return all(repair.fault in (Fault.NONE, *CORRECTED) for repair in case)
 
 
 def is_curve(case: Case) -> bool:

@@ -54,3 +54,17 @@ def test_who_says_a_whole_pose_is_believed_before_who_says_but_a_place() -> None
     (one,) = joints(place(0, 0), place(1, 10))
     assert one.tells_place_only
     assert one.closures.number.tolist() == [0, 1]
+
+
+def test_wheels_as_configured_are_believed_before_any_that_turn_the_other_way() -> None:
+    """And these before a mere place."""
+    odd = replace(whole(1, 10), corrected=(0.0, 0.0, 0.0, -2.0))
+    (one,) = joints(place(0, 0), odd)
+    assert (one.is_mirrored, one.tells_place_only) == (True, False)
+    assert one.closures.number.tolist() == [1]
+    (both,) = joints(whole(0, 0), odd, place(2, 20))
+    assert (both.is_mirrored, both.tells_place_only) == (False, False)
+    assert both.closures.number.tolist() == [0]
+    wide = replace(whole(1, 10), corrected=(0.0, 0.3, 0.0, -0.5))
+    (plain,) = joints(wide)
+    assert not plain.is_mirrored

@@ -25,7 +25,7 @@ from slam_scenes import (
 
 from drslamd.conventions import Chain, Segment, node_chain
 from drslamd.slam.graph.estimate import Lapse, Learned, TeamEstimate, Trajectory
-from drslamd.slam.graph.measurements import GraphEntry
+from drslamd.slam.graph.measurements import ClosureMeasurement, GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.tables import NO_HEADING
 from drslamd.slam.graph.team_frame import Group
@@ -528,3 +528,39 @@ def test_pairs_that_are_narrower_are_named_by_their_robots_the_lower_first(
     monkeypatch.setattr(banded_solver, "solve", sharing)
     a, b, c = sorted(robots)[:3]
     assert solved(team.graph, group).narrower == {(a, b): 0.3, (a, c): 0.4}
+
+
+@pytest.mark.parametrize("robot", [0, 2])
+def test_a_robot_that_turns_the_other_way_serves_the_others_as_if_it_did_not(robot: int) -> None:
+    """A team and its twin, in which the odometry of one robot is the mirror image. Closures were
+    found with the peer turning the other way, also where it is the owner that does."""
+    team, twin = small_team(5), PoseGraph()
+    for chain, entry in team.entries:
+        frames, said = entry.keyframes, entry.closures
+        if chain.robot == robot:
+            frames = tuple(replace(k, y=-k.y, theta=-k.theta) for k in frames)
+        if chain.robot == robot or any(c.peer.robot == robot for c in said):
+            said = tuple(_as_of_twin(c, chain, robot) for c in said)
+        twin.insert(chain, replace(entry, keyframes=frames, closures=said))
+    odd = frozenset({Segment(*team.chains[robot], 0)})
+    whole = group_of(team.graph)
+    frame = min(whole.members - odd)
+    right = solved(team.graph, replace(whole, frame=frame))
+    found = solved(twin, Group(whole.members - odd, frame, mirrored=odd))
+    assert found.points == found.mirrored.keys() == {robot}
+    for other, path in right.trajectories.items():
+        assert found.trajectories[other].poses == pytest.approx(path.poses, abs=1e-5)
+    assert found.turn == {robot: Learned(-2.0, found.turn[robot].sigma)}
+    assert found.covariance(robot)[2, 2] == NO_HEADING  # type: ignore[index]
+    assert found.mirrored[robot] == pytest.approx(right.covariance(robot)[2, 2], rel=1e-3)  # type: ignore[index]
+    again = solved(twin, Group(whole.members - odd, frame, mirrored=odd), found)
+    for other, path in found.trajectories.items():
+        assert again.trajectories[other].poses == pytest.approx(path.poses, abs=1e-5)
+
+
+def _as_of_twin(c: ClosureMeasurement, owner: Chain, odd: int) -> ClosureMeasurement:
+    if odd not in (owner.robot, c.peer.robot):
+        return c
+    x, y, theta = c.a_T_b
+    seen = (x, -y, -theta) if owner.robot == odd else c.a_T_b
+    return replace(c, a_T_b=seen, corrected=(0.0, 0.0, 0.0, -2.0))
