@@ -56,8 +56,8 @@ class PoseState(IntEnum):
     """No odometry: a position by ranges, whose heading means nothing (its sigma is that of any), or
     the last pose, as uncertain as the way that may have been driven since."""
     POSITION = 4
-    """It stands, and others have found its place; its heading is not known, and means nothing in a
-    pose: its sigma is that of any."""
+    """Its place is known and its heading is not: it stands, and others have found it, or its wheels
+    turn it the other way. A heading means nothing in such a pose: its sigma is that of any."""
 
 
 @dataclass(frozen=True)

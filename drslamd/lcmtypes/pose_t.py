@@ -31,7 +31,7 @@ class pose_t(object):
         2 doubtful: there is a pose, but what was measured contradicts it
         3 stale: no odometry for ten periods of its own, half a second to one; a position by ranges, with the sigma of any
         heading, or the last pose, with a covariance that grows as fast as the robot drove
-        4 position: it stands, and others have found its place; theta means nothing and has the
+        4 position: its place is known and its heading is not; theta means nothing and has the
         sigma of any
         LCM Type: int8_t
         """
