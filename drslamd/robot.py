@@ -245,14 +245,13 @@ class Robot:
         """One entry of our log: where our wheels went, what we ranged, what module 2 kept."""
         neighbours = self.neighbours(utime)
         is_own_doubted, is_any_doubted = self.standing.is_doubted()
-        keyframe = self.front.make_keyframe(is_own_doubted)
+        keyframes = self.front.make_keyframes(is_own_doubted, self.standing.turns_otherwise)
         ranges = self.front.sample_ranges(neighbours, self.back.graph, utime, is_any_doubted)
         closures = self.front.tell_closures()
-        if not (keyframe or ranges or closures):
+        if not (keyframes or ranges or closures):
             return []
-        if self.team.is_spent or (keyframe and not is_sayable(keyframe)):
+        if self.team.is_spent or not all(map(is_sayable, keyframes)):
             return [Restart(self.own.epoch, "it has used up the numbers of its messages")]
-        keyframes = (keyframe,) if keyframe else ()
         entries = self.team.entries(self.front.model, keyframes, ranges, closures)
         said = [self.team.append(entry, utime) for entry in entries]
         for decoded, _ in said:

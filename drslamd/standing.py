@@ -25,6 +25,9 @@ from drslamd.slam.relocation.last_place import LastPlace, last_place
 from drslamd.slam.relocation.question import Found, is_vague
 from drslamd.whereabouts import NOWHERE, VALID_US, Whereabouts, likely_speeds, whereabouts
 
+ODD_TURN = 0.1
+"""A fraction; less is no more wrong over a link than its noise."""
+
 
 class Asked(NamedTuple):
     """A computation, by the name of its module, and who gets what comes out and the time."""
@@ -187,6 +190,16 @@ class Standing:
         own = self._doubt() is not None
         partners = doubted_partners(self._robot, self._back.estimate, self._front.watch.doubted)
         return own, own or bool(partners)
+
+    @property
+    def turns_otherwise(self) -> bool:
+        """Are our turns others than our wheels say, by a tenth at least?"""
+        estimate = self._back.estimate
+        return (
+            estimate is not None
+            and estimate.converged
+            and abs(estimate.correction(self._robot).longer) >= ODD_TURN
+        )
 
     def _doubt(self) -> Doubt | None:
         estimate, front = self._back.estimate, self._front

@@ -113,9 +113,9 @@ class FrontEnd:
         """UWB ids to which ranges came in of late."""
         return self.ranges.fresh(utime)
 
-    def make_keyframe(self, is_doubted: bool = False) -> Keyframe | None:
-        """See `KeyframeSelector.next`."""
-        return self._keyframes.next(self.reckoning.track, is_doubted)
+    def make_keyframes(self, is_doubted: bool = False, is_odd: bool = False) -> list[Keyframe]:
+        """See `KeyframeSelector.made`."""
+        return self._keyframes.made(self.reckoning.track, is_doubted, is_odd)
 
     # pairs
 
@@ -330,7 +330,7 @@ class FrontEnd:
         """New distances for the graph, where module 3 knows what to do with them.
 
         Args:
-            is_doubted: see `make_keyframe`; of who makes them or of any other.
+            is_doubted: see `make_keyframes`; of who makes them or of any other.
         """
         if not self._has_ranges_in_graph:
             return []

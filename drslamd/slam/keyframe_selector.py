@@ -1,6 +1,15 @@
-"""Which samples of our odometry become keyframes of the pose graph: one a second while we move."""
+"""Which samples of our odometry become keyframes of the pose graph: one a second while we move.
+
+A robot that turns otherwise than its wheels say has some between as well, as soon as that is known,
+also of the way that it drove before. For module 3 makes other turns of a link to first order, and a
+link does not say when it was turned within it: where all turns are twice or two thirds of what they
+seem, a second's way ends 9 mm aside, which is more than the noise of odometry. Half a second has an
+eighth of that.
+"""
 
 from __future__ import annotations
+
+from collections import deque
 
 import numpy as np
 
@@ -12,12 +21,22 @@ KEYFRAME_M = 0.05
 makes no new one."""
 KEYFRAME_RAD = 0.05
 """See `KEYFRAME_M`."""
+FINER = 5
+"""Samples between finer keyframes."""
+DRIVEN = 2 * 10
+"""So long before a keyframe its robot may have begun to drive, in samples; before that it stood."""
+WAY_BACK = 1_200
+"""So many keyframes are remembered for finer ones between, 20 minutes of them ..."""
+AT_ONCE = 30
+"""... and of so many these are said at once, the newest first."""
 
 
 class KeyframeSelector:
     """Of one robot."""
 
     def __init__(self) -> None:
+        self._coarse: deque[tuple[int, Keyframe]] = deque(maxlen=WAY_BACK)
+        """Keyframes, and the one before each, between which there are no finer ones."""
         self._segment = 0
         self._segment_start: int | None = None
         self._last: Keyframe | None = None
@@ -45,5 +64,29 @@ class KeyframeSelector:
             is_still = np.hypot(moved[0], moved[1]) < KEYFRAME_M and abs(moved[2]) < KEYFRAME_RAD
             if is_still and (n == last.n or not is_doubted):
                 return None
-        self._last = Keyframe(n, self._segment, x, y, theta)
-        return self._last
+        made = Keyframe(n, self._segment, x, y, theta)
+        if self._last is not None:
+            self._coarse.append((self._last.n, made))
+        self._last = made
+        return made
+
+    def made(self, track: Track, is_doubted: bool = False, is_odd: bool = False) -> list[Keyframe]:
+        """The next one, if there is one.
+
+        Args:
+            is_doubted: see `next`; is_odd: and finer ones, because turns are not what they seem?
+        """
+        found = self.next(track, is_doubted)
+        finer = self.finer(track) if is_odd else []
+        return [*finer, *([found] if found else [])]
+
+    def finer(self, track: Track) -> list[Keyframe]:
+        """Some that lie between those that were made, and were not made yet."""
+        out = []
+        for _ in range(min(AT_ONCE, len(self._coarse))):
+            before, made = self._coarse.pop()
+            for n in range(made.n - FINER, max(before, made.n - DRIVEN), -FINER):
+                if track.covers(n, made.n):
+                    x, y, theta = (int(v) for v in track.steps(n, 1)[0])
+                    out.append(Keyframe(n, made.segment, x, y, theta))
+        return out

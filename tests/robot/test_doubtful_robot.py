@@ -169,3 +169,24 @@ def test_a_robot_that_turns_the_other_way_says_where_it_is_and_which_keys_to_set
     why = why_not_localised(scene.robot, scene.utime) or ""
     assert why.startswith("its place is known")
     assert "wheels." not in why
+
+
+@pytest.mark.parametrize(("turn", "is_odd"), [(0.0, False), (0.09, False), (-0.11, True)])
+def test_a_robot_whose_turns_are_others_than_its_wheels_say_tells_its_way_finer(
+    turn: float, is_odd: bool
+) -> None:
+    scene = localised()
+    estimate = scene.robot.back.estimate
+    assert estimate is not None
+    scene.robot.back.on_solution(replace(estimate, turn={0: Learned(turn, 0.01)}))
+    assert scene.robot.standing.turns_otherwise is is_odd
+    for _ in range(2):
+        scene.tick()
+        scene.drive(1)
+        scene.range_to(4)
+    scene.tick()
+    steps = np.diff(scene.robot.back.graph.chains[0].keyframes.n)
+    assert (steps == 5).any() == is_odd
+    # a mirror image turns as its wheels say, the other way
+    scene.robot.back.on_solution(replace(estimate, turn={0: Learned(-2.0, 0.01)}))
+    assert not scene.robot.standing.turns_otherwise

@@ -172,8 +172,8 @@ def test_who_may_move_though_its_wheels_stand_makes_keyframes() -> None:
     scene = FrontScene()
     scene.drive(5)
     # where it began, and where it is
-    assert scene.front.make_keyframe() is not None
-    assert scene.front.make_keyframe() is not None
+    assert len(scene.front.make_keyframes()) == 1
+    assert len(scene.front.make_keyframes()) == 1
     scene.front.on_motion(Motion(scene.utime + GRID_US, 0.0, 0.0))
-    assert scene.front.make_keyframe() is None
-    assert scene.front.make_keyframe(is_doubted=True) is not None
+    assert scene.front.make_keyframes() == []
+    assert len(scene.front.make_keyframes(is_doubted=True)) == 1

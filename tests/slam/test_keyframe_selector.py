@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drslamd.slam.graph.measurements import Keyframe
-from drslamd.slam.keyframe_selector import KEYFRAME_M, KEYFRAME_RAD, KeyframeSelector
+from drslamd.slam.keyframe_selector import AT_ONCE, KEYFRAME_M, KEYFRAME_RAD, KeyframeSelector
 from drslamd.slam.odometry.track import Track
 
 STEP = 1e-4
@@ -107,3 +107,46 @@ def test_behind_a_hole_a_new_segment_begins_wherever_it_is() -> None:
     robot.to(109, 5, -7, 3)
     robot.to(110, 5, -7, 3)
     assert robot.next() == Keyframe(109, 2, 5, -7, 3)
+
+
+def test_who_turns_otherwise_has_some_between_also_of_the_way_until_then() -> None:
+    """Two seconds as ever, one after it is known; what was said is not said again."""
+    robot = Driven()
+    for n in range(101, 131):
+        robot.to(n, 100 * n, 7 * n, n)
+        if n in (110, 120):
+            assert robot.next() is not None
+    found = robot.selector.made(robot.track, is_odd=True)
+    assert [k.n for k in found] == [125, 115, 105, 130]
+    assert found[0] == Keyframe(125, 0, 12500, 875, 125)
+    assert robot.selector.made(robot.track, is_odd=True) == []
+    robot.to(140, 0, 0, 0)
+    assert [k.n for k in robot.selector.made(robot.track)] == [140]
+
+
+def test_who_stood_before_has_some_only_of_where_it_may_have_driven() -> None:
+    robot = Driven()
+    for n in range(101, 301):
+        robot.to(n, 5, -7, 3)
+    robot.to(301, 9000, 0, 0)
+    assert robot.next() is not None
+    assert [k.n for k in robot.selector.finer(robot.track)] == [296, 291, 286]
+
+
+def test_across_a_hole_there_are_none() -> None:
+    robot = Driven()
+    robot.to(110, 9000, 0, 0)
+    assert robot.next() is not None
+    assert robot.selector.finer(robot.track) == []
+
+
+def test_a_long_way_is_said_piece_by_piece_the_newest_first() -> None:
+    robot = Driven()
+    for n in range(101, 101 + 10 * (AT_ONCE + 5)):
+        robot.to(n, 100 * n, 0, 0)
+        if n % 10 == 0:
+            assert robot.next() is not None
+    last = 100 + 10 * (AT_ONCE + 5)
+    first = [k.n for k in robot.selector.finer(robot.track)]
+    assert first == [last - 5 - 10 * k for k in range(AT_ONCE)]
+    assert [k.n for k in robot.selector.finer(robot.track)] == [145, 135, 125, 115, 105]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,8 @@ LINK_FLOOR_M = 5e-4
 """No wheel is better than this between two keyframes, and a robot that stands may be pushed."""
 LINK_FLOOR_RAD = 5e-4
 """Likewise of angles."""
+LEAST_WAY = 0.1
+"""Of the way that was measured; no wheels count more."""
 FAR = 128
 """So many poses lie between the ends of a factor that joins different times."""
 FAR_APART = 2**42
@@ -191,6 +193,22 @@ def odometry(graph: PoseGraph, numbers: Numbering, robots: list[int]) -> Odometr
     found = OdometryFactors(i, j, measured, covariance, of, by_yaw, by_turn)
     odd = np.isin(robots, list(numbers.mirrored))[of]
     return mirror_factors.mirrored_odometry(found, odd) if odd.any() else found
+
+
+def as_driven(
+    links: OdometryFactors, known: Mapping[int, Correction], robots: list[int]
+) -> OdometryFactors:
+    """Noise grows with the way that was driven, where that is not the one that was measured.
+
+    Args:
+        known: see `corrections`; what is learned of a scale moves a little with each solution, so
+            it counts in halves of an octave, and who holds the same has the same noise.
+    """
+    if not known:
+        return links
+    ways = np.array([max(1 - known.get(robot, Correction()).scale, LEAST_WAY) for robot in robots])
+    longer = 2 ** (np.round(2 * np.log2(ways)) / 2)
+    return replace(links, covariance=links.covariance * longer[links.robot, None, None])
 
 
 def chain_links(chain: ChainView, calibrated: bool) -> BetweenFactors:

@@ -346,3 +346,17 @@ def test_edges_all_over_the_time_are_nonsense() -> None:
 def test_far_begins_beyond_its_bound_and_so_many_may_stand(reach: int, kept: int) -> None:
     i = 10 * np.arange(factors.STANDING + 1) + 10_000 * np.arange(factors.STANDING + 1)
     assert sensible(i, i + reach).sum() == kept
+
+
+@pytest.mark.parametrize(("scale", "times"), [(-1.0, 2.0), (0.34, 0.5**0.5), (0.1, 1.0)])
+def test_links_are_as_noisy_as_the_way_that_was_driven(scale: float, times: float) -> None:
+    """In steps of half an octave: what differs by a rounding is the same noise."""
+    team = small_team(1, robots=2, count=12)
+    numbers = numbering(team.graph, members(*team.chains.values()))
+    links = factors.odometry(team.graph, numbers, [0, 1])
+    assert factors.as_driven(links, {}, [0, 1]) is links
+    found = factors.as_driven(links, {1: Correction(scale, 0.0, 0.5)}, [0, 1])
+    noisier = np.where(links.robot == 1, times, 1.0)[:, None, None]
+    assert found.covariance == pytest.approx(noisier * links.covariance)
+    near = factors.as_driven(links, {1: Correction(scale + 1e-6, 0.0, 0.5)}, [0, 1])
+    assert np.array_equal(near.covariance, found.covariance)

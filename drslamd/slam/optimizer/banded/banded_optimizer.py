@@ -146,7 +146,7 @@ def build_problem(
         initial=factors.initial_poses(graph, group, previous, places, known),
         gauge=factors.gauge_place(graph, group, places),
         pairs=len(pairs),
-        odometry=factors.odometry(graph, places, robots),
+        odometry=factors.as_driven(factors.odometry(graph, places, robots), known, robots),
         closures=hints.chosen(factors.sensible(hints.i, hints.j)),
         ranges=ranges.chosen(factors.sensible(ranges.i, ranges.j)),
         priors=priors,
