@@ -203,7 +203,8 @@ def _next_to_place(
     everything = group.everything
     for joint in joints(graph):
         a, b = joint.a in done, joint.b in done
-        if a == b or not {joint.a, joint.b} <= everything:
+        ends = {joint.a, joint.b}
+        if a == b or not ends <= everything or joint.is_mirrored is not bool(ends & group.mirrored):
             continue
         new = found.setdefault(joint.b if a else joint.a, {})
         # (what was found with b turning the other way is the mirror image where a does)

@@ -246,13 +246,13 @@ def closures(graph: PoseGraph, numbers: Numbering) -> BetweenFactors:
     table = ClosureTable(np.concatenate(rows))
     of_pair = _of_pairs([len(pair.closures) for pair in pairs])
     ends = _ends(numbers, pairs, of_pair, table.a_n, table.b_n)
-    used = np.asarray((ends >= 0).all(axis=0))
+    is_odd = np.isin(numbers.robot[ends], list(numbers.mirrored))
+    used = (ends >= 0).all(axis=0) & (table.is_mirrored == is_odd.any(axis=0))
     i, j = ends[:, used]
     table = table.chosen(used)
     found = BetweenFactors(i, j, table.a_T_b, table.covariance)
     # (those were found with b turning the other way)
-    odd = np.isin(numbers.robot[i], list(numbers.mirrored))
-    return mirror_factors.mirrored_between(found, odd) if odd.any() else found
+    return mirror_factors.mirrored_between(found, is_odd[0, used]) if is_odd.any() else found
 
 
 def ranges(graph: PoseGraph, numbers: Numbering) -> tuple[RangeFactors, list[tuple[int, int]]]:

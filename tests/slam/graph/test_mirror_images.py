@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from slam_scenes import NOISE, closure, keyframes, model_of
+import pytest
+from slam_scenes import NOISE, closure, keyframes, model_of, product
 
 from drslamd.conventions import Chain, Segment
 from drslamd.slam.graph import team_frame
 from drslamd.slam.graph.measurements import ClosureMeasurement, GraphEntry
 from drslamd.slam.graph.mirror_images import with_mirrored
 from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.graph.team_frame import Group, placed
+from drslamd.slam.optimizer import factors
 
 A, B, C, D = (Chain(robot, 1) for robot in range(4))
 NUMBERS = range(0, 100, 10)
@@ -88,3 +91,14 @@ def test_it_joins_nobody_to_anybody_else() -> None:
     graph = graph_of((A, plain(B)), (A, odd(C, 1)), (C, plain(D)))
     assert seen_by(A, graph) == (first(A, B), set())
     assert seen_by(D, graph) == (first(C, D), set())
+
+
+def test_a_closure_that_says_so_of_two_who_agree_with_others_places_nobody() -> None:
+    """A knows C by its own closure alone, and that is of the mirror image."""
+    graph = graph_of((A, plain(B)), (A, odd(C, 1)), (B, plain(C)))
+    group = Group(first(A, B, C), min(first(A)))
+    place = placed(graph, group, None)[min(first(C))][0]
+    assert place == pytest.approx(product(POSE, POSE))
+    odd_group = Group(first(A, B), min(first(A)), mirrored=frozenset(first(C)))
+    assert placed(graph, odd_group, None)[min(first(C))][0] == pytest.approx(POSE)
+    assert len(factors.closures(graph, factors.numbering(graph, first(A, B, C)))) == 2
