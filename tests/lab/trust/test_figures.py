@@ -111,6 +111,9 @@ def test_a_fault_that_cannot_be_seen_counts_for_nothing() -> None:
 def test_a_broken_world_can_be_known_from_the_first_pose_on() -> None:
     run = Run(said=[Said(25.0, 0, "odometry: slip")], localised_s=18.0)
     assert of(run, cause=ODOMETRY).cause_s == pytest.approx(7.0)
+    # and what is broken now and then once it was
+    run.evident_s = 21.0
+    assert of(run, cause=ODOMETRY).cause_s == pytest.approx(4.0)
 
 
 def test_wrong_names_are_counted_by_run() -> None:

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from lab.recordings import world
-from lab.trust import worlds
+from lab.trust import sensor_faults, worlds
 from lab.trust.worlds import World
+from slam_scenes import inverted, product
+
+SLIPS_LATE = 3
+"""A seed."""
 
 
 def test_a_world_without_faults_is_the_scene_as_it_is_simulated() -> None:
@@ -38,3 +45,24 @@ def test_corridors_are_long_and_narrow() -> None:
     spread = np.ptp(places, axis=0)
     assert spread[0] > 15
     assert spread[1] < 2.7
+
+
+def test_wheels_that_slip_can_be_known_to_once_they_have() -> None:
+    """A quarter of a metre too much, or ten degrees, of one robot since it has a pose."""
+    slips = replace(worlds.SLIP, scene=replace(worlds.SLIP.scene, seconds=20.0))
+    right, wrong = replace(slips, faults=()).recording(SLIPS_LATE), slips.recording(SLIPS_LATE)
+    since, soonest = 8.0, np.inf
+    for robot, trail in wrong.trails.items():
+        way = turned = 0.0
+        odometries = trail.odometry, right.trails[robot].odometry
+        for k in np.flatnonzero(trail.t > since):
+            steps = [product(inverted(poses[k - 1]), poses[k]) for poses in odometries]
+            off = steps[0] - steps[1]
+            way, turned = way + np.hypot(off[0], off[1]), turned + math.degrees(off[2])
+            if way > 0.25 or abs(turned) > 10:
+                soonest = min(soonest, trail.t[k])
+                break
+    assert slips.evident_s(SLIPS_LATE, since) == pytest.approx(soonest)
+    assert sensor_faults.evident_s(right, wrong, 0.0) < since < soonest < np.inf
+    assert sensor_faults.evident_s(right, wrong, np.inf) == np.inf
+    assert worlds.BLOCKED.evident_s(0, since) == since

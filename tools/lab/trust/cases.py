@@ -54,7 +54,11 @@ class Case:
         recording = fault(np.random.default_rng(seed), recording)
         run = watch(recording, seed, self.mounting.hardware(recording, seed), progress)
         run.at_fault = self.mounting.robots(seed, count)
-        run.evident_s = self.mounting.evident_s(recording, seed)
+        run.evident_s = (
+            self.mounting.evident_s(recording, seed)
+            if run.at_fault
+            else self.world.evident_s(seed, run.localised_s)
+        )
         return run
 
 

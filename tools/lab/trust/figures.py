@@ -138,8 +138,8 @@ def _ate(run: Run, without: int | None = None) -> float:
 
 
 def known_s(run: Run) -> float:
-    """From when a fault could be known; of a world that is broken all along from the first pose."""
-    return run.evident_s if run.at_fault else run.localised_s
+    """From when a fault could be known; of a world that is broken from the first pose at least."""
+    return run.evident_s if run.at_fault else max(run.evident_s, run.localised_s)
 
 
 def said_after(run: Run, is_it: Callable[[Said], bool]) -> float:

@@ -13,10 +13,7 @@ import numpy as np
 from lab.play.playback import Hardware, Wiring, equip
 from lab.recordings.recording import Array, Recording, wheel_paths
 from lab.trust import sensor_faults
-from lab.trust.sensor_faults import Fault
-
-EVIDENT_M, EVIDENT_DEG = 0.25, 10.0
-"""Wheels that have been wrong by so much since their fault began can be known to be wrong."""
+from lab.trust.sensor_faults import EVIDENT_DEG, EVIDENT_M, Fault
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,28 @@ SWING_M = (0.04, 0.10)
 """From the shortest to the longest that the bias of one module becomes when it turns."""
 
 
+EVIDENT_M, EVIDENT_DEG = 0.25, 10.0
+"""Wheels that have been wrong by so much since their fault began can be known to be wrong."""
+
+
 # wheels
+
+
+def evident_s(right: Recording, wrong: Recording, since_s: float) -> float:
+    """From when it can be known that odometry of one recording is wrong, of what it measured from
+    `since_s` on; infinite where it is not that wrong.
+
+    Args:
+        right: the same drive, measured as modelled.
+    """
+    found = [float("inf")]
+    for robot, trail in wrong.trails.items():
+        off = _steps(trail) - _steps(right.trails[robot])
+        off[trail.t[1:] <= since_s] = 0.0
+        ways, turned = np.hypot(off[:, 0], off[:, 1]).cumsum(), np.degrees(off[:, 2].cumsum())
+        is_evident = (ways > EVIDENT_M) | (np.abs(turned) > EVIDENT_DEG)
+        found += trail.t[1:][is_evident][:1].tolist()
+    return min(found)
 
 
 def slipping(rng: np.random.Generator, recording: Recording) -> Recording:
@@ -42,7 +63,7 @@ def slipping(rng: np.random.Generator, recording: Recording) -> Recording:
 
 
 def _slipped(rng: np.random.Generator, trail: Trail) -> Trail:
-    step = metrics.relative(trail.odometry[:-1], trail.odometry[1:])
+    step = _steps(trail)
     t = trail.t[1:]
     seconds = rng.random(int(trail.t[-1] / SLIP_S) + 1) < SLIP_SHARE
     step[:, :2] *= 1 + SLIP_MORE * seconds[(t / SLIP_S).astype(int)][:, None]
@@ -50,6 +71,11 @@ def _slipped(rng: np.random.Generator, trail: Trail) -> Trail:
         inside = (t >= start) & (t < start + JERK_S)
         step[inside, 2] += np.radians(JERK_DEG) * rng.choice([-1, 1]) / max(inside.sum(), 1)
     return replace(trail, odometry=_chained(trail.odometry[0], step))
+
+
+def _steps(trail: Trail) -> Array:
+    """(k, 3) of its odometry."""
+    return metrics.relative(trail.odometry[:-1], trail.odometry[1:])
 
 
 def _chained(start: Array, steps: Array) -> Array:

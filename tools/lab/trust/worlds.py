@@ -33,11 +33,16 @@ SPOT_ANTENNA_M = 0.31
 
 @dataclass(frozen=True)
 class World:
-    """A scene, who drives where in it, and what breaks the model of its sensors."""
+    """A scene, who drives where in it, and what breaks the model of its sensors.
+
+    Attributes:
+        breaks_wheels: is that wheels which are wrong now and then, and not all along?
+    """
 
     scene: Scene
     truths: Callable[[np.random.Generator, Scene], list[Array]] = paths.each_alone
     faults: tuple[Fault, ...] = ()
+    breaks_wheels: bool = False
 
     def recording(self, seed: int) -> Recording:
         """The same seed gives the same recording."""
@@ -46,6 +51,13 @@ class World:
         for fault in self.faults:
             recording = fault(rng, recording)
         return recording
+
+    def evident_s(self, seed: int, localised_s: float) -> float:
+        """From when it can be known that it is broken, of robots with a pose since then."""
+        if not self.breaks_wheels:
+            return localised_s
+        right = replace(self, faults=()).recording(seed)
+        return sensor_faults.evident_s(right, self.recording(seed), localised_s)
 
 
 def clean(robots: int) -> World:
@@ -80,7 +92,7 @@ HEAVY_TAILS = World(LONGER, faults=(sensor_faults.heavy_tailed,))
 BLOCKED = World(
     replace(LONGER, ranges=RangeModel(burst_share=0.0)), faults=(sensor_faults.blocked,)
 )
-SLIP = World(LONGER, faults=(sensor_faults.slipping,))
+SLIP = World(LONGER, faults=(sensor_faults.slipping,), breaks_wheels=True)
 ON_THE_SPOT = World(
     replace(LONGER, robots=2),
     paths.on_the_spot,
