@@ -14,6 +14,7 @@ from collections import deque
 import numpy as np
 
 from drslamd.slam.graph.measurements import Keyframe
+from drslamd.slam.graph.thinning.time_cells import RECENT_S
 from drslamd.slam.odometry.track import RESOLUTION, Track
 
 KEYFRAME_M = 0.05
@@ -25,18 +26,16 @@ FINER = 5
 """Samples between finer keyframes."""
 DRIVEN = 2 * 10
 """So long before a keyframe its robot may have begun to drive, in samples; before that it stood."""
-WAY_BACK = 1_200
-"""So many keyframes are remembered for finer ones between, 20 minutes of them ..."""
 AT_ONCE = 30
-"""... and of so many these are said at once, the newest first."""
+"""Of so many keyframes those before them are said at once, the newest first."""
 
 
 class KeyframeSelector:
     """Of one robot."""
 
     def __init__(self) -> None:
-        self._coarse: deque[tuple[int, Keyframe]] = deque(maxlen=WAY_BACK)
-        """Keyframes, and the one before each, between which there are no finer ones."""
+        self._coarse: deque[tuple[int, Keyframe]] = deque(maxlen=RECENT_S)
+        """Keyframes with no finer ones before, and the one before each; older ones are thinned."""
         self._segment = 0
         self._segment_start: int | None = None
         self._last: Keyframe | None = None

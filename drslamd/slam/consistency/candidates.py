@@ -46,8 +46,7 @@ def candidates(
     )
     sums = (own.sums[a[0]], peer.sums[b[0]])
     a_sums, b_sums = map(corrected_sums, corrections, sums)
-    ends = map(_corrected_anchor, corrections, (request.a, request.b))
-    a_end, b_end = ends
+    a_end, b_end = map(_corrected_anchor, corrections, (request.a, request.b))
     scales, turns = zip(*((c.scale, c.turn) for c in corrections), strict=True)
     out = []
     for hypothesis in estimate.hypotheses:
