@@ -9,7 +9,7 @@ from message_builders import MS, SECOND
 from drslamd.conventions import Chain
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.message_types import LogState
-from drslamd.gossip.repeats.log_repeats import Holding, holdings
+from drslamd.gossip.repeats.log_rows import Holding, holdings
 from drslamd.slam.graph.measurements import Chapter
 
 
