@@ -7,8 +7,6 @@ log; `log_repeats` says who then repeats what is missing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from drslamd.conventions import MILLISECOND_US, SECOND_US, Chain
 from drslamd.gossip.message_types import LogState
 from drslamd.gossip.repeats import log_rows

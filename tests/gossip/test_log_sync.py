@@ -283,7 +283,7 @@ def test_logs_with_gaps_take_turns_and_none_is_named_without_what_lies_beyond_th
 ) -> None:
     """Each takes 22 bytes and 14 for seven stretches, so seventeen of them fit 28 times 22."""
     logs, named = with_gaps(others), Counter[int]()
-    for _ in range(statuses):
+    for _status in range(statuses):
         rows = logs.next_states()
         told = Counter(row.id for row in rows)
         assert set(told.values()) == {1 + 7}
@@ -315,9 +315,9 @@ def test_what_a_newcomer_to_a_crowd_holds_beyond_gaps_is_not_said_to_it_again() 
 
 def test_a_status_with_room_for_another_log_leaves_none_out() -> None:
     """26 logs and 22 bytes about gaps are as long as 27."""
-    for logs, stretches, is_full in ((27, 0, False), (28, 0, True), (26, 11, False), (26, 12, True)):
+    for logs, gaps, is_full in ((27, 0, False), (28, 0, True), (26, 11, False), (26, 12, True)):
         rows = [LogState(robot, 1, 0, 0, 50) for robot in range(logs)]
-        rows += [LogState(logs - 1, 1, k, k + 1, 50) for k in range(1, 2 * stretches, 2)]
+        rows += [LogState(logs - 1, 1, k, k + 1, 50) for k in range(1, 2 * gaps, 2)]
         assert leaves_any_out(rows) == is_full
 
 
