@@ -313,14 +313,6 @@ def test_what_a_newcomer_to_a_crowd_holds_beyond_gaps_is_not_said_to_it_again() 
     assert not newcomer.lacks_any()
 
 
-def test_a_status_with_room_for_another_log_leaves_none_out() -> None:
-    """26 logs and 22 bytes about gaps are as long as 27."""
-    for logs, gaps, is_full in ((27, 0, False), (28, 0, True), (26, 11, False), (26, 12, True)):
-        rows = [LogState(robot, 1, 0, 0, 50) for robot in range(logs)]
-        rows += [LogState(logs - 1, 1, k, k + 1, 50) for k in range(1, 2 * gaps, 2)]
-        assert leaves_any_out(rows) == is_full
-
-
 def test_whoever_gets_what_it_asked_for_does_not_ask_again_at_once() -> None:
     logs = holding(5, OWNER, 0, 5)
     logs.next_states()
