@@ -271,8 +271,8 @@ def with_gaps(others: int, entries: int = 300) -> LogSync:
 
 def test_a_status_names_all_logs_of_a_small_team_and_says_what_lies_beyond_their_gaps() -> None:
     """What is said of gaps takes two bytes a stretch here, 240 in all, and the place of logs."""
-    for others, stretches in ((1, 120), (5, 120), (15, 120)):
-        rows = with_gaps(others).next_states()
+    for others, entries, stretches in ((1, 300, 120), (5, 128, 120), (15, 128, 120)):
+        rows = with_gaps(others, entries).next_states()
         assert len({row.id for row in rows}) == others
         assert stretches * 0.9 <= len(rows) - others <= stretches + others
 
@@ -281,12 +281,13 @@ def test_a_status_names_all_logs_of_a_small_team_and_says_what_lies_beyond_their
 def test_logs_with_gaps_take_turns_and_none_is_named_without_what_lies_beyond_them(
     others: int, statuses: int
 ) -> None:
-    """Each takes 22 bytes and 14 for seven stretches, so seventeen of them fit 28 times 22."""
+    """Each takes 22 bytes and 13 for six stretches, so seventeen of them fit 28 times 22."""
     logs, named = with_gaps(others), Counter[int]()
     for _status in range(statuses):
         rows = logs.next_states()
         told = Counter(row.id for row in rows)
-        assert set(told.values()) == {1 + 7}
+        assert set(told.values()) == {1 + 6}
+        assert sum(row.complete == 300 for row in rows) == len(told)
         assert leaves_any_out(rows)
         assert len(named) < others
         named.update(told.keys())

@@ -65,13 +65,16 @@ def rows(logs: Mapping[int, ReplicatedLog], order: Sequence[int]) -> list[LogSta
 
 
 def _rows_of(robot: int, log: ReplicatedLog, most: int) -> list[LogState]:
-    """Of one log, with as much about gaps as so many bytes say."""
+    """Of one log, with as much about gaps as so many bytes say: its end, which is heard as it is
+    said and must not look as if it were lacked, then from the first gap on."""
     out = [LogState(robot, log.epoch, log.start, log.complete, log.newest)]
-    for first, end in log.stretches() if log.complete < log.newest else ():
+    told = log.stretches() if log.complete < log.newest else []
+    for first, end in [*told[-1:], *told[:-1]]:
         row = LogState(robot, log.epoch, first, end, log.newest)
-        if stretches.size([*out, row]) - 1 > most:
+        more = sorted([*out, row], key=lambda row: row.complete)
+        if stretches.size(more) - 1 > most:
             break
-        out.append(row)
+        out = more
     return out
 
 

@@ -41,3 +41,10 @@ def test_where_logs_lack_little_more_of_them_are_named() -> None:
         LogState(3, 1, 0, 2, 2),
     ]
     assert len(rows(whole, sorted(whole))) == 28
+
+
+def test_the_end_of_a_log_is_told_before_the_stretches_between() -> None:
+    """Twenty logs with gaps get fourteen bytes: three for the end, then two for each stretch."""
+    logs = {robot: a_log(*range(1, 200, 2), 200, 201) for robot in range(20)}
+    told = [(row.first, row.complete) for row in rows(logs, sorted(logs)) if row.id == 0]
+    assert told == [(0, 0), (1, 2), (3, 4), (5, 6), (7, 8), (9, 10), (199, 202)]
