@@ -7,13 +7,11 @@ log; `log_repeats` says who then repeats what is missing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from drslamd.conventions import MILLISECOND_US, SECOND_US, Chain
-from drslamd.gossip.entries import stretches
-from drslamd.gossip.message_types import LOG_BYTES, MAX_BEYOND, MAX_LOGS, LogState
+from drslamd.gossip.message_types import LogState
+from drslamd.gossip.repeats import log_rows
 from drslamd.gossip.repeats.allowance import Speech
-from drslamd.gossip.repeats.log_repeats import REPEATS_AT_ONCE, LogRepeats, holdings
+from drslamd.gossip.repeats.log_repeats import REPEATS_AT_ONCE, LogRepeats
 from drslamd.gossip.replicated_log import AHEAD, ReplicatedLog
 from drslamd.slam.graph.measurements import Chapter, GraphEntry
 
@@ -21,19 +19,6 @@ ECHO_US = 200 * MILLISECOND_US
 """So late at most we hear ourselves."""
 MUCH = 650
 """Bytes of a large repeat: where there is no room for it, others say again what they can."""
-
-
-def _with_stretches(
-    state: LogState, logs: Mapping[int, ReplicatedLog], most: int
-) -> list[LogState]:
-    """A row of a status, and those that follow it in so many bytes."""
-    out, log = [state], logs[state.id]
-    for first, end in log.stretches() if log.complete < log.newest else ():
-        row = LogState(state.id, log.epoch, first, end, log.newest)
-        if stretches.size([*out, row]) > most:
-            break
-        out.append(row)
-    return out
 
 
 class LogSync:
@@ -109,23 +94,16 @@ class LogSync:
         """For our status: our own log, and those of the others, in turn when they are too many.
         Where there is room, what is held beyond a gap follows in rows of its own."""
         others = sorted(robot for robot in self._logs if robot != self._robot)
-        named = [self._robot] if self._robot in self._logs else []
-        room = MAX_LOGS - len(named)
-        if len(others) > room:
-            start = self._turn % len(others)
-            others = (others[start:] + others[:start])[:room]
-            self._turn = start + room
-        logs = {robot: self._logs[robot] for robot in named + others}
-        lacking = {robot: log for robot, log in logs.items() if log.complete < log.newest}
-        few = [min(log.newest - log.complete, REPEATS_AT_ONCE) for log in lacking.values()]
-        self._asked, self._came = sum(few), 0
-        states = [
-            LogState(robot, log.epoch, log.start, log.complete, log.newest)
-            for robot, log in logs.items()
-        ]
-        room = min(MAX_BEYOND - MAX_LOGS, LOG_BYTES * (MAX_LOGS - len(states)))
-        share = 1 + room // max(1, len(lacking))
-        return tuple(row for state in states for row in _with_stretches(state, logs, share))
+        turn = self._turn % max(1, len(others))
+        own = [self._robot] if self._robot in self._logs else []
+        rows = log_rows.rows(self._logs, own + others[turn:] + others[:turn])
+        named = {row.id for row in rows}
+        is_whole = len(named) == len(self._logs)
+        self._turn = 0 if is_whole else turn + len(named) - len(own)
+        logs = (self._logs[robot] for robot in named)
+        self._asked = sum(min(log.newest - log.complete, REPEATS_AT_ONCE) for log in logs)
+        self._came = 0
+        return tuple(rows)
 
     def epoch(self, robot: int) -> int | None:
         log = self._logs.get(robot)
@@ -177,8 +155,8 @@ class LogSync:
             log = self._logs.get(theirs.id)
             if log is not None and theirs.epoch == log.epoch:
                 self._learn(log, theirs, is_owner=theirs.id == sender)
-        left_out = self._logs.keys() - first_rows if len(first_rows) == MAX_LOGS else set()
-        self.repeats.on_status(sender, holdings(states), left_out, utime)
+        left_out = self._logs.keys() - first_rows if log_rows.leaves_any_out(states) else set()
+        self.repeats.on_status(sender, log_rows.holdings(states), left_out, utime)
 
     def _learn(self, log: ReplicatedLog, theirs: LogState, is_owner: bool) -> None:
         if theirs.id == self._robot:

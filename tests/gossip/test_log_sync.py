@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from collections import Counter
 
 import pytest
 from log_scenes import OTHER, OWNER, PEER, T0, all_repeated, holding, repeated, said, state
@@ -12,6 +13,7 @@ from drslamd.conventions import Chain
 from drslamd.gossip import replicated_log
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.message_types import LogState
+from drslamd.gossip.repeats.log_rows import leaves_any_out
 from drslamd.slam.graph.measurements import GraphEntry
 
 
@@ -258,16 +260,58 @@ def test_what_is_held_beyond_gaps_is_said_in_rows_of_its_log() -> None:
     assert rows[1:] == tuple(LogState(*OWNER, first, end, 31) for first, end in ends)
 
 
-def test_a_status_has_room_for_all_logs_whatever_lies_beyond_gaps() -> None:
+def with_gaps(others: int, entries: int = 300) -> LogSync:
+    """Of robot 0: of each log every second entry is there."""
+    logs = LogSync(0)
+    for robot in range(1, others + 1):
+        for seq in range(1, entries, 2):
+            logs.add(Chain(robot, 1), seq, said(Chain(robot, 1), seq), T0)
+    return logs
+
+
+def test_a_status_names_all_logs_of_a_small_team_and_says_what_lies_beyond_their_gaps() -> None:
     """What is said of gaps takes two bytes a stretch here, 240 in all, and the place of logs."""
-    for others, stretches in ((1, 120), (5, 120), (20, 80), (27, 0), (28, 0)):
-        logs = LogSync(0)
-        for robot in range(1, others + 1):
-            for seq in range(1, 300, 2):
-                logs.add(Chain(robot, 1), seq, b"", T0)
-        rows = logs.next_states()
+    for others, entries, stretches in ((1, 300, 120), (5, 128, 120), (15, 128, 120)):
+        rows = with_gaps(others, entries).next_states()
         assert len({row.id for row in rows}) == others
         assert stretches * 0.9 <= len(rows) - others <= stretches + others
+
+
+@pytest.mark.parametrize(("others", "statuses"), [(17, 1), (18, 2), (34, 2), (49, 3), (254, 15)])
+def test_logs_with_gaps_take_turns_and_none_is_named_without_what_lies_beyond_them(
+    others: int, statuses: int
+) -> None:
+    """Each takes 22 bytes and 13 for six stretches, so seventeen of them fit 28 times 22."""
+    logs, named = with_gaps(others), Counter[int]()
+    for _status in range(statuses):
+        rows = logs.next_states()
+        told = Counter(row.id for row in rows)
+        assert set(told.values()) == {1 + 6}
+        assert sum(row.complete == 300 for row in rows) == len(told)
+        assert leaves_any_out(rows)
+        assert len(named) < others
+        named.update(told.keys())
+    assert len(named) == others
+    assert max(named.values()) <= 2
+
+
+def test_what_a_newcomer_to_a_crowd_holds_beyond_gaps_is_not_said_to_it_again() -> None:
+    """Forty owners are silent, so one that holds their logs says what is lacked."""
+    newcomer, helper = with_gaps(40, 14), LogSync(41)
+    for robot in range(1, 41):
+        for seq in range(14):
+            helper.add(Chain(robot, 1), seq, said(Chain(robot, 1), seq), T0)
+    came = 0
+    for step in range(300):
+        utime = T0 + 10 * SECOND + step * SECOND // 10
+        if step % 10 == 0:
+            helper.on_states(newcomer.next_states(), 0, utime)
+        for robot, sealed in helper.repeats.take_due(utime):
+            seq = next(k for k in range(14) if said(Chain(robot, 1), k) == sealed)
+            assert newcomer.add(Chain(robot, 1), seq, sealed, utime)
+            came += 1
+    assert came == 40 * 7
+    assert not newcomer.lacks_any()
 
 
 def test_whoever_gets_what_it_asked_for_does_not_ask_again_at_once() -> None:

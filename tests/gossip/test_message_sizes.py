@@ -56,12 +56,12 @@ def test_a_status_that_says_what_lies_beyond_gaps_fits(others: int) -> None:
         for seq in range(1, 900, 9):
             logs.add(Chain(robot, 1), seq, b"", 0)
     rows = logs.next_states()
-    assert len({row.id for row in rows}) == min(others, 28)
     status = a_status((Heard(1, 1, 1),) * 28, rows, ranged=(1,) * 28)
     payload = messages.encode(HEADER, status)
     assert len(payload) <= 1_400
     assert messages.decode("STATUS", payload) == status
-    assert len(rows) > min(others, 28) or others > 25
+    # (of all that lack something, whoever they are)
+    assert len(rows) >= 5 * len({row.id for row in rows})
 
 
 def test_the_status_of_a_robot_that_hears_254_others_fits() -> None:

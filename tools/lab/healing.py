@@ -5,7 +5,7 @@ robots: what they measured is made up, as much as driving robots measure that al
 other. One row for each case, with what it shall show.
 
     python -m lab.healing                # the cases of a small team, three minutes
-    python -m lab.healing --all          # also an hour of partition and a newcomer to fifty robots
+    python -m lab.healing --all          # also an hour of partition and newcomers to large teams
 """
 
 from __future__ import annotations
@@ -317,6 +317,7 @@ SMALL = [
 LARGE = [
     Case("parted 60 min, loss 0%", 5, 0.0, parted(60, 2), 30),
     Case("newcomer after 60 min, loss 0%", 5, 0.0, joined(60), 30),
+    Case("newcomer to 20 after 60 min, loss 0%", 20, 0.0, joined(0), 30, remembered=60),
     Case("newcomer to 50 after 60 min, loss 0%", 50, 0.0, joined(0), 30, remembered=60),
 ]
 

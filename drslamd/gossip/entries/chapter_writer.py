@@ -106,15 +106,15 @@ class ChapterWriter:
         """The entries that follow now, from number `seq` on: one chapter, most often none. Ask once
         a second: what becomes due at once is said one chapter after the other, because each takes
         as long as sensors may wait."""
-        is_full = self._measurements >= MOST_MEASUREMENTS
-        if is_full or len(self._entries) >= (FEWEST if self._is_asked else LEVELS[0].entries):
+        most = FEWEST if self._is_asked else LEVELS[0].size(team.recent_s)
+        if len(self._entries) >= most or self._measurements >= MOST_MEASUREMENTS:
             self._is_asked = False
             new = coarse(bound(self._unsaid))
             self._entries, self._unsaid, self._measurements = [], [], 0
             return self._say(new, 0, seq, team)
         for number, level in enumerate(LEVELS[1:], start=1):
             until = utime - SECOND_US * level.age_s(team.recent_s)
-            old = self._ripe(number, seq - MOST_LAG // 2, until)
+            old = self._ripe(number, level.size(team.recent_s), seq - MOST_LAG // 2, until)
             if old is not None:
                 ends = team.named(old, level)
                 longest = int(LONGEST_STEP_S) - 1 if self._has_gyro else level.keyframes_s
@@ -123,14 +123,15 @@ class ChapterWriter:
                 return self._say(book, number, seq, team)
         return []
 
-    def _ripe(self, number: int, first: int, until: int) -> Book | None:
+    def _ripe(self, number: int, most: int, first: int, until: int) -> Book | None:
         """Chapters of the level below that together make the next one of this level, if there are.
 
         Args:
-            first: what was said before this entry has to be said now; until: what was said before
+            most: entries of which one is made; first: what was said before this entry has to be
+                said now; until: what was said before
                 this time is old enough.
         """
-        waiting, most = self._said[number - 1], LEVELS[number].entries
+        waiting = self._said[number - 1]
         if not waiting:
             return None
         is_late = is_ready = waiting[0].spans[0][0] < first

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from drslamd.conventions import MILLISECOND_US, SECOND_US
-from drslamd.gossip.message_types import LogState
 from drslamd.gossip.repeats.allowance import Allowance, Speech
+from drslamd.gossip.repeats.log_rows import Holding
 from drslamd.gossip.replicated_log import ReplicatedLog
 
 REPEATS_AT_ONCE = 12
@@ -56,27 +56,6 @@ PUSH_US = 20 * SECOND_US
 entry after half of that."""
 PRESENT_US = 30 * SECOND_US
 """Whose last status is not older may lack something."""
-
-
-class Holding(NamedTuple):
-    """What a peer says it holds of one log: all before `complete`, and what lies beyond a gap."""
-
-    epoch: int
-    complete: int
-    beyond: tuple[tuple[int, int], ...] = ()
-
-    def has(self, seq: int) -> bool:
-        return seq < self.complete or any(first <= seq < end for first, end in self.beyond)
-
-
-def holdings(states: Iterable[LogState]) -> dict[int, Holding]:
-    """By robot, of the rows of a status: the first one of a log says where its first gap is."""
-    out: dict[int, Holding] = {}
-    for row in states:
-        known = out.setdefault(row.id, Holding(row.epoch, row.complete))
-        if row.epoch == known.epoch and row.first > known.complete:
-            out[row.id] = known._replace(beyond=(*known.beyond, (row.first, row.complete)))
-    return out
 
 
 class Place(NamedTuple):

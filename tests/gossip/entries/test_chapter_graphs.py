@@ -39,7 +39,7 @@ class Pair:
         self.chains = Chain(0, 1), Chain(1, 1)
         self.graph, self.said = PoseGraph(RECENT_S), list[Said]()
         self._left: list[dict[int, GraphEntry]] = [{}, {}]
-        self._seq, self._chance = [0, 0], random.Random(5)
+        self._seq, self._chance = [0, 0], random.Random(8)
         self._writers = ChapterWriter(), ChapterWriter()
         self._place, self._last_n = np.zeros((2, 3)), [0, 0]
         self._number = 0

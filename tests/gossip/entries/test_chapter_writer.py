@@ -50,6 +50,15 @@ def test_a_chapter_is_made_of_256_entries(count: int, is_due: bool) -> None:
     assert bool(written([an_entry(k, 10 * k) for k in range(count)])) is is_due
 
 
+@pytest.mark.parametrize(("recent_s", "entries"), [(150, 128), (75, 64), (37, 64), (600, 256)])
+def test_a_large_team_which_thins_times_sooner_makes_chapters_of_fewer_entries(
+    recent_s: int, entries: int
+) -> None:
+    for count, is_due in ((entries - 1, False), (entries, True)):
+        made = written([an_entry(k, 10 * k) for k in range(count)], Audience(recent_s, 50))
+        assert bool(made) is is_due
+
+
 @pytest.mark.parametrize(
     ("count", "complete", "is_due"),
     [(15, 0, False), (16, 0, True), (16, 1, False), (40, 24, True), (40, 25, False)],
@@ -102,7 +111,7 @@ def test_a_chapter_says_all_and_its_last_part_says_for_what_it_stands() -> None:
 
 @pytest.mark.parametrize("robots", [2, 5, 20])
 def test_each_part_fits_a_message_for_which_a_team_of_this_size_has_room(robots: int) -> None:
-    said = written([busy(k, 19) for k in range(64)], Audience(300, robots))
+    said = written([busy(k, 19) for k in range(96)], Audience(300, robots))
     sizes = [len(messages.encode(HEADER, entry)) for entry in said]
     assert len(said) >= 4
     assert max(sizes) <= min(MAX_PAYLOAD, 500 * robots**0.5 + 1)
@@ -126,7 +135,7 @@ SECOND = 1_000_000
 PEER = Chain(1, 9)
 
 
-def a_log(count: int, each_s: int = 1) -> Log:
+def a_log(count: int, each_s: int = 1, audience: Audience = MANY) -> Log:
     """All that a robot says that drives straight on and ranges to one peer, what chapters stand for
     taken away; somebody asks for all that is in no chapter when it has waited for a minute or so.
 
@@ -143,7 +152,7 @@ def a_log(count: int, each_s: int = 1) -> Log:
         seq += 1
         if k % 1_000 < 80:
             writer.on_states(OWN, [LogState(*OWN, 0, 0, seq)])
-        for said in writer.due(seq, SECOND * k // each_s, MANY):
+        for said in writer.due(seq, SECOND * k // each_s, audience):
             assert said.chapter is not None
             log[seq] = said
             for first, end in said.chapter.replaces:
@@ -170,6 +179,19 @@ def test_as_a_log_ages_it_is_said_with_less_and_nothing_twice() -> None:
     assert 128 <= sum(k < 4_096 for k in places) <= 1.1 * 256
     assert 144 / 4 <= sum(6_000 <= k < 6_144 for k in frames) <= 144 / 3
     assert len(said) < 30
+
+
+def test_in_a_large_team_only_the_last_minutes_of_a_log_are_whole() -> None:
+    """Where nothing is thinned for 37 s, times 154 s old have a quarter of a minute in a cell, and
+    chapters of a minute each wait until they have 192 entries; of the first quarter of an hour four
+    ranges of four minutes stay."""
+    log = a_log(1_900, audience=Audience(37, 50))
+    said = [entry.chapter for entry in log.values() if entry.chapter]
+    seconds = {item.a_n // 10 for chapter in said for _, item in chapter.ranges}
+    seconds |= {item.a_n // 10 for entry in log.values() for item in entry.ranges}
+    assert seconds >= set(range(1_900 - 154, 1_900))
+    assert not seconds >= set(range(1_900 - 154 - 192 - 64 - 16, 1_900 - 154))
+    assert 4 * 896 / 256 <= sum(k < 896 for k in seconds) <= 1.3 * 4 * 896 / 256
 
 
 def test_a_robot_that_says_much_makes_chapters_before_they_lie_too_far_back(

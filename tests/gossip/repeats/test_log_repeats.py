@@ -9,7 +9,6 @@ from message_builders import MS, SECOND
 from drslamd.conventions import Chain
 from drslamd.gossip.log_sync import LogSync
 from drslamd.gossip.message_types import LogState
-from drslamd.gossip.repeats.log_repeats import Holding, holdings
 from drslamd.slam.graph.measurements import Chapter
 
 
@@ -223,11 +222,6 @@ def test_what_a_peer_holds_beyond_a_gap_is_not_repeated() -> None:
     rows = state(OWNER, 2, newest=9) + state(OWNER, 5, first=3) + state(OWNER, 8, first=7)
     logs.on_states(rows, PEER.robot, T0)
     assert repeated(logs, T0) == [said(OWNER, seq) for seq in (2, 5, 6, 8, 9)]
-
-
-def test_rows_of_another_start_say_nothing_of_this_one() -> None:
-    rows = state(OWNER, 2) + state(Chain(3, 2), 9, first=5) + state(OWNER, 1, first=0)
-    assert holdings(rows) == {3: Holding(1, 2)}
 
 
 def test_what_a_peer_got_from_somebody_else_meanwhile_is_not_repeated_for_it() -> None:

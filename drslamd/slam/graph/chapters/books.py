@@ -36,6 +36,7 @@ from drslamd.slam.graph.measurements import (
     Placed,
     RangeMeasurement,
 )
+from drslamd.slam.graph.thinning.time_cells import RECENT_S
 from drslamd.slam.robot_model import RobotModel
 from drslamd.slam.se2 import Array, Index
 
@@ -62,16 +63,25 @@ class Detail(NamedTuple):
     """How much chapters say.
 
     Attributes:
-        entries: of which one is made.
+        entries: of which one is made in a small team; fewest: in a large one.
         cell_s: cells of time of which few measurements stay; 0 says all.
         keyframes_s: the first keyframe of each so many seconds stays; gap_s: and those at both ends
             of a longer stand.
     """
 
     entries: int
+    fewest: int
     cell_s: int
     keyframes_s: int
     gap_s: int
+
+    def size(self, recent_s: int) -> int:
+        """Entries of which one is made, in a team whose graph thins nothing for so long.
+
+        In a large one times are thinned sooner, and each entry says more: what waits for the next
+        chapter would be most of a log.
+        """
+        return min(self.entries, max(self.fewest, self.entries * recent_s // RECENT_S))
 
     def age_s(self, recent_s: int) -> int:
         """How old all of it has to be.
@@ -87,13 +97,20 @@ class Detail(NamedTuple):
 
 
 LEVELS = (
-    Detail(256, 0, 0, 0),
-    Detail(256, 16, 4, 2),
-    Detail(1_024, 64, 16, 6),
-    Detail(4_096, 256, 16, 24),
+    Detail(256, 64, 0, 0, 0),
+    Detail(256, 192, 16, 4, 2),
+    Detail(1_024, 512, 64, 16, 6),
+    Detail(4_096, 1_024, 256, 16, 24),
 )
 """The first is four minutes long: shorter ones have more bytes, because each message has a hundred
-of its own and each column of numbers two."""
+of its own and each column of numbers two. A robot that ranges to ten others fills messages with a
+minute; and of cells of time that end in the midst of a chapter twice as much stays, so that one has
+four of them at least."""
+
+
+def by_peer(placed: Placed[RangeMeasurement] | Placed[ClosureMeasurement]) -> tuple[Chain, int]:
+    """The order in which chapters are packed."""
+    return placed[1].peer, placed[0]
 
 
 @dataclass
@@ -117,26 +134,25 @@ class Book:
     words: list[Placed[ClosureMeasurement]] = field(default_factory=list)
 
     def pieces(self, count: int) -> list[Book]:
-        """The same in so many parts of about the same size."""
+        """The same in so many parts of about the same size, each with few peers: these take bytes
+        in every part that names them."""
         out = [Book() for _ in range(count)]
         for name in ("models", "keyframes", "ranges", "closures", "words"):
             items = getattr(self, name)
+            if name in ("ranges", "closures", "words"):
+                items = sorted(items, key=by_peer)
             for k, piece in enumerate(out):
                 setattr(piece, name, items[k * len(items) // count : (k + 1) * len(items) // count])
         return out
 
     def part(self) -> Chapter:
         """It as part of a chapter, in the order in which that is packed."""
-
-        def order(placed: Placed[Item]) -> tuple[Chain, int]:
-            return placed[1].peer, placed[0]
-
         return Chapter(
             parts=0,
             models=tuple(self.models),
             keyframes=tuple(self.keyframes),
-            ranges=tuple(sorted(self.ranges, key=order)),
-            closures=tuple(sorted([*self.closures, *self.words], key=order)),
+            ranges=tuple(sorted(self.ranges, key=by_peer)),
+            closures=tuple(sorted([*self.closures, *self.words], key=by_peer)),
         )
 
 

@@ -144,6 +144,15 @@ def test_of_a_closure_the_latest_word_stays_and_of_first_words_two_of_each_cell(
     assert len(few_of_them.closures) == 2
 
 
+def test_each_part_of_a_book_names_few_peers_and_together_they_say_all_of_it() -> None:
+    peers = [Chain(robot, 1) for robot in (4, 5, 6, 7)]
+    book = a_book(driven(*reversed(peers)))
+    parts = [piece.part() for piece in book.pieces(4)]
+    assert [{item.peer for _, item in part.ranges} for part in parts] == [{p} for p in peers]
+    assert [len(part.keyframes) for part in parts] == [16] * 4
+    assert sorted(p for part in parts for p in part.ranges) == sorted(book.ranges)
+
+
 def test_the_latest_model_is_said_again() -> None:
     entries = driven()
     for k in (0, 40):
@@ -154,6 +163,23 @@ def test_the_latest_model_is_said_again() -> None:
 def test_what_was_said_again_with_less_digits_has_no_more_to_lose() -> None:
     book = a_book(driven(A))
     assert coarse(coarse(book)) == coarse(book)
+
+
+@pytest.mark.parametrize(
+    ("recent_s", "sizes"),
+    [
+        (300, [256, 256, 1_024, 4_096]),
+        (150, [128, 192, 512, 2_048]),
+        (75, [64, 192, 512, 1_024]),
+        (37, [64, 192, 512, 1_024]),
+        (1_000, [256, 256, 1_024, 4_096]),
+    ],
+)
+def test_the_sooner_a_graph_thins_times_the_fewer_entries_has_a_chapter(
+    recent_s: int, sizes: list[int]
+) -> None:
+    """In proportion to 300 s; no fewer than fill messages and have some cells of time."""
+    assert [level.size(recent_s) for level in LEVELS] == sizes
 
 
 @pytest.mark.parametrize("level", LEVELS[1:])
