@@ -53,6 +53,7 @@ SLAM_ORDER = [
     "se2",
     "chi_squared",
     "range_model",
+    "lapack",
     "odometry",
     "robot_model",
     "graph",
@@ -78,7 +79,6 @@ SLAM_ORDER = [
 """The rooms of `slam` and what stands beside them, in the order of the paper."""
 
 OPTIMIZER_ORDER = [
-    "lapack",
     "bias_prior",
     "mounting_prior",
     "sensor_priors",

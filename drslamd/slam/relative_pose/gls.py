@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import get_lapack_funcs
 
+from drslamd.slam.lapack.routines import small_cholesky, small_cholesky_solved
 from drslamd.slam.relative_pose.descent import WEAK_PRIOR
 from drslamd.slam.relative_pose.range_fit import Minima, RangeFit, stepped
 from drslamd.slam.relative_pose.window_noise import WindowNoise
@@ -27,7 +27,6 @@ LONGEST = 0.5
 """m, rad: what one step may do."""
 
 _WEAK = WEAK_PRIOR * np.eye(3)
-_factorise, _solve = get_lapack_funcs(("potrf", "potrs"), dtype=np.float64)
 
 
 class Refined(NamedTuple):
@@ -95,7 +94,7 @@ class _Refinement:
     def step(self) -> None:
         u, rows = self._live_fit.linear(self._x)
         self._renew_factors(rows[:, 4], u)
-        weighted = np.array([_solve(f, r.T)[0] for r, f in zip(rows, self._factors, strict=True)])
+        weighted = small_cholesky_solved(self._factors, rows)
         normal = rows @ weighted
         covariance = np.linalg.inv(normal[:, :3, :3] + _WEAK)
         step = -(covariance @ normal[:, :3, 4:])[..., 0]
@@ -167,8 +166,7 @@ class _Refinement:
 
 
 def _factors(covariance: Array) -> tuple[list[Array], NDArray[np.bool_]]:
-    """Cholesky factors out of lower triangles, and which of them there are."""
-    # LAPACK reads columns: what is below the diagonal here is above it there
-    found = [_factorise(c.T, overwrite_a=True, clean=False) for c in covariance]
-    sound = np.array([info == 0 for _, info in found])
-    return [f if ok else np.eye(len(f)) for (f, _), ok in zip(found, sound, strict=True)], sound
+    """Cholesky factors, ones where there are none, and which of them there are."""
+    factors, sound = small_cholesky(covariance)
+    factors[~sound] = np.eye(factors.shape[1])
+    return list(factors), sound

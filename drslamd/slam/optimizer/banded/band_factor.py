@@ -8,9 +8,9 @@ from typing import Protocol
 import numpy as np
 
 from drslamd.slam import headway
+from drslamd.slam.lapack.routines import cholesky_banded, triangular_banded
 from drslamd.slam.optimizer.banded.assembly import System
 from drslamd.slam.optimizer.banded.layout import NOWHERE
-from drslamd.slam.optimizer.lapack import cholesky_banded, triangular_banded
 from drslamd.slam.se2 import Array, Index
 
 ROOM = 64

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.linalg import get_lapack_funcs
 
+from drslamd.slam.lapack.routines import cholesky_banded, cholesky_banded_solved
 from drslamd.slam.se2 import Array, Index
 
 NARROW = 96
@@ -69,11 +69,10 @@ def _sums(at: Index, values: Array, length: int) -> Array:
 
 
 class _Band:
-    """LAPACK's banded Cholesky, in place."""
+    """LAPACK's banded Cholesky."""
 
     def __init__(self, lower: Array) -> None:
         self._lower = lower
-        (self._pbtrs,) = get_lapack_funcs(("pbtrs",), (lower,))
 
     @staticmethod
     def of(band: Array) -> _Band | None:
@@ -81,15 +80,13 @@ class _Band:
         Args:
             band: (n, w), row k holds column k of the lower triangle from the diagonal down.
         """
-        (pbtrf,) = get_lapack_funcs(("pbtrf",), (band,))
-        lower, info = pbtrf(band.T, lower=1, overwrite_ab=1)
-        return None if info else _Band(lower)
+        try:
+            return _Band(cholesky_banded(band.T))
+        except np.linalg.LinAlgError:
+            return None
 
     def solve(self, right: Array) -> Array:
-        solved, info = self._pbtrs(self._lower, right, lower=1)
-        if info:
-            raise AssertionError(f"pbtrs: argument {-info}")
-        return np.asarray(solved)
+        return cholesky_banded_solved(self._lower, right)
 
 
 class _Sparse:

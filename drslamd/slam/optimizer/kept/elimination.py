@@ -19,8 +19,8 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from drslamd.slam import headway
+from drslamd.slam.lapack.routines import inverse_triangular
 from drslamd.slam.optimizer.banded.assembly import System
-from drslamd.slam.optimizer.lapack import inverse_triangular
 from drslamd.slam.se2 import Array, Index
 
 LEAST_COLUMNS, MOST_COLUMNS = 128, 256

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from drslamd.slam.lapack.routines import cholesky_solved, inverse_triangular
 from drslamd.slam.optimizer.banded.claims import UNKNOWN, bias_sigmas
 from drslamd.slam.optimizer.banded.layout import NOWHERE
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.kept.kept_factor import Current
-from drslamd.slam.optimizer.lapack import cholesky_solved, inverse_triangular
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.se2 import Array, Index

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drslamd.slam.lapack.routines import cholesky_solved
 from drslamd.slam.optimizer.banded.assembly import System
 from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout, border_poses
 from drslamd.slam.optimizer.banded.normal_equations import Equations
@@ -20,7 +21,6 @@ from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
 from drslamd.slam.optimizer.factor_errors import RangeErrors
 from drslamd.slam.optimizer.kept.elimination import SINGLE, Elimination, Rest, eliminated
 from drslamd.slam.optimizer.kept.head import Flags, Head, Pair, Places, keys_of, tail_of
-from drslamd.slam.optimizer.lapack import cholesky_solved
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array, Index
 

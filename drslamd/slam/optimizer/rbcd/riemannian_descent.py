@@ -21,9 +21,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from drslamd.slam import headway
+from drslamd.slam.lapack.routines import cholesky_banded, cholesky_banded_solved
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.se2 import Array
 
@@ -163,7 +163,7 @@ def descend(problem: BlockProblem, x: Array, most: int = MOST_STEPS) -> tuple[Ar
         headway.mark()
         ambient = problem.gradient(x)
         gradient = tangent(x, ambient)
-        downhill = -tangent(x, cho_solve_banded((factor, True), gradient, check_finite=False))
+        downhill = -tangent(x, cholesky_banded_solved(factor, gradient))
         direction = downhill
         if before is not None:
             old_gradient, old_downhill, old_direction = before
@@ -232,7 +232,7 @@ def conditional_covariance(problem: BlockProblem, pose: int, held: int | None) -
         q[0, 2 * held : 2 * held + 2] += HOLD
     unit = np.zeros((q.shape[1], 2))
     unit[[2 * pose, 2 * pose + 1], [0, 1]] = 1
-    inverse = cho_solve_banded((_factor(q), True), unit, check_finite=False)
+    inverse = cholesky_banded_solved(_factor(q), unit)
     turn, place = (float(inverse[2 * pose + k, k].real) for k in range(2))
     return np.diag([place, place, 2 * turn])
 
@@ -241,7 +241,7 @@ def _factor(q: Array) -> Array:
     """Cholesky factor of a Hermitian band; a block without neighbours is singular by itself."""
     lifted = q.copy()
     lifted[0] = q[0].real * (1 + REGULARISATION) + REGULARISATION
-    return np.asarray(cholesky_banded(lifted, lower=True, check_finite=False))
+    return cholesky_banded(lifted)
 
 
 def tangent(x: Array, vectors: Array) -> Array:
