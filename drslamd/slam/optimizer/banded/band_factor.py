@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from drslamd.slam import headway
-from drslamd.slam.lapack.routines import cholesky_banded, triangular_banded
+from drslamd.slam.lapack.routines import cholesky_banded, inverse_triangular, triangular_banded
 from drslamd.slam.optimizer.banded.assembly import System
 from drslamd.slam.optimizer.banded.layout import NOWHERE
 from drslamd.slam.se2 import Array, Index
@@ -17,6 +17,10 @@ ROOM = 64
 """Poses that `selected_inverse` does before it moves its window: moving costs as much as some."""
 AT_ONCE, ROWS_AT_ONCE = 128, 4096
 """Columns and rows between two signs of headway: a second, with a hundred robots."""
+MANY = 512
+"""Columns, as of thirty robots that have met, that are worth dense blocks ..."""
+ROWS = 256
+"""... of that height."""
 
 
 class Solver(Protocol):
@@ -119,11 +123,46 @@ class BandFactor:
 def _through(lower: Array, columns: Array, transposed: bool = False) -> Array:
     """`triangular_banded`, some columns at a time: all of a large team take many seconds, in which
     nobody could tell a long computation from one that is stuck."""
+    if columns.shape[1] >= MANY:
+        return _through_blocks(lower, columns, transposed)
     done = []
     for first in range(0, max(columns.shape[1], 1), AT_ONCE):
         headway.mark()
         done.append(triangular_banded(lower, columns[:, first : first + AT_ONCE], transposed))
     return done[0] if len(done) == 1 else np.concatenate(done, axis=1)
+
+
+def _through_blocks(lower: Array, columns: Array, transposed: bool) -> Array:
+    """The same some rows at a time, each as far as they reach: dense blocks go through the
+    processor several times faster than column by column."""
+    solved: Array = columns.copy(order="C")
+    firsts = range(0, len(solved), ROWS)
+    for first in reversed(firsts) if transposed else firsts:
+        headway.mark()
+        own = slice(first, min(first + ROWS, len(solved)))
+        before, aside, corner = _rows(lower, own)
+        inverse = inverse_triangular(corner)
+        if transposed:
+            solved[own] = inverse.T @ solved[own]
+            solved[before] -= aside.T @ solved[own]
+        else:
+            solved[own] = inverse @ (solved[own] - aside @ solved[before])
+    return solved
+
+
+def _rows(lower: Array, own: slice) -> tuple[slice, Array, Array]:
+    """Rows of L, (w, n) in lower banded form: before themselves they reach these columns, with
+    that; and what they have in their own ones."""
+    width = len(lower)
+    start, height = max(own.start - width + 1, 0), own.stop - own.start
+    dense = np.zeros((height, own.stop - start))
+    for below in range(min(width, own.stop)):
+        # a diagonal: row i stands in column i - below
+        rows = np.arange(max(own.start, below), own.stop)
+        dense[rows - own.start, rows - below - start] = lower[below, rows - below]
+    apart = own.start - start
+    unused = int(np.argmax(np.append(dense[:, :apart].any(axis=0), True)))
+    return slice(start + unused, own.start), dense[:, unused:apart], dense[:, apart:]
 
 
 def _squared(columns: Array) -> Array:

@@ -57,7 +57,8 @@ they came from; but where those are missing nothing else holds the group togethe
 
 
 MANY_NEW = 5
-"""So many keyframes of each robot may be new to a problem that is said to be near its solution."""
+"""So many keyframes of each robot may be new to a problem that is said to be near its solution; of
+larger teams as many as there are robots, since solutions of theirs are as many seconds apart."""
 
 
 def anew(
@@ -197,7 +198,7 @@ def _is_near(previous: TeamEstimate | None, group: Group, keyframes: Mapping[Cha
     if not previous.converged or known.keys() != keyframes.keys():
         return False
     new = sum(len(np.setdiff1d(n, known[chain])) for chain, n in keyframes.items())
-    return new <= MANY_NEW * len(known)
+    return new <= max(MANY_NEW, len(known)) * len(known)
 
 
 def _start(

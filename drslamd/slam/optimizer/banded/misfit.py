@@ -35,6 +35,11 @@ FEW_OUTLIERS = 0.06
 """Of the ranges of any pair, when odometry alone was at fault; 0.08 to 0.21 where ranges were."""
 OUTLIER_SIGMAS = 2.5
 """Of what a range was sent with: beyond it, it is an outlier."""
+BY_CHANCE = 1e-3
+"""Of ranges that are as modelled: what they are sent with is more than they scatter."""
+HALF_A_PAIR = 0.5
+"""Pairs of a team: when fewer than that are expected to have so many outliers by chance, a pair
+that has them says something. One of ten ranges does among thirty pairs, not among a thousand."""
 BLOCKED_SHARE = 0.15
 """Of a pair between which sight was blocked; others come to 0.13 where ranges of some are."""
 RUN = 4
@@ -166,8 +171,17 @@ def too_long(problem: Problem, point: Point) -> NDArray[np.bool_]:
 
 
 def outlier_share(problem: Problem, point: Point) -> Array:
-    """(pairs,) of the ranges of each pair; none of no ranges."""
-    return share(problem, outliers(problem, point))
+    """(pairs,) of the ranges of each pair; none of no ranges, nor where it may be by chance."""
+    wrong, pair = outliers(problem, point), problem.ranges.pair
+    count, several = (np.bincount(pair, of, problem.pairs) for of in (None, wrong))
+    expected = problem.pairs * _chance(count * BY_CHANCE, several.astype(int))
+    return np.where(expected < HALF_A_PAIR, share(problem, wrong), 0.0)
+
+
+def _chance(mean: Array, count: Index) -> Array:
+    """Of so many or more of what is as rare as that (Poisson's first term)."""
+    factorials = np.cumprod(np.maximum(np.arange(1.0 + count.max(initial=0)), 1.0))
+    return np.asarray(mean**count / factorials[count])
 
 
 def many_wrong(problem: Problem, point: Point) -> bool:

@@ -55,10 +55,10 @@ def approach(
             gradient[layout.poses] = chart.pulled(gradient[layout.poses], at[layout.poses])
         step = matrix.solved(-gradient)
         size = float(np.abs(step[layout.poses]).max())
-        if not size < FARTHEST:
-            return None
         if not count:
             is_turning = size > TURNS * chart.own_size(step[layout.poses])
+        if not (chart.own_size(step[layout.poses]) if is_turning else size) < FARTHEST:
+            return None
         places, steps, gradients = (
             [*kept[-DEPTH:], new]
             for kept, new in ((places, at), (steps, step), (gradients, gradient))

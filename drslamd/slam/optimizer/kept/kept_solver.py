@@ -23,7 +23,7 @@ from drslamd.slam.optimizer.banded.pairs import narrowing
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.kept import kept_claims, kept_factor, quick_check
-from drslamd.slam.optimizer.kept.fixed_point import approach
+from drslamd.slam.optimizer.kept.fixed_point import MOST, approach
 from drslamd.slam.optimizer.kept.head import LONG_TAIL, Pair, tail_of
 from drslamd.slam.optimizer.kept.kept_factor import (
     Believed,
@@ -45,6 +45,10 @@ GROWN = 1.1
 
 FEW = 400
 """Poses: a smaller problem is solved anew in the time of what is done beside a kept factor."""
+
+MANY, PATIENT = 4000, 36
+"""Poses: to solve a larger problem anew takes ten times as long as to try a kept factor, and a new
+factor as long as a hundred steps. So that is tried though the team turns, and for so many steps."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +145,7 @@ def solve(
         kept: what came of the solution before.
     """
     is_turning = isinstance(kept, KeptShares) and kept.is_turning
-    if team.is_near and len(team.problem.n) >= FEW and not is_turning:
+    if team.is_near and len(team.problem.n) >= (MANY if is_turning else FEW):
         for before in (kept, None) if isinstance(kept, Kept) else (None,):
             found = _solved(team, last, tolerance, before)
             if found is not None:
@@ -168,7 +172,8 @@ def _solved(
     if current is None:
         return None
     equations = Equations(problem, layout=current.places.flat)
-    point = approach(equations, start, current, tolerance)
+    most = MOST if len(problem.n) < MANY else PATIENT
+    point = approach(equations, start, current, tolerance, most)
     if point is None:
         return None
     variances = kept.variances if kept else mountings.variances(equations, point, current)

@@ -9,9 +9,16 @@ from scipy.linalg import cholesky_banded
 from slam_scenes import Array
 
 from drslamd.slam import headway
+from drslamd.slam.lapack.routines import triangular_banded
 from drslamd.slam.optimizer.banded import band_factor
 from drslamd.slam.optimizer.banded.assembly import System
-from drslamd.slam.optimizer.banded.band_factor import ROOM, BandFactor, selected_inverse
+from drslamd.slam.optimizer.banded.band_factor import (
+    MANY,
+    ROOM,
+    BandFactor,
+    _through,
+    selected_inverse,
+)
 from drslamd.slam.optimizer.banded.layout import NOWHERE
 
 
@@ -49,6 +56,22 @@ def test_solutions_are_those_of_the_dense_matrix(poses: int, reach: int, border:
         found = factor.solved(right)
         assert found is not None
         assert np.allclose(found, np.linalg.solve(full, right), atol=1e-10)
+
+
+@pytest.mark.parametrize(("poses", "reach"), [(3, 1), (200, 0), (200, 30), (171, 170)])
+@pytest.mark.parametrize("transposed", [False, True])
+def test_many_columns_are_solved_in_blocks(poses: int, reach: int, transposed: bool) -> None:
+    """Of 256 rows: less than one, some, and rows that reach over two and more."""
+    lower = factorised(a_system(poses, reach, 0)).lower
+    columns = np.random.default_rng(1).normal(size=(3 * poses, MANY))
+    before = columns.copy()
+    found = _through(lower, columns, transposed)
+    right = triangular_banded(lower, columns, transposed)
+    assert np.array_equal(columns, before)
+    assert np.abs(found - right).max() < 1e-12 * np.abs(right).max()
+    # column by column it would be the same to the last bit
+    assert poses < 4 or not np.array_equal(found, right)
+    assert np.array_equal(_through(lower, columns[:, 1:], transposed), right[:, 1:])
 
 
 def test_damping_is_added_to_the_diagonal_relative_to_it() -> None:

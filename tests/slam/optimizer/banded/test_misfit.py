@@ -166,6 +166,33 @@ def test_shares_of_outliers_are_those_of_each_pair() -> None:
 
 
 @pytest.mark.parametrize(
+    ("pairs", "several", "count", "share"),
+    [
+        (28, 1, 16, 1 / 16),  # 28 pairs with one of 16 where 1/1000 is wrong: 0.448 of them
+        (33, 1, 16, 0.0),
+        (1000, 1, 2, 0.0),
+        (1000, 2, 20, 0.1),  # 1000 * 0.02^2 / 2 = 0.2
+        (1000, 2, 33, 0.0),  # 1000 * 0.033^2 / 2 = 0.54
+        (1000, 3, 33, 3 / 33),  # 1000 * 0.033^3 / 6 = 0.006
+    ],
+)
+def test_among_many_pairs_some_have_outliers_by_chance(
+    pairs: int, several: int, count: int, share: float
+) -> None:
+    problem, point = errs(np.array([9.0] * several + [0.0] * (count - several)))
+    found = outlier_share(_Beside(problem, pairs), point)  # type: ignore[arg-type]
+    assert found[0] == pytest.approx(share)
+    assert not found[1:].any()
+
+
+class _Beside:
+    """A problem with more pairs, which have no ranges."""
+
+    def __init__(self, problem: Problem, pairs: int) -> None:
+        self.ranges, self.is_blocked, self.pairs = problem.ranges, problem.is_blocked, pairs
+
+
+@pytest.mark.parametrize(
     ("wrong", "good", "expected"),
     [(3, 10, False), (4, 10, True), (4, 62, True), (4, 63, False), (0, 5, False)],
 )

@@ -78,7 +78,7 @@ def test_mixing_saves_steps(team: TeamProblem, monkeypatch: pytest.MonkeyPatch) 
     assert plain is None or mixed.steps < plain.steps
 
 
-def test_what_is_far_away_or_slow_is_not_reached(team: TeamProblem) -> None:
+def test_what_is_far_from_its_neighbours_or_slow_is_not_reached(team: TeamProblem) -> None:
     problem = team.problem
     right = solution(team)
     flat = Equations(problem, layout=BandLayout.flat(problem))
@@ -86,5 +86,11 @@ def test_what_is_far_away_or_slow_is_not_reached(team: TeamProblem) -> None:
     near = Point.of(problem, right.poses + 0.001, right.calibration)
     assert approach(flat, near, matrix, 1e-6) is not None
     assert approach(flat, near, matrix, 1e-9, most=2) is None
-    far = Point.of(problem, right.poses + [5.0, 0.0, 0.0], right.calibration)
-    assert approach(flat, far, matrix, 1e-6) is None
+    # one pose away from those beside it is far, all of them together are not
+    poses = right.poses.copy()
+    poses[-1, 0] += 5.0
+    assert approach(flat, Point.of(problem, poses, right.calibration), matrix, 1e-6) is None
+    beside = Point.of(problem, right.poses + [5.0, 0.0, 0.0], right.calibration)
+    found = approach(flat, beside, matrix, 1e-6)
+    assert found is not None
+    assert np.abs(found.poses - right.poses).max() < 1e-6

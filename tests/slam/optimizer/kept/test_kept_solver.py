@@ -143,6 +143,18 @@ def test_whatever_does_not_fit_is_solved_anew(fault: str, monkeypatch: pytest.Mo
     assert all(second.is_right() and second.began_anew for second in seconds)
 
 
+@pytest.mark.parametrize(("more", "steps"), [(0, 36), (1, 12)])
+def test_steps_of_a_large_problem_are_cheaper_than_a_matrix(
+    more: int, steps: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = []
+    monkeypatch.setattr(kept_solver, "approach", lambda *args: said.append(args[-1]))
+    team = replace(a_team_problem(), is_near=True)
+    monkeypatch.setattr(kept_solver, "MANY", len(team.problem.n) + more)
+    kept_solver.solve(team, (), 1e-6)
+    assert said == [steps]
+
+
 @pytest.mark.parametrize(("more", "is_anew"), [(0, False), (1, True)])
 def test_a_small_problem_is_solved_anew(
     more: int, is_anew: bool, monkeypatch: pytest.MonkeyPatch
@@ -197,16 +209,20 @@ def test_shares_are_not_found_each_second(few: int, monkeypatch: pytest.MonkeyPa
     assert len(times) <= 1
 
 
-@pytest.mark.parametrize("is_turning", [False, True])
-def test_a_team_that_turns_is_not_solved_from_what_is_kept(
-    is_turning: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("is_turning", "more", "is_tried"),
+    [(False, 1, True), (True, 1, False), (True, 0, True)],
+)
+def test_a_team_that_turns_is_not_solved_from_what_is_kept_unless_it_is_large(
+    is_turning: bool, more: int, is_tried: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A matrix is one of how the team stood."""
     tried = []
     monkeypatch.setattr(kept_solver, "_solved", lambda *args: tried.append(args))
     team = replace(a_team_problem(), is_near=True)
+    monkeypatch.setattr(kept_solver, "MANY", len(team.problem.n) + more)
     last = tuple(int(np.flatnonzero(team.problem.robot == robot)[-1]) for robot in range(3))
     kept = replace(kept_solver.KeptShares.of(team, last, np.ones((0, 0))), is_turning=is_turning)
     _, after = kept_solver.solve(team, last, 1e-6, kept)
-    assert len(tried) == (0 if is_turning else 1)
+    assert len(tried) == is_tried
     assert isinstance(after, kept_solver.KeptShares)
