@@ -34,6 +34,7 @@ from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.banded.banded_optimizer import (
     SCALE_TAILS,
     YAW_PRIOR_FLOOR,
+    _is_near,
     build_problem,
 )
 from drslamd.slam.optimizer.banded.solution import Solution
@@ -564,3 +565,19 @@ def _as_of_twin(c: ClosureMeasurement, owner: Chain, odd: int) -> ClosureMeasure
     x, y, theta = c.a_T_b
     seen = (x, -y, -theta) if owner.robot == odd else c.a_T_b
     return replace(c, a_T_b=seen, corrected=(0.0, 0.0, 0.0, -2.0))
+
+
+@pytest.mark.parametrize(
+    ("robots", "new", "is_near"), [(3, 5, True), (3, 6, False), (8, 8, True), (8, 9, False)]
+)
+def test_keyframes_that_are_new_since_a_solution_leave_it_near_more_of_them_in_a_large_team(
+    robots: int, new: int, is_near: bool
+) -> None:
+    chains = [Chain(robot, 1) for robot in range(robots)]
+    known, frame = np.arange(20), Segment(*chains[0], 0)
+    paths = {c.robot: Trajectory(c, known, np.zeros((20, 3))) for c in chains}
+    group = Group({Segment(*c, 0) for c in chains}, frame)
+    now = {c: np.arange(20 + new) for c in chains}
+    assert _is_near(TeamEstimate(frame, paths), group, now) is is_near
+    worse = TeamEstimate(frame, paths, is_as_modelled=False)
+    assert not _is_near(worse, group, now)
