@@ -76,7 +76,7 @@ def solve(
         point.calibration,
         cost=equations.cost(point, point.threshold),
         iterations=nominal.steps,
-        converged=nominal.converged or problem.is_blocked,
+        converged=nominal.converged or problem.blocked is not None,
         scatter=scatter,
         joint=joint,
         shares=_shares(explained, joint, biases, wanted, known),
@@ -128,6 +128,6 @@ def _is_as_modelled(explained: Explanation, level: Array) -> bool:
         level: (m,) sigmas of odometry over what is configured.
     """
     problem = explained.equations.problem
-    if explained.other is not None or problem.is_blocked or (level > 1).any():
+    if explained.other is not None or problem.blocked is not None or (level > 1).any():
         return False
     return not many_wrong(problem, explained.point)

@@ -4,7 +4,7 @@ A solution as configured is asked three questions: does odometry fit, do ranges 
 track or antenna ask to be another one? Most often all is well. Else odometry that was worse all
 along is tried (`common_level`), then wheels that stood or spun (`lapses`), then mountings
 (`mountings`), which explain a fault for good and must explain more than such odometry, then sight
-that was blocked (`Problem.is_blocked`), and then odometry that was worse for a while
+that was blocked (`Problem.blocked`), and then odometry that was worse for a while
 (`odometry_levels`).
 """
 
@@ -24,6 +24,8 @@ from drslamd.slam.optimizer.banded.misfit import (
     Run,
     guessed_misfit,
     has_passed,
+    has_witnesses,
+    long_for_long,
     many_wrong,
     misfit,
     outlier_share,
@@ -44,6 +46,9 @@ MANY_OUTLIERS = 2 * FEW_OUTLIERS
 NOT_WHEELS = 5
 """Ranges of a pair, one a second, since all was as modelled: wheels that stood or spun are found
 sooner, and until they are, ranges of theirs may all seem too long."""
+FAR = 10
+"""Times the steps that a solution takes otherwise: two or three times as many are the most that was
+seen, eight now and then, and a way that is broken off looks like another cause for a while."""
 MUCH = 100.0
 """Of cost: a mounting that takes away so much is right, though something else is wrong as well."""
 
@@ -94,6 +99,9 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
         nominal: the solution as configured, or with the mountings that were let go before.
         most, tolerance: of further solutions, see `descend`.
     """
+    sight = _by_sight(equations, nominal, most, tolerance)
+    if sight is not None and has_witnesses(sight.equations.problem, sight.point):
+        return sight
     equations, nominal = settled(equations, nominal, most, tolerance)
     check = _checked(equations, nominal)
     fits = check.is_passed() and not check.scores.ask() and _fits(equations, nominal)
@@ -122,8 +130,7 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
             bases.insert(0, (mounted, better, again))
         if common is not None:
             return _commonly(equations, common)
-    sight = _by_sight(equations, nominal, most, tolerance)
-    if sight is not None:
+    if sight is not None and has_passed(sight.equations.problem, sight.point):
         return sight
     if check.is_passed() and not check.scores.ask_alone():
         return _as_is(equations, nominal, check.ratio)
@@ -150,19 +157,27 @@ def _by_lapse(
 def _by_sight(
     equations: Equations, nominal: Point, most: int, tolerance: float
 ) -> Explanation | None:
-    """Sight was blocked for long, if that explains all: then hardly a range is too short, wheels
-    are as configured, and somewhere sight is free again."""
+    """Sight was blocked for long, if that explains all: then hardly a range is too short, and
+    wheels are as configured, also where something of theirs was freed before."""
     problem = equations.problem
-    if not many_wrong(problem, nominal) or _is_new(problem):
+    if problem.told is None and (not many_wrong(problem, nominal) or _is_new(problem)):
         return None
-    blocked = replace(problem, initial=nominal.poses, is_blocked=True)
-    better = Equations(blocked, like=equations)
+    told, anybody = problem.told or problem, np.ones(problem.pairs, dtype=bool)
+    everywhere = replace(told, initial=nominal.poses, blocked=anybody)
     # it is far from here: a solution that was bent until the ranges fit leads astray
-    point = descend(better, nominal.calibration, 2 * most, tolerance)
-    if not point.converged or not _fits(better, point) or not has_passed(blocked, point):
+    wide = Equations(everywhere, like=equations)
+    point = descend(wide, nominal.calibration, FAR * most, tolerance)
+    if not point.converged or not _fits(wide, point):
         return None
-    check = _checked(better, point)
-    return _as_is(better, point, check.ratio) if check.is_passed() else None
+    # the others are believed as always
+    hidden = long_for_long(everywhere, point)
+    somewhere = Equations(replace(told, initial=point.poses, blocked=hidden), like=equations)
+    better = descend(somewhere, point.calibration, FAR * most, tolerance)
+    for found, at in ((somewhere, better), (wide, point)):
+        check = _checked(found, at)
+        if at.converged and _fits(found, at) and check.is_passed():
+            return _as_is(found, at, check.ratio)
+    return None
 
 
 def _is_new(problem: Problem) -> bool:

@@ -11,7 +11,7 @@ nothing. Therefore outliers are counted too, and the run of them that lasts unti
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -41,6 +41,8 @@ RUN = 4
 """Outliers of one pair that follow each other, at one a second; bursts are shorter."""
 OF_RUN = 0.8
 """Share of the ranges since its beginning that are outliers."""
+LONG = 2 * RUN
+"""A robot that was not where it seems to be would by then not fit anybody."""
 
 LAST = 10
 """Ranges of a pair that are held against their sigmas together: a solution that was bent until the
@@ -152,7 +154,9 @@ def squares_of_ranges(problem: Problem, point: Point) -> Array:
 def sigmas_off(problem: Problem, point: Point) -> Array:
     """(n,) how far ranges are off the solution; too long ones of blocked sight are not."""
     off = point.sight.error / problem.ranges.sigma
-    return np.maximum(off, 0.0) if problem.is_blocked else np.abs(off)
+    if problem.blocked is None:
+        return np.abs(off)
+    return np.where(problem.blocked[problem.ranges.pair], np.maximum(off, 0.0), np.abs(off))
 
 
 def outliers(problem: Problem, point: Point) -> NDArray[np.bool_]:
@@ -187,6 +191,14 @@ def has_passed(problem: Problem, point: Point) -> bool:
     lasted = count >= RUN
     is_next = pair[1:] == pair[:-1]
     return bool((is_next & is_long[:-1] & lasted[:-1] & lasted[1:]).any())
+
+
+def long_for_long(problem: Problem, point: Point) -> NDArray[np.bool_]:
+    """(pairs,) whose ranges were too long for longer than bursts last."""
+    pair, is_long, count = _stretches(problem, too_long(problem, point))
+    found = np.zeros(problem.pairs, dtype=bool)
+    found[pair[is_long & (count >= RUN)]] = True
+    return found
 
 
 def _stretches(
@@ -239,7 +251,7 @@ def contradicted(problem: Problem, point: Point) -> NDArray[np.bool_]:
 def blocked(problem: Problem, point: Point) -> NDArray[np.bool_]:
     """(pairs,) of whose ranges many are too long, where that explains what was measured."""
     far = share(problem, too_long(problem, point)) >= BLOCKED_SHARE
-    return far if problem.is_blocked else np.zeros(problem.pairs, dtype=bool)
+    return np.zeros(problem.pairs, dtype=bool) if problem.blocked is None else far
 
 
 def lately_wrong(problem: Problem, point: Point) -> NDArray[np.bool_]:
@@ -273,6 +285,26 @@ def runs(problem: Problem, point: Point) -> list[Run]:
         (i, j), (n_i, n_j) = np.searchsorted(robots, problem.robot[ends]), problem.n[ends]
         found.append(Run(int(i), int(j), int(n_i), int(n_j), count))
     return found
+
+
+def has_witnesses(problem: Problem, point: Point) -> bool:
+    """Are ranges of some pairs wrong until now, for long, while those of both its robots with
+    somebody else have fit as long? Then neither is elsewhere, and what lies between them has come.
+    """
+    problem = replace(problem, blocked=None)
+    found = runs(problem, point)
+    if max((run.count for run in found), default=0) < LONG:
+        return False
+    robots, wrong = np.unique(problem.robot), outliers(problem, point)
+    ends = np.stack([problem.ranges.i, problem.ranges.j])
+    whose, n = np.searchsorted(robots, problem.robot[ends]), problem.n[ends]
+    for run in found:
+        for robot, other, since in ((run.i, run.j, run.n_i), (run.j, run.i, run.n_j)):
+            beside = ((whose == robot) & (n >= since)).any(axis=0) & (whose != other).all(axis=0)
+            count = np.count_nonzero(beside)
+            if 2 * count < run.count or np.count_nonzero(wrong & beside) > (1 - OF_RUN) * count:
+                return False
+    return True
 
 
 def with_runs(problem: Problem, point: Point) -> Index:

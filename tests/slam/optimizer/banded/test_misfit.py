@@ -22,6 +22,8 @@ from drslamd.slam.optimizer.banded.misfit import (
     contradicted,
     guessed_misfit,
     has_passed,
+    has_witnesses,
+    long_for_long,
     many_wrong,
     misfit,
     outlier_share,
@@ -207,7 +209,7 @@ def test_ranges_that_are_too_long_are_none_the_other_way() -> None:
     problem, point = errs(np.array([2.4, 2.6, -2.6, 0.0]))
     assert too_long(problem, point).tolist() == [False, True, False, False]
     # a problem in which sight is blocked does not count them as wrong
-    blocked_too = replace(problem, is_blocked=True)
+    blocked_too = replace(problem, blocked=np.ones(3, dtype=bool))
     assert outliers(problem, point).tolist() == [False, True, True, False]
     assert outliers(blocked_too, point).tolist() == [False, False, True, False]
     assert sigmas_off(blocked_too, point) == pytest.approx([0.0, 0.0, 2.6, 0.0])
@@ -219,7 +221,56 @@ def test_pairs_with_many_ranges_that_are_too_long_are_blocked_where_that_explain
     sigmas[[0, 5, 9, 20, 30]], sigmas[[25, 35]] = 9.0, -9.0
     problem, point = errs(sigmas, pair)
     assert blocked(problem, point).tolist() == [False] * 3
-    assert blocked(replace(problem, is_blocked=True), point).tolist() == [True, False, False]
+    assert blocked(replace(problem, blocked=np.ones(3, dtype=bool)), point).tolist() == [
+        True,
+        False,
+        False,
+    ]
+
+
+def between_three(*pairs: str) -> tuple[Problem, Point]:
+    """Ranges of robots 0 and 1, 0 and 2, 1 and 2: too long `x`, right `o` and none `-`."""
+    sigmas = np.array([[9.0 if c == "x" else 0.0 for c in pair] for pair in pairs])
+    problem, _ = team_problem(4, robots=3, count=sigmas.shape[1])
+    nothing = Calibration.zero(3, 3)
+    ranges = problem.ranges
+    apart = Point.of(problem, problem.initial, nothing).sight.error
+    right = ranges.measured + apart + sigmas.T.ravel() * ranges.sigma
+    is_there = np.array([[c != "-" for c in pair] for pair in pairs]).T.ravel()
+    problem = replace(problem, ranges=replace(ranges, measured=right).chosen(is_there))
+    return problem, Point.of(problem, problem.initial, nothing)
+
+
+@pytest.mark.parametrize(
+    ("between", "beside", "expected"),
+    [
+        ("ooooxxxxxxxx", "oooooooooooo", True),
+        ("oooooxxxxxxx", "oooooooooooo", False),
+        ("xxxxxxxxooooooooooo", "ooooooooooooooooooo", False),
+        ("oooooooooooo", "oooooooooooo", False),
+        ("ooooxxxxxxxx", "oooooooxoooo", True),
+        ("ooooxxxxxxxx", "oooooxoxoooo", False),
+        ("ooooxxxxxxxx", "oooo-o-o-o-o", True),
+        ("ooooxxxxxxxx", "oooo-o-o-o--", False),
+        ("ooooxxxxxxxx", "oooooooxxxxx", False),
+        ("xxxxxxxxxxxx", "xxxxoooooooo", False),
+    ],
+)
+def test_what_came_between_two_is_seen_by_a_third_that_sees_both(
+    between: str, beside: str, expected: bool
+) -> None:
+    right = "o" * len(between)
+    assert has_witnesses(*between_three(between, beside, right)) is expected
+    assert has_witnesses(*between_three(between, right, beside)) is expected
+
+
+def test_two_robots_alone_have_no_witness() -> None:
+    assert not has_witnesses(*errs(np.array([0.0] * 4 + [9.0] * 12)))
+
+
+def test_whoever_was_hidden_for_longer_than_a_burst_was_hidden_for_long() -> None:
+    problem, point = between_three("oxxxxooooooo", "oxxxoxxxoooo", "oooooooooooo")
+    assert long_for_long(problem, point).tolist() == [True, False, False]
 
 
 # runs
