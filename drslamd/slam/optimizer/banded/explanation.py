@@ -10,7 +10,7 @@ that was blocked (`Problem.blocked`), and then odometry that was worse for a whi
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,19 +23,17 @@ from drslamd.slam.optimizer.banded.misfit import (
     FEW_OUTLIERS,
     Run,
     guessed_misfit,
-    has_passed,
-    has_witnesses,
-    long_for_long,
     many_wrong,
     misfit,
     outlier_share,
     runs,
 )
 from drslamd.slam.optimizer.banded.mountings import Scores
-from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import STANDS_OUT, TARGET
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.banded.sight import hidden_search
+from drslamd.slam.optimizer.banded.sight.hidden import has_passed, has_witnesses
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array
 
@@ -46,9 +44,6 @@ MANY_OUTLIERS = 2 * FEW_OUTLIERS
 NOT_WHEELS = 5
 """Ranges of a pair, one a second, since all was as modelled: wheels that stood or spun are found
 sooner, and until they are, ranges of theirs may all seem too long."""
-FAR = 10
-"""Times the steps that a solution takes otherwise: two or three times as many are the most that was
-seen, eight now and then, and a way that is broken off looks like another cause for a while."""
 MUCH = 100.0
 """Of cost: a mounting that takes away so much is right, though something else is wrong as well."""
 
@@ -162,21 +157,10 @@ def _by_sight(
     problem = equations.problem
     if problem.told is None and (not many_wrong(problem, nominal) or _is_new(problem)):
         return None
-    told, anybody = problem.told or problem, np.ones(problem.pairs, dtype=bool)
-    everywhere = replace(told, initial=nominal.poses, blocked=anybody)
-    # it is far from here: a solution that was bent until the ranges fit leads astray
-    wide = Equations(everywhere, like=equations)
-    point = descend(wide, nominal.calibration, FAR * most, tolerance)
-    if not point.converged or not _fits(wide, point):
-        return None
-    # the others are believed as always
-    hidden = long_for_long(everywhere, point)
-    somewhere = Equations(replace(told, initial=point.poses, blocked=hidden), like=equations)
-    better = descend(somewhere, point.calibration, FAR * most, tolerance)
-    for found, at in ((somewhere, better), (wide, point)):
-        check = _checked(found, at)
-        if at.converged and _fits(found, at) and check.is_passed():
-            return _as_is(found, at, check.ratio)
+    for found, point in hidden_search.solutions(equations, nominal, most, tolerance):
+        check = _checked(found, point)
+        if _fits(found, point) and check.is_passed():
+            return _as_is(found, point, check.ratio)
     return None
 
 

@@ -11,7 +11,7 @@ nothing. Therefore outliers are counted too, and the run of them that lasts unti
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -35,14 +35,10 @@ FEW_OUTLIERS = 0.06
 """Of the ranges of any pair, when odometry alone was at fault; 0.08 to 0.21 where ranges were."""
 OUTLIER_SIGMAS = 2.5
 """Of what a range was sent with: beyond it, it is an outlier."""
-BLOCKED_SHARE = 0.15
-"""Of a pair between which sight was blocked; others come to 0.13 where ranges of some are."""
 RUN = 4
 """Outliers of one pair that follow each other, at one a second; bursts are shorter."""
 OF_RUN = 0.8
 """Share of the ranges since its beginning that are outliers."""
-LONG = 2 * RUN
-"""A robot that was not where it seems to be would by then not fit anybody."""
 
 LAST = 10
 """Ranges of a pair that are held against their sigmas together: a solution that was bent until the
@@ -164,11 +160,6 @@ def outliers(problem: Problem, point: Point) -> NDArray[np.bool_]:
     return np.asarray(sigmas_off(problem, point) > OUTLIER_SIGMAS)
 
 
-def too_long(problem: Problem, point: Point) -> NDArray[np.bool_]:
-    """(n,) which of the ranges are longer by far than the solution has them."""
-    return np.asarray(point.sight.error < -OUTLIER_SIGMAS * problem.ranges.sigma)
-
-
 def outlier_share(problem: Problem, point: Point) -> Array:
     """(pairs,) of the ranges of each pair; none of no ranges."""
     return share(problem, outliers(problem, point))
@@ -180,30 +171,11 @@ def many_wrong(problem: Problem, point: Point) -> bool:
     many = share(problem, wrong) >= FEW_OUTLIERS
     if not many.any():
         return False
-    pair, is_wrong, count = _stretches(problem, wrong)
+    pair, is_wrong, count = in_a_row(problem, wrong)
     return bool((many[pair] & is_wrong & (count >= RUN)).any())
 
 
-def has_passed(problem: Problem, point: Point) -> bool:
-    """Were ranges of any pair too long for longer than bursts last, and do they fit again since?
-    Where wheels stood or spun they do not."""
-    pair, is_long, count = _stretches(problem, too_long(problem, point))
-    lasted = count >= RUN
-    is_next = pair[1:] == pair[:-1]
-    return bool((is_next & is_long[:-1] & lasted[:-1] & lasted[1:]).any())
-
-
-def long_for_long(problem: Problem, point: Point) -> NDArray[np.bool_]:
-    """(pairs,) whose ranges were too long for longer than bursts last."""
-    pair, is_long, count = _stretches(problem, too_long(problem, point))
-    found = np.zeros(problem.pairs, dtype=bool)
-    found[pair[is_long & (count >= RUN)]] = True
-    return found
-
-
-def _stretches(
-    problem: Problem, which: NDArray[np.bool_]
-) -> tuple[Index, NDArray[np.bool_], Index]:
+def in_a_row(problem: Problem, which: NDArray[np.bool_]) -> tuple[Index, NDArray[np.bool_], Index]:
     """(k,) of which pair each stretch of ranges is that are alike, are they among those (n,), and
     how many there are; pair by pair in the order of time."""
     ranges = problem.ranges
@@ -248,12 +220,6 @@ def contradicted(problem: Problem, point: Point) -> NDArray[np.bool_]:
     return found
 
 
-def blocked(problem: Problem, point: Point) -> NDArray[np.bool_]:
-    """(pairs,) of whose ranges many are too long, where that explains what was measured."""
-    far = share(problem, too_long(problem, point)) >= BLOCKED_SHARE
-    return np.zeros(problem.pairs, dtype=bool) if problem.blocked is None else far
-
-
 def lately_wrong(problem: Problem, point: Point) -> NDArray[np.bool_]:
     """(pairs,) of whose ranges of late many do not fit."""
     pair, n = problem.ranges.pair, problem.n[problem.ranges.i]
@@ -285,26 +251,6 @@ def runs(problem: Problem, point: Point) -> list[Run]:
         (i, j), (n_i, n_j) = np.searchsorted(robots, problem.robot[ends]), problem.n[ends]
         found.append(Run(int(i), int(j), int(n_i), int(n_j), count))
     return found
-
-
-def has_witnesses(problem: Problem, point: Point) -> bool:
-    """Are ranges of some pairs wrong until now, for long, while those of both its robots with
-    somebody else have fit as long? Then neither is elsewhere, and what lies between them has come.
-    """
-    problem = replace(problem, blocked=None)
-    found = runs(problem, point)
-    if max((run.count for run in found), default=0) < LONG:
-        return False
-    robots, wrong = np.unique(problem.robot), outliers(problem, point)
-    ends = np.stack([problem.ranges.i, problem.ranges.j])
-    whose, n = np.searchsorted(robots, problem.robot[ends]), problem.n[ends]
-    for run in found:
-        for robot, other, since in ((run.i, run.j, run.n_i), (run.j, run.i, run.n_j)):
-            beside = ((whose == robot) & (n >= since)).any(axis=0) & (whose != other).all(axis=0)
-            count = np.count_nonzero(beside)
-            if 2 * count < run.count or np.count_nonzero(wrong & beside) > (1 - OF_RUN) * count:
-                return False
-    return True
 
 
 def with_runs(problem: Problem, point: Point) -> Index:

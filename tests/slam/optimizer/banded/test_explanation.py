@@ -27,10 +27,8 @@ from drslamd.slam.optimizer.banded.explanation import MUCH, NOT_WHEELS, Explanat
 from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.lapses.stretches import freed_links, with_freed
 from drslamd.slam.optimizer.banded.misfit import (
-    LONG,
     Misfit,
     Run,
-    blocked,
     guessed_misfit,
     misfit,
     outlier_share,
@@ -41,6 +39,7 @@ from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import STANDS_OUT, TARGET, Levels, raised
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.banded.sight.hidden import LONG, blocked
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
 
