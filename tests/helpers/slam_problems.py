@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from slam_scenes import Array, inverted, product, wander
 
+from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.problem import (
     BetweenFactors,
@@ -17,7 +18,7 @@ from drslamd.slam.optimizer.problem import (
     Problem,
     RangeFactors,
 )
-from drslamd.slam.optimizer.sensor_priors import Priors
+from drslamd.slam.optimizer.sensor_priors import Calibration, Priors
 from drslamd.slam.range_model import LINKTRACK
 
 BIAS = BiasPrior(sigma=0.6, spread=0.3, dof=3.0, team=0.1)
@@ -274,3 +275,17 @@ def held_at(problem: Problem, truth: Array) -> Problem:
     start = problem.initial.copy()
     start[problem.gauge] = truth[problem.gauge]
     return replace(problem, initial=start)
+
+
+def errs(sigmas: Array, pair: Array | None = None) -> tuple[Problem, Point]:
+    """Ranges between robots that stand, so many sigmas too long, one a second."""
+    problem, _ = team_problem(4, robots=3, count=len(sigmas))
+    pair = np.zeros(len(sigmas), dtype=int) if pair is None else pair
+    rows = 3 * np.arange(len(sigmas)) + pair
+    ranges = problem.ranges.chosen(np.isin(np.arange(len(problem.ranges)), rows))
+    problem = replace(problem, ranges=ranges)
+    nothing = Calibration.zero(3, 3)
+    apart = Point.of(problem, problem.initial, nothing).sight.error
+    right = ranges.measured + apart + sigmas * ranges.sigma
+    problem = replace(problem, ranges=replace(ranges, measured=right))
+    return problem, Point.of(problem, problem.initial, nothing)

@@ -266,10 +266,11 @@ class Problem:
         doubted: whose mountings are unknowns; those of the others are as configured.
         model: of its ranges.
         freed: of what odometry says.
+        told: the same with nothing freed, where something is.
         fitted: (robots,) keyframes until which all was as modelled not long ago; none where left
             out.
-        is_blocked: was sight blocked for long? A signal that went around something is too long and
-            never too short.
+        blocked: (pairs,) between whom sight was blocked for long, nobody where left out: a signal
+            that went around something is too long and never too short.
     """
 
     robot: Index
@@ -285,8 +286,9 @@ class Problem:
     range_sigma: float = 0.1
     model: RangeModel = LINKTRACK
     freed: tuple[Freed, ...] = ()
+    told: Problem | None = None
     fitted: Array | None = None
-    is_blocked: bool = False
+    blocked: NDArray[np.bool_] | None = None
 
     def cuts(self, threshold: Array, error: Array) -> Array:
         """(n,) sigmas beyond which each range loses weight.
@@ -295,7 +297,9 @@ class Problem:
             threshold: (pairs,) of each pair; error: (n,) predicted minus measured.
         """
         cut = threshold[self.ranges.pair]
-        return np.where(error < 0, TOO_LONG * cut, cut) if self.is_blocked else cut
+        if self.blocked is None:
+            return cut
+        return np.where((error < 0) & self.blocked[self.ranges.pair], TOO_LONG * cut, cut)
 
     @cached_property
     def ends(self) -> Index:

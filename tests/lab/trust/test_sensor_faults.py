@@ -90,6 +90,21 @@ def test_both_modules_of_a_pair_are_blocked_alike() -> None:
     assert np.array_equal(sides[0], sides[1])
 
 
+def test_a_wall_hides_one_pair_from_some_moment_on() -> None:
+    scene = replace(SCENE, robots=3, seconds=60.0)
+    before = world.simulate(scene, 3)
+    after = sensor_faults.walled(np.random.default_rng(5), before)
+    more = after.ranges[:, 3] - before.ranges[:, 3]
+    hidden = more > 0
+    assert np.unique(np.sort(after.ranges[hidden, 1:3], axis=1), axis=0).shape == (1, 2)
+    size, since = np.unique(more[hidden].round(9)), after.ranges[hidden, 0].min()
+    assert len(size) == 1
+    assert sensor_faults.WALL_M[0] <= size[0] <= sensor_faults.WALL_M[1]
+    assert sensor_faults.WALL_S[0] <= since <= sensor_faults.WALL_S[1] + 1 / scene.range_hz
+    pair = (np.sort(after.ranges[:, 1:3], axis=1) == np.sort(after.ranges[hidden][0, 1:3])).all(1)
+    assert (hidden == (pair & (after.ranges[:, 0] >= since))).all()
+
+
 def test_heavy_tails_are_as_wide_as_stated_and_know_no_bounds() -> None:
     found = extra(sensor_faults.heavy_tailed)
     # half of Student's t of 2 degrees is within 0.816

@@ -98,6 +98,7 @@ def _worlds() -> list[Case]:
         _world("slow-biases", "biases that move in 30 s", w.SLOW_BIASES, promises.BROKEN),
         _world("heavy-tails", "range noise without bounds", w.HEAVY_TAILS, promises.BROKEN, UNSEEN),
         _world("blocked", "sight blocked 40 % of the time", w.BLOCKED, SAID, UNSEEN),
+        _world("walled", "two lose sight of each other", w.WALLED, SAID, UNSEEN),
         _world("slip", "wheels slip 8 % of the time", w.SLIP, SAID, SLIPS),
         Case("patrol", lanes, w.PATROL, promises.PATROL, SEEDS, PATROL_SEED),
         Case("on-the-spot", spot, w.ON_THE_SPOT, promises.ON_THE_SPOT, SPOT_SEEDS),

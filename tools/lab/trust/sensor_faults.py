@@ -25,6 +25,9 @@ BLOCKED_SHARE, BLOCKED_S = 0.4, 10.0
 BLOCKED_LEAST_M, BLOCKED_MEAN_M = 0.3, 1.0
 """By how much ranges are then too long, at least, and beyond that in the mean."""
 
+WALL_S, WALL_M = (35.0, 55.0), (0.5, 1.5)
+"""When sight between two is gone for good, and how much too long ranges are from then on."""
+
 TAILS_M, TAILS_DOF = 0.05, 2
 """Student's distribution of so few degrees has no variance."""
 
@@ -107,6 +110,16 @@ def blocked(rng: np.random.Generator, recording: Recording) -> Recording:
         return out
 
     return lengthened(recording, extra)
+
+
+def walled(rng: np.random.Generator, recording: Recording) -> Recording:
+    """Two robots lose sight of each other, and stay so."""
+    robots = sorted(recording.trails)
+    hidden = tuple(sorted(rng.choice(robots, 2, replace=False).tolist()))
+    since, size = rng.uniform(*WALL_S), rng.uniform(*WALL_M)
+    return lengthened(
+        recording, lambda a, b, t: np.where((t >= since) & ((a, b) == hidden), size, 0.0)
+    )
 
 
 def heavy_tailed(rng: np.random.Generator, recording: Recording) -> Recording:

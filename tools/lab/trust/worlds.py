@@ -92,6 +92,7 @@ HEAVY_TAILS = World(LONGER, faults=(sensor_faults.heavy_tailed,))
 BLOCKED = World(
     replace(LONGER, ranges=RangeModel(burst_share=0.0)), faults=(sensor_faults.blocked,)
 )
+WALLED = World(LONGER, faults=(sensor_faults.walled,))
 SLIP = World(LONGER, faults=(sensor_faults.slipping,), breaks_wheels=True)
 ON_THE_SPOT = World(
     replace(LONGER, robots=2),

@@ -18,11 +18,12 @@ from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.explanation import Explanation, explain
 from drslamd.slam.optimizer.banded.lapses.known_lapses import still_freed
 from drslamd.slam.optimizer.banded.lapses.stretches import under
-from drslamd.slam.optimizer.banded.misfit import blocked, contradicted, many_wrong
+from drslamd.slam.optimizer.banded.misfit import contradicted, many_wrong
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import FIRST_LEVEL, raised
 from drslamd.slam.optimizer.banded.pairs import narrowing
+from drslamd.slam.optimizer.banded.sight.hidden import blocked
 from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
@@ -76,7 +77,7 @@ def solve(
         point.calibration,
         cost=equations.cost(point, point.threshold),
         iterations=nominal.steps,
-        converged=nominal.converged or problem.is_blocked,
+        converged=nominal.converged or problem.blocked is not None,
         scatter=scatter,
         joint=joint,
         shares=_shares(explained, joint, biases, wanted, known),
@@ -128,6 +129,6 @@ def _is_as_modelled(explained: Explanation, level: Array) -> bool:
         level: (m,) sigmas of odometry over what is configured.
     """
     problem = explained.equations.problem
-    if explained.other is not None or problem.is_blocked or (level > 1).any():
+    if explained.other is not None or problem.blocked is not None or (level > 1).any():
         return False
     return not many_wrong(problem, explained.point)

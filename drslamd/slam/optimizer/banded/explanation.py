@@ -4,13 +4,13 @@ A solution as configured is asked three questions: does odometry fit, do ranges 
 track or antenna ask to be another one? Most often all is well. Else odometry that was worse all
 along is tried (`common_level`), then wheels that stood or spun (`lapses`), then mountings
 (`mountings`), which explain a fault for good and must explain more than such odometry, then sight
-that was blocked (`Problem.is_blocked`), and then odometry that was worse for a while
+that was blocked (`Problem.blocked`), and then odometry that was worse for a while
 (`odometry_levels`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,17 +23,17 @@ from drslamd.slam.optimizer.banded.misfit import (
     FEW_OUTLIERS,
     Run,
     guessed_misfit,
-    has_passed,
     many_wrong,
     misfit,
     outlier_share,
     runs,
 )
 from drslamd.slam.optimizer.banded.mountings import Scores
-from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import STANDS_OUT, TARGET
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.banded.sight import hidden_search
+from drslamd.slam.optimizer.banded.sight.hidden import has_passed, has_witnesses
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array
 
@@ -94,6 +94,9 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
         nominal: the solution as configured, or with the mountings that were let go before.
         most, tolerance: of further solutions, see `descend`.
     """
+    sight = _by_sight(equations, nominal, most, tolerance)
+    if sight is not None and has_witnesses(sight.equations.problem, sight.point):
+        return sight
     equations, nominal = settled(equations, nominal, most, tolerance)
     check = _checked(equations, nominal)
     fits = check.is_passed() and not check.scores.ask() and _fits(equations, nominal)
@@ -122,8 +125,7 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
             bases.insert(0, (mounted, better, again))
         if common is not None:
             return _commonly(equations, common)
-    sight = _by_sight(equations, nominal, most, tolerance)
-    if sight is not None:
+    if sight is not None and has_passed(sight.equations.problem, sight.point):
         return sight
     if check.is_passed() and not check.scores.ask_alone():
         return _as_is(equations, nominal, check.ratio)
@@ -150,19 +152,16 @@ def _by_lapse(
 def _by_sight(
     equations: Equations, nominal: Point, most: int, tolerance: float
 ) -> Explanation | None:
-    """Sight was blocked for long, if that explains all: then hardly a range is too short, wheels
-    are as configured, and somewhere sight is free again."""
+    """Sight was blocked for long, if that explains all: then hardly a range is too short, and
+    wheels are as configured, also where something of theirs was freed before."""
     problem = equations.problem
-    if not many_wrong(problem, nominal) or _is_new(problem):
+    if problem.told is None and (not many_wrong(problem, nominal) or _is_new(problem)):
         return None
-    blocked = replace(problem, initial=nominal.poses, is_blocked=True)
-    better = Equations(blocked, like=equations)
-    # it is far from here: a solution that was bent until the ranges fit leads astray
-    point = descend(better, nominal.calibration, 2 * most, tolerance)
-    if not point.converged or not _fits(better, point) or not has_passed(blocked, point):
-        return None
-    check = _checked(better, point)
-    return _as_is(better, point, check.ratio) if check.is_passed() else None
+    for found, point in hidden_search.solutions(equations, nominal, most, tolerance):
+        check = _checked(found, point)
+        if _fits(found, point) and check.is_passed():
+            return _as_is(found, point, check.ratio)
+    return None
 
 
 def _is_new(problem: Problem) -> bool:

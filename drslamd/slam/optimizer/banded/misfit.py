@@ -40,8 +40,6 @@ BY_CHANCE = 1e-3
 HALF_A_PAIR = 0.5
 """Pairs of a team: when fewer than that are expected to have so many outliers by chance, a pair
 that has them says something. One of ten ranges does among thirty pairs, not among a thousand."""
-BLOCKED_SHARE = 0.15
-"""Of a pair between which sight was blocked; others come to 0.13 where ranges of some are."""
 RUN = 4
 """Outliers of one pair that follow each other, at one a second; bursts are shorter."""
 OF_RUN = 0.8
@@ -157,17 +155,14 @@ def squares_of_ranges(problem: Problem, point: Point) -> Array:
 def sigmas_off(problem: Problem, point: Point) -> Array:
     """(n,) how far ranges are off the solution; too long ones of blocked sight are not."""
     off = point.sight.error / problem.ranges.sigma
-    return np.maximum(off, 0.0) if problem.is_blocked else np.abs(off)
+    if problem.blocked is None:
+        return np.abs(off)
+    return np.where(problem.blocked[problem.ranges.pair], np.maximum(off, 0.0), np.abs(off))
 
 
 def outliers(problem: Problem, point: Point) -> NDArray[np.bool_]:
     """(n,) which of the ranges are far off the solution."""
     return np.asarray(sigmas_off(problem, point) > OUTLIER_SIGMAS)
-
-
-def too_long(problem: Problem, point: Point) -> NDArray[np.bool_]:
-    """(n,) which of the ranges are longer by far than the solution has them."""
-    return np.asarray(point.sight.error < -OUTLIER_SIGMAS * problem.ranges.sigma)
 
 
 def outlier_share(problem: Problem, point: Point) -> Array:
@@ -190,22 +185,11 @@ def many_wrong(problem: Problem, point: Point) -> bool:
     many = share(problem, wrong) >= FEW_OUTLIERS
     if not many.any():
         return False
-    pair, is_wrong, count = _stretches(problem, wrong)
+    pair, is_wrong, count = in_a_row(problem, wrong)
     return bool((many[pair] & is_wrong & (count >= RUN)).any())
 
 
-def has_passed(problem: Problem, point: Point) -> bool:
-    """Were ranges of any pair too long for longer than bursts last, and do they fit again since?
-    Where wheels stood or spun they do not."""
-    pair, is_long, count = _stretches(problem, too_long(problem, point))
-    lasted = count >= RUN
-    is_next = pair[1:] == pair[:-1]
-    return bool((is_next & is_long[:-1] & lasted[:-1] & lasted[1:]).any())
-
-
-def _stretches(
-    problem: Problem, which: NDArray[np.bool_]
-) -> tuple[Index, NDArray[np.bool_], Index]:
+def in_a_row(problem: Problem, which: NDArray[np.bool_]) -> tuple[Index, NDArray[np.bool_], Index]:
     """(k,) of which pair each stretch of ranges is that are alike, are they among those (n,), and
     how many there are; pair by pair in the order of time."""
     ranges = problem.ranges
@@ -248,12 +232,6 @@ def contradicted(problem: Problem, point: Point) -> NDArray[np.bool_]:
         between = np.isin(ends, robots[[run.i, run.j]]).all(axis=0)
         found[problem.ranges.pair[between]] = True
     return found
-
-
-def blocked(problem: Problem, point: Point) -> NDArray[np.bool_]:
-    """(pairs,) of whose ranges many are too long, where that explains what was measured."""
-    far = share(problem, too_long(problem, point)) >= BLOCKED_SHARE
-    return far if problem.is_blocked else np.zeros(problem.pairs, dtype=bool)
 
 
 def lately_wrong(problem: Problem, point: Point) -> NDArray[np.bool_]:

@@ -25,10 +25,10 @@ from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.common_level import ASKS, TAILS, CommonLevel
 from drslamd.slam.optimizer.banded.explanation import MUCH, NOT_WHEELS, Explanation, explain
 from drslamd.slam.optimizer.banded.lapses import lapse_search
+from drslamd.slam.optimizer.banded.lapses.stretches import freed_links, with_freed
 from drslamd.slam.optimizer.banded.misfit import (
     Misfit,
     Run,
-    blocked,
     guessed_misfit,
     misfit,
     outlier_share,
@@ -39,6 +39,7 @@ from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import STANDS_OUT, TARGET, Levels, raised
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.banded.sight.hidden import LONG, blocked
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
 
@@ -605,7 +606,7 @@ def test_where_sight_was_blocked_that_explains_it_and_wheels_are_as_configured(s
     problem, truth = around_walls(seed)
     point = nominal(problem)
     found = explained(problem, point)
-    assert found.equations.problem.is_blocked
+    assert found.equations.problem.blocked is not None
     assert found.other is None
     assert (found.level == 1).all()
     assert found.lately.max() < STANDS_OUT
@@ -614,9 +615,33 @@ def test_where_sight_was_blocked_that_explains_it_and_wheels_are_as_configured(s
     assert np.flatnonzero(pairs).tolist() == list(WALLS)
 
 
+@pytest.mark.parametrize(("ranges", "is_found"), [(LONG - 1, False), (LONG, True)])
+def test_a_wall_that_came_between_two_is_known_once_others_have_seen_both_for_long(
+    ranges: int, is_found: bool
+) -> None:
+    """Wheels that stood or spun would explain it as well until then."""
+    found = explained(beside(3, COUNT - ranges, metres=1.0))
+    assert (found.equations.problem.blocked is not None) is is_found
+    if is_found:
+        assert np.flatnonzero(found.equations.problem.blocked).tolist() == [0]
+        assert not found.equations.problem.freed
+
+
+def test_what_was_freed_for_a_wall_is_told_again_once_the_wall_is_known() -> None:
+    problem, truth = beside(3, 25, metres=1.0), a_team(3)[1]
+    links = np.flatnonzero((problem.odometry.robot == 0) & (problem.odometry.i // ROBOTS == 25))
+    freed = with_freed(problem, freed_links(problem, 0, links, False))
+    point = nominal(freed)
+    found = explained(freed, point)
+    assert not found.equations.problem.freed
+    assert np.array_equal(found.equations.problem.odometry.covariance, problem.odometry.covariance)
+    clean = nominal(a_team(3)[0])
+    assert worst(found.point, truth) < 1.2 * worst(clean, truth) < worst(point, truth)
+
+
 def test_one_pair_whose_ranges_are_too_short_is_out_of_no_sight() -> None:
     found = explained(beside(1, 30, metres=-2.0))
-    assert not found.equations.problem.is_blocked
+    assert found.equations.problem.blocked is None
     assert found.other is not None
 
 
@@ -628,7 +653,7 @@ def test_what_began_just_now_may_be_wheels_until_they_had_time_to_show_it(
     newest = np.array([problem.n[problem.robot == robot].max() for robot in range(ROBOTS)])
     problem = replace(problem, fitted=newest - 10 * ranges)
     found = explained(problem, nominal(problem))
-    assert found.equations.problem.is_blocked is is_asked
+    assert (found.equations.problem.blocked is not None) is is_asked
 
 
 def test_who_stood_all_the_time_does_not_hide_that_the_others_have_driven() -> None:
@@ -636,7 +661,7 @@ def test_who_stood_all_the_time_does_not_hide_that_the_others_have_driven() -> N
     newest = np.array([problem.n[problem.robot == robot].max() for robot in range(ROBOTS)])
     parked = np.array([True, False, False, False])
     problem = replace(problem, fitted=newest - np.where(parked, 0, 10 * NOT_WHEELS))
-    assert explained(problem, nominal(problem)).equations.problem.is_blocked
+    assert explained(problem, nominal(problem)).equations.problem.blocked is not None
 
 
 @pytest.mark.parametrize(
@@ -651,11 +676,11 @@ def test_sight_must_leave_hardly_a_range_too_short_and_nobody_at_fault(
 
     def said(first: Any, *rest: Any) -> Any:
         problem = getattr(first, "problem", first)
-        if name != "many_wrong" and not problem.is_blocked:
+        if name != "many_wrong" and problem.blocked is None:
             return was(first, *rest)
         if verdict is None:
             return replace(was(first, *rest), ratio=np.full(ROBOTS, STANDS_OUT + 1e-6))
         return verdict
 
     monkeypatch.setattr(explanation, name, said)
-    assert not explained(problem, point).equations.problem.is_blocked
+    assert explained(problem, point).equations.problem.blocked is None

@@ -155,7 +155,8 @@ def a_range(sigmas: float, is_blocked: bool = False) -> linearised.Linearised:
     known = replace(KNOWN, near_bias=np.zeros(1))
     error = of_ranges(replace(PROBLEM, ranges=ranges), POSES, known)
     ranges = replace(ranges, measured=ranges.measured + error - sigmas * ranges.sigma)
-    problem = replace(PROBLEM, ranges=ranges, is_blocked=is_blocked)
+    blocked = np.arange(3) == ranges.pair[0] if is_blocked else None
+    problem = replace(PROBLEM, ranges=ranges, blocked=blocked)
     return linearised.ranges_at(problem, point_at(problem, POSES, known, np.full(3, 2.0)))
 
 

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from dense_problems import link_misfit, packed
-from slam_problems import CLOCKS, no_ranges, pose_edges, team_problem
-from slam_scenes import Array
+from slam_problems import CLOCKS, errs, no_ranges, pose_edges, team_problem
 
 from drslamd.slam.optimizer.banded import misfit as misfit_module
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
@@ -18,18 +17,14 @@ from drslamd.slam.optimizer.banded.misfit import (
     RUN,
     Misfit,
     Run,
-    blocked,
     contradicted,
     guessed_misfit,
-    has_passed,
     many_wrong,
     misfit,
     outlier_share,
     outliers,
     runs,
-    sigmas_off,
     squares_of_ranges,
-    too_long,
 )
 from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
@@ -132,20 +127,6 @@ def test_ratios_are_held_at_one_by_one_degree_of_freedom() -> None:
 # outliers
 
 
-def errs(sigmas: Array, pair: Array | None = None) -> tuple[Problem, Point]:
-    """Ranges between robots that stand, so many sigmas too long, one a second."""
-    problem, _ = team_problem(4, robots=3, count=len(sigmas))
-    pair = np.zeros(len(sigmas), dtype=int) if pair is None else pair
-    rows = 3 * np.arange(len(sigmas)) + pair
-    ranges = problem.ranges.chosen(np.isin(np.arange(len(problem.ranges)), rows))
-    problem = replace(problem, ranges=ranges)
-    nothing = Calibration.zero(3, 3)
-    apart = Point.of(problem, problem.initial, nothing).sight.error
-    right = ranges.measured + apart + sigmas * ranges.sigma
-    problem = replace(problem, ranges=replace(ranges, measured=right))
-    return problem, Point.of(problem, problem.initial, nothing)
-
-
 @pytest.mark.parametrize("times", [0.99, 1.01, -0.99, -1.01])
 def test_a_range_is_an_outlier_beyond_two_and_a_half_sigmas(times: float) -> None:
     problem, point = errs(np.array([0.0, times * 2.5, 0.0]))
@@ -210,43 +191,6 @@ def test_bursts_are_many_ranges_and_not_for_long() -> None:
     sigmas = np.array([0.0, 0, 0, 0, 9, 9, 9, 9, 0, 0, 0, 0])
     assert not many_wrong(*errs(sigmas, pair))
     assert many_wrong(*errs(sigmas, np.zeros(12, dtype=int)))
-
-
-@pytest.mark.parametrize(
-    ("ranges", "expected"),
-    [
-        ("ooooxxxxoooo", True),
-        ("xxxxoooo", True),
-        ("oooxxxoooo", False),
-        ("ooooxxxxooo", False),
-        ("ooooooxxxxx", False),
-        ("ooooxxxxoxxxx", False),
-        ("oooossssoooo", False),
-    ],
-)
-def test_sight_was_blocked_where_it_is_free_again(ranges: str, expected: bool) -> None:
-    """Too long `x`, too short `s`."""
-    sigmas = np.array([{"x": 9.0, "s": -9.0}.get(c, 0.0) for c in ranges])
-    assert has_passed(*errs(sigmas)) is expected
-
-
-def test_ranges_that_are_too_long_are_none_the_other_way() -> None:
-    problem, point = errs(np.array([2.4, 2.6, -2.6, 0.0]))
-    assert too_long(problem, point).tolist() == [False, True, False, False]
-    # a problem in which sight is blocked does not count them as wrong
-    blocked_too = replace(problem, is_blocked=True)
-    assert outliers(problem, point).tolist() == [False, True, True, False]
-    assert outliers(blocked_too, point).tolist() == [False, False, True, False]
-    assert sigmas_off(blocked_too, point) == pytest.approx([0.0, 0.0, 2.6, 0.0])
-
-
-def test_pairs_with_many_ranges_that_are_too_long_are_blocked_where_that_explains_them() -> None:
-    """Three of 20 of one, and two of 20 of another that also has some that are too short."""
-    pair, sigmas = np.repeat([0, 1], 20), np.zeros(40)
-    sigmas[[0, 5, 9, 20, 30]], sigmas[[25, 35]] = 9.0, -9.0
-    problem, point = errs(sigmas, pair)
-    assert blocked(problem, point).tolist() == [False] * 3
-    assert blocked(replace(problem, is_blocked=True), point).tolist() == [True, False, False]
 
 
 # runs

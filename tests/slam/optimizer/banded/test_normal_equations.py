@@ -89,7 +89,7 @@ def test_cost_and_gradient_are_those_of_the_dense_residuals(robots: int) -> None
 
 
 def test_where_sight_is_blocked_the_gradient_is_that_of_the_cost_too() -> None:
-    problem = replace(small(3), is_blocked=True)
+    problem = replace(small(3), blocked=np.ones(3, dtype=bool))
     poses, calibration = somewhere(problem, 2)
     equations, threshold = Equations(problem), THRESHOLD[:3]
     gradient = equations.gradient(point_at(problem, poses, calibration, threshold))

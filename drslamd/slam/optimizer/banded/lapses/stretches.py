@@ -127,7 +127,9 @@ def with_freed(problem: Problem, freed: Freed) -> Problem:
     if freed.stands:
         sigma = np.where(_ranged_later(problem, freed), UNKNOWN_M, ranges.sigma)
         ranges = replace(ranges, sigma=sigma)
-    return replace(problem, odometry=odometry, ranges=ranges, freed=(*problem.freed, freed))
+    all_freed = (*problem.freed, freed)
+    told = problem.told or problem
+    return replace(problem, odometry=odometry, ranges=ranges, freed=all_freed, told=told)
 
 
 def _ranged_later(problem: Problem, freed: Freed) -> NDArray[np.bool_]:

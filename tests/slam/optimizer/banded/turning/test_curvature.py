@@ -33,7 +33,7 @@ PROBLEMS = {
     "carried ranges": team_problem(1, robots=2, count=7, is_thinned=True)[0],
     "antennas in doubt": antennas_in_doubt(),
     "no ranges": replace(team_problem(2, robots=2, count=5)[0], ranges=no_ranges()),
-    "blocked sight": replace(team_problem(2, robots=2, count=5)[0], is_blocked=True),
+    "blocked sight": replace(team_problem(2, robots=2, count=5)[0], blocked=np.ones(1, dtype=bool)),
     "a gauge in the middle": replace(team_problem(4, robots=2, count=6)[0], gauge=5),
 }
 
