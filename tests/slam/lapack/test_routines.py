@@ -58,7 +58,7 @@ def test_nothing_is_solved_of_nothing(shape: tuple[int, int]) -> None:
 @pytest.mark.parametrize("dtype", [float, complex])
 @pytest.mark.parametrize("shape", [(40,), (40, 3)])
 def test_a_band_is_solved_as_by_scipy(dtype: type, shape: tuple[int, ...]) -> None:
-    a = band(40, 4).astype(dtype)
+    a: np.ndarray = band(40, 4).astype(dtype)
     columns = RNG.normal(size=shape)
     if dtype is complex:
         a[1:] += 1j * RNG.normal(size=a[1:].shape)

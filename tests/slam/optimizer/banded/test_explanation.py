@@ -621,9 +621,10 @@ def test_a_wall_that_came_between_two_is_known_once_others_have_seen_both_for_lo
 ) -> None:
     """Wheels that stood or spun would explain it as well until then."""
     found = explained(beside(3, COUNT - ranges, metres=1.0))
-    assert (found.equations.problem.blocked is not None) is is_found
-    if is_found:
-        assert np.flatnonzero(found.equations.problem.blocked).tolist() == [0]
+    hidden = found.equations.problem.blocked
+    assert (hidden is not None) is is_found
+    if hidden is not None:
+        assert np.flatnonzero(hidden).tolist() == [0]
         assert not found.equations.problem.freed
 
 

@@ -161,16 +161,9 @@ def test_among_many_pairs_some_have_outliers_by_chance(
     pairs: int, several: int, count: int, share: float
 ) -> None:
     problem, point = errs(np.array([9.0] * several + [0.0] * (count - several)))
-    found = outlier_share(_Beside(problem, pairs), point)  # type: ignore[arg-type]
+    found = outlier_share(replace(problem, pairs=pairs), point)
     assert found[0] == pytest.approx(share)
     assert not found[1:].any()
-
-
-class _Beside:
-    """A problem with more pairs, which have no ranges."""
-
-    def __init__(self, problem: Problem, pairs: int) -> None:
-        self.ranges, self.is_blocked, self.pairs = problem.ranges, problem.is_blocked, pairs
 
 
 @pytest.mark.parametrize(
