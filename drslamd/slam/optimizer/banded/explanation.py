@@ -10,6 +10,7 @@ that was blocked (`Problem.blocked`), and then odometry that was worse for a whi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,6 +45,8 @@ MANY_OUTLIERS = 2 * FEW_OUTLIERS
 NOT_WHEELS = 5
 """Ranges of a pair, one a second, since all was as modelled: wheels that stood or spun are found
 sooner, and until they are, ranges of theirs may all seem too long."""
+WITNESSED = 3
+"""Pairs: of the two that a wall hides from each other, and of each with a third who sees both."""
 MUCH = 100.0
 """Of cost: a mounting that takes away so much is right, though something else is wrong as well."""
 
@@ -94,9 +97,9 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
         nominal: the solution as configured, or with the mountings that were let go before.
         most, tolerance: of further solutions, see `descend`.
     """
-    sight = _by_sight(equations, nominal, most, tolerance)
-    if sight is not None and has_witnesses(sight.equations.problem, sight.point):
-        return sight
+    wall = _by_wall(equations, nominal, most, tolerance)
+    if wall is not None:
+        return wall
     equations, nominal = settled(equations, nominal, most, tolerance)
     check = _checked(equations, nominal)
     fits = check.is_passed() and not check.scores.ask() and _fits(equations, nominal)
@@ -125,7 +128,8 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
             bases.insert(0, (mounted, better, again))
         if common is not None:
             return _commonly(equations, common)
-    if sight is not None and has_passed(sight.equations.problem, sight.point):
+    sight = _by_sight(equations, nominal, most, tolerance)
+    if sight is not None:
         return sight
     if check.is_passed() and not check.scores.ask_alone():
         return _as_is(equations, nominal, check.ratio)
@@ -149,18 +153,46 @@ def _by_lapse(
     return _as_is(found.equations, found.point, check.ratio) if check.is_passed() else None
 
 
+def _by_wall(
+    equations: Equations, nominal: Point, most: int, tolerance: float
+) -> Explanation | None:
+    """A wall has come between two, if that explains all of what odometry told, also where
+    something of it was freed before."""
+    problem = equations.problem
+    if problem.pairs < WITNESSED:
+        return None
+    if problem.told is None and (not many_wrong(problem, nominal) or _is_new(problem)):
+        return None
+    told = Equations(problem.told or problem, like=equations)
+    return _hidden(told, nominal, most, tolerance, has_witnesses)
+
+
 def _by_sight(
     equations: Equations, nominal: Point, most: int, tolerance: float
 ) -> Explanation | None:
-    """Sight was blocked for long, if that explains all: then hardly a range is too short, and
-    wheels are as configured, also where something of theirs was freed before."""
-    problem = equations.problem
-    if problem.told is None and (not many_wrong(problem, nominal) or _is_new(problem)):
+    """Sight was blocked for long, if that explains all and somewhere it is free again."""
+    if not many_wrong(equations.problem, nominal) or _is_new(equations.problem):
         return None
+    return _hidden(equations, nominal, most, tolerance, has_passed)
+
+
+def _hidden(
+    equations: Equations,
+    nominal: Point,
+    most: int,
+    tolerance: float,
+    is_clear: Callable[[Problem, Point], bool],
+) -> Explanation | None:
+    """Some do not see each other: then hardly a range is too short, and wheels are as configured.
+
+    Args:
+        is_clear: could it be nothing else?
+    """
     for found, point in hidden_search.solutions(equations, nominal, most, tolerance):
-        check = _checked(found, point)
-        if _fits(found, point) and check.is_passed():
-            return _as_is(found, point, check.ratio)
+        if is_clear(found.problem, point) and _fits(found, point):
+            check = _checked(found, point)
+            if check.is_passed():
+                return _as_is(found, point, check.ratio)
     return None
 
 

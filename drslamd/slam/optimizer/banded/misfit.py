@@ -37,6 +37,8 @@ OUTLIER_SIGMAS = 2.5
 """Of what a range was sent with: beyond it, it is an outlier."""
 BY_CHANCE = 1e-3
 """Of ranges that are as modelled: what they are sent with is more than they scatter."""
+NEVER = 100
+"""Outliers of a pair that are none by chance; 100! is a number yet."""
 HALF_A_PAIR = 0.5
 """Pairs of a team: when fewer than that are expected to have so many outliers by chance, a pair
 that has them says something. One of ten ranges does among thirty pairs, not among a thousand."""
@@ -175,7 +177,8 @@ def outlier_share(problem: Problem, point: Point) -> Array:
 
 def _chance(mean: Array, count: Index) -> Array:
     """Of so many or more of what is as rare as that (Poisson's first term)."""
-    factorials = np.cumprod(np.maximum(np.arange(1.0 + count.max(initial=0)), 1.0))
+    count = np.minimum(count, NEVER)
+    factorials = np.cumprod(np.maximum(np.arange(1.0 + NEVER), 1.0))
     return np.asarray(mean**count / factorials[count])
 
 

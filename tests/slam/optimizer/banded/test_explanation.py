@@ -640,6 +640,17 @@ def test_what_was_freed_for_a_wall_is_told_again_once_the_wall_is_known() -> Non
     assert worst(found.point, truth) < 1.2 * worst(clean, truth) < worst(point, truth)
 
 
+def test_sight_that_is_free_again_leaves_freed_what_was_freed() -> None:
+    """Of two robots nobody sees both: wheels that spun are not told again for a wall."""
+    problem, truth = around_walls(7)
+    links = np.flatnonzero((problem.odometry.robot == 0) & (problem.odometry.i // ROBOTS == 25))
+    freed = with_freed(problem, freed_links(problem, 0, links, False))
+    found = explained(freed)
+    assert found.equations.problem.blocked is not None
+    assert len(found.equations.problem.freed) == 1
+    assert worst(found.point, truth) < worst(nominal(freed), truth)
+
+
 def test_one_pair_whose_ranges_are_too_short_is_out_of_no_sight() -> None:
     found = explained(beside(1, 30, metres=-2.0))
     assert found.equations.problem.blocked is None

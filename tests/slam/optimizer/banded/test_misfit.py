@@ -155,6 +155,7 @@ def test_shares_of_outliers_are_those_of_each_pair() -> None:
         (1000, 2, 20, 0.1),  # 1000 * 0.02^2 / 2 = 0.2
         (1000, 2, 33, 0.0),  # 1000 * 0.033^2 / 2 = 0.54
         (1000, 3, 33, 3 / 33),  # 1000 * 0.033^3 / 6 = 0.006
+        (1000, 400, 1000, 0.4),
     ],
 )
 def test_among_many_pairs_some_have_outliers_by_chance(

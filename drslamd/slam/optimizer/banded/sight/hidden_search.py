@@ -24,10 +24,10 @@ def solutions(
     """The likelier one first: only pairs were hidden of which that is seen, else anybody was.
 
     Args:
-        nominal: a solution for which nobody was; what is freed of odometry is told again.
+        nominal: a solution for which nobody was.
         most, tolerance: of a solution, see `descend`.
     """
-    problem = equations.problem.told or equations.problem
+    problem = equations.problem
     anybody = np.ones(problem.pairs, dtype=bool)
     everywhere = replace(problem, initial=nominal.poses, blocked=anybody)
     # it is far from here: a solution that was bent until the ranges fit leads astray

@@ -9,7 +9,6 @@ import pytest
 from slam_problems import held_at, team_problem
 from slam_scenes import Array
 
-from drslamd.slam.optimizer.banded.lapses.stretches import freed_links, with_freed
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
@@ -62,17 +61,6 @@ def test_a_wall_leaves_the_poses_where_they_are_without_it() -> None:
 def test_ranges_that_are_too_short_are_out_of_no_sight() -> None:
     """Where half are, the other half may be too long."""
     assert not found(walled(-2.0, since=35)[0])
-
-
-def test_what_was_freed_of_odometry_is_told_again() -> None:
-    problem, _ = walled(1.0)
-    links = np.flatnonzero((problem.odometry.robot == 0) & (problem.odometry.i // ROBOTS == SINCE))
-    freed = with_freed(problem, freed_links(problem, 0, links, False))
-    assert not np.array_equal(freed.odometry.covariance, problem.odometry.covariance)
-    for equations, _ in found(freed):
-        assert not equations.problem.freed
-        assert equations.problem.told is None
-        assert np.array_equal(equations.problem.odometry.covariance, problem.odometry.covariance)
 
 
 def test_a_far_way_is_gone_to_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
