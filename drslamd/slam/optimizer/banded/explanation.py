@@ -1,11 +1,11 @@
 """Is the model one of what was measured, and if not, what is?
 
 A solution as configured is asked three questions: does odometry fit, do ranges fit now, does some
-track or antenna ask to be another one? Most often all is well. Else odometry that was worse all
-along is tried (`common_level`), then wheels that stood or spun (`lapses`), then mountings
-(`mountings`), which explain a fault for good and must explain more than such odometry, then sight
-that was blocked (`Problem.blocked`), and then odometry that was worse for a while
-(`odometry_levels`).
+track or antenna ask to be another one? Most often all is well. Else a wall between two whom others
+see is tried (`sight`), then odometry that was worse all along (`common_level`), then wheels that
+stood or spun (`lapses`), then mountings (`mountings`), which explain a fault for good and must
+explain more than such odometry, then sight that was blocked for a while, and then odometry that was
+worse for a while (`odometry_levels`).
 """
 
 from __future__ import annotations
