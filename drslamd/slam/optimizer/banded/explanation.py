@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -97,10 +98,15 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
         nominal: the solution as configured, or with the mountings that were let go before.
         most, tolerance: of further solutions, see `descend`.
     """
-    wall = _by_wall(equations, nominal, most, tolerance)
+    told = equations.problem.told
+    hidden = _Hidden(
+        Equations(told, like=equations) if told else equations, nominal, most, tolerance
+    )
+    wall = _by_wall(equations, nominal, hidden)
     if wall is not None:
         return wall
     equations, nominal = settled(equations, nominal, most, tolerance)
+    hidden = _Hidden(equations, nominal, most, tolerance) if told else hidden
     check = _checked(equations, nominal)
     fits = check.is_passed() and not check.scores.ask() and _fits(equations, nominal)
     common = _in_common(equations, nominal, check, most, tolerance)
@@ -128,7 +134,7 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
             bases.insert(0, (mounted, better, again))
         if common is not None:
             return _commonly(equations, common)
-    sight = _by_sight(equations, nominal, most, tolerance)
+    sight = _by_sight(equations, nominal, hidden)
     if sight is not None:
         return sight
     if check.is_passed() and not check.scores.ask_alone():
@@ -153,9 +159,36 @@ def _by_lapse(
     return _as_is(found.equations, found.point, check.ratio) if check.is_passed() else None
 
 
-def _by_wall(
-    equations: Equations, nominal: Point, most: int, tolerance: float
-) -> Explanation | None:
+@dataclass(frozen=True)
+class _Hidden:
+    """What may be when some do not see each other, looked for at most once."""
+
+    equations: Equations
+    nominal: Point
+    most: int
+    tolerance: float
+
+    @cached_property
+    def solutions(self) -> list[tuple[Equations, Point]]:
+        """Those with hardly a range too short."""
+        found = hidden_search.solutions(self.equations, self.nominal, self.most, self.tolerance)
+        return [(equations, point) for equations, point in found if _fits(equations, point)]
+
+    def explained(self, is_clear: Callable[[Problem, Point], bool]) -> Explanation | None:
+        """With wheels as configured.
+
+        Args:
+            is_clear: could it be nothing else?
+        """
+        for equations, point in self.solutions:
+            if is_clear(equations.problem, point):
+                check = _checked(equations, point)
+                if check.is_passed():
+                    return _as_is(equations, point, check.ratio)
+        return None
+
+
+def _by_wall(equations: Equations, nominal: Point, hidden: _Hidden) -> Explanation | None:
     """A wall has come between two, if that explains all of what odometry told, also where
     something of it was freed before."""
     problem = equations.problem
@@ -163,37 +196,14 @@ def _by_wall(
         return None
     if problem.told is None and (not many_wrong(problem, nominal) or _is_new(problem)):
         return None
-    told = Equations(problem.told or problem, like=equations)
-    return _hidden(told, nominal, most, tolerance, has_witnesses)
+    return hidden.explained(has_witnesses)
 
 
-def _by_sight(
-    equations: Equations, nominal: Point, most: int, tolerance: float
-) -> Explanation | None:
+def _by_sight(equations: Equations, nominal: Point, hidden: _Hidden) -> Explanation | None:
     """Sight was blocked for long, if that explains all and somewhere it is free again."""
     if not many_wrong(equations.problem, nominal) or _is_new(equations.problem):
         return None
-    return _hidden(equations, nominal, most, tolerance, has_passed)
-
-
-def _hidden(
-    equations: Equations,
-    nominal: Point,
-    most: int,
-    tolerance: float,
-    is_clear: Callable[[Problem, Point], bool],
-) -> Explanation | None:
-    """Some do not see each other: then hardly a range is too short, and wheels are as configured.
-
-    Args:
-        is_clear: could it be nothing else?
-    """
-    for found, point in hidden_search.solutions(equations, nominal, most, tolerance):
-        if is_clear(found.problem, point) and _fits(found, point):
-            check = _checked(found, point)
-            if check.is_passed():
-                return _as_is(found, point, check.ratio)
-    return None
+    return hidden.explained(has_passed)
 
 
 def _is_new(problem: Problem) -> bool:

@@ -16,6 +16,8 @@ from drslamd.slam.optimizer.banded.sight.hidden import long_for_long
 FAR = 10
 """Times the steps that a solution takes otherwise: two or three times as many are the most that was
 seen, eight now and then, and a way that is broken off looks like another cause for a while."""
+HOPELESS = 0.3
+"""Share of ranges of any pair that are too short after the first steps: no sight explains them."""
 
 
 def solutions(
@@ -32,7 +34,10 @@ def solutions(
     everywhere = replace(problem, initial=nominal.poses, blocked=anybody)
     # it is far from here: a solution that was bent until the ranges fit leads astray
     wide = Equations(everywhere, like=equations)
-    point = descend(wide, nominal.calibration, FAR * most, tolerance)
+    point = descend(wide, nominal.calibration, 2 * most, tolerance)
+    if not point.converged and outlier_share(everywhere, point).max(initial=0) < HOPELESS:
+        wide = Equations(replace(everywhere, initial=point.poses), like=equations)
+        point = descend(wide, point.calibration, FAR * most, tolerance)
     if not point.converged or outlier_share(everywhere, point).max(initial=0) >= FEW_OUTLIERS:
         return
     # the others are believed as always

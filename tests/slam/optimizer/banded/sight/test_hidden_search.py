@@ -63,15 +63,28 @@ def test_ranges_that_are_too_short_are_out_of_no_sight() -> None:
     assert not found(walled(-2.0, since=35)[0])
 
 
-def test_a_far_way_is_gone_to_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With three times the steps that a solution takes else, one of twenty was broken off."""
+@pytest.mark.parametrize(
+    ("is_near", "short", "steps"),
+    [(True, 0.0, [120, 600]), (False, 0.29, [120, 600, 600]), (False, 0.31, [120])],
+)
+def test_a_far_way_is_gone_to_its_end_unless_many_ranges_are_too_short(
+    is_near: bool, short: float, steps: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With twice the steps that a solution takes else, one of twenty was broken off."""
     asked: list[int] = []
 
     def counted(equations: Equations, start: Calibration, most: int, tolerance: float) -> Point:
         asked.append(most)
-        return descend(equations, start, most, tolerance)
+        point = descend(equations, start, most, tolerance)
+        return point if is_near or len(asked) > 1 else replace(point, converged=False)
 
     problem, _ = walled(1.0)
+    point = nominal(problem)
     monkeypatch.setattr(hidden_search, "descend", counted)
-    found(problem)
-    assert asked == [600, 600]
+    monkeypatch.setattr(
+        hidden_search,
+        "outlier_share",
+        lambda *_: np.full(6, short if len(asked) == 1 and not is_near else 0.0),
+    )
+    list(hidden_search.solutions(Equations(problem), point, 60, TOLERANCE))
+    assert asked == steps
