@@ -20,7 +20,7 @@ from drslamd.slam.optimizer.banded import common_level, mountings, odometry_leve
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.common_level import ASKS, TAILS, CommonLevel, pooled
 from drslamd.slam.optimizer.banded.lapses import lapse_search
-from drslamd.slam.optimizer.banded.lapses.known_lapses import settled
+from drslamd.slam.optimizer.banded.lapses.known_lapses import freed_lately, settled
 from drslamd.slam.optimizer.banded.misfit import (
     FEW_OUTLIERS,
     Run,
@@ -98,7 +98,7 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
         nominal: the solution as configured, or with the mountings that were let go before.
         most, tolerance: of further solutions, see `descend`.
     """
-    told = equations.problem.told
+    told = equations.problem.told if freed_lately(equations.problem) else None
     hidden = _Hidden(
         Equations(told, like=equations) if told else equations, nominal, most, tolerance
     )
@@ -190,11 +190,12 @@ class _Hidden:
 
 def _by_wall(equations: Equations, nominal: Point, hidden: _Hidden) -> Explanation | None:
     """A wall has come between two, if that explains all of what odometry told, also where
-    something of it was freed before."""
+    something of it was freed a minute ago."""
     problem = equations.problem
     if problem.pairs < WITNESSED:
         return None
-    if problem.told is None and (not many_wrong(problem, nominal) or _is_new(problem)):
+    is_as_told = hidden.equations is equations
+    if is_as_told and (not many_wrong(problem, nominal) or _is_new(problem)):
         return None
     return hidden.explained(has_witnesses)
 

@@ -39,6 +39,7 @@ from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE, descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.odometry_levels import STANDS_OUT, TARGET, Levels, raised
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.banded.sight import hidden_search
 from drslamd.slam.optimizer.banded.sight.hidden import LONG, blocked
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
@@ -638,6 +639,27 @@ def test_what_was_freed_for_a_wall_is_told_again_once_the_wall_is_known() -> Non
     assert np.array_equal(found.equations.problem.odometry.covariance, problem.odometry.covariance)
     clean = nominal(a_team(3)[0])
     assert worst(found.point, truth) < 1.2 * worst(clean, truth) < worst(point, truth)
+
+
+def test_a_wall_is_not_asked_for_each_second_of_the_hours_after_a_lapse(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem, _ = a_team(3)
+    links = np.flatnonzero((problem.odometry.robot == 0) & (problem.odometry.i // ROBOTS == 5))
+    freed = with_freed(problem, freed_links(problem, 0, links, False))
+    point, asked = nominal(freed), list[str]()
+
+    def looked_for(*_: object) -> list[tuple[Equations, Point]]:
+        asked.append("a wall")
+        return []
+
+    monkeypatch.setattr(hidden_search, "solutions", looked_for)
+    explained(freed, point)
+    assert asked
+    asked.clear()
+    monkeypatch.setattr(explanation, "freed_lately", lambda _: False)
+    explained(freed, point)
+    assert not asked
 
 
 def test_sight_that_is_free_again_leaves_freed_what_was_freed() -> None:

@@ -26,6 +26,8 @@ GAIN = 30.0
 less than 20, or the rest still does not fit."""
 SETTLES_S = 10.0
 """After a lapse: where the robot went meanwhile shows in the ranges since."""
+REGARDED_S = 60.0
+"""After a lapse: what else it may have been is asked for so long, and not each second for hours."""
 
 
 def freed_again(problem: Problem, robots: list[int], lapses: Iterable[Lapse]) -> Problem:
@@ -60,6 +62,19 @@ def lapse_of(problem: Problem, robots: list[int], freed: Freed) -> Lapse:
     return Lapse(robots[freed.robot], first, last, freed.stands, freed.is_settled)
 
 
+def freed_lately(problem: Problem) -> bool:
+    """Did a stretch that is freed end a minute ago or less?"""
+    return any(
+        _newest(problem, one) <= span(problem, one)[1] + REGARDED_S * GRID_HZ
+        for one in problem.freed
+    )
+
+
+def _newest(problem: Problem, freed: Freed) -> int:
+    """The last keyframe of the robot whose stretch it is."""
+    return int(problem.n[problem.odometry.j[problem.odometry.robot == freed.robot]].max())
+
+
 def still_freed(problem: Problem, point: Point) -> tuple[Freed, ...]:
     """Those along which robots did something else than their wheels say."""
     out = []
@@ -89,7 +104,6 @@ def settled(
         if not one.is_settled:
             point = on_likelier_side(equations, point, one, most, tolerance)
             point, is_clear = best_placed(equations, point, one, most, tolerance)
-            newest = problem.n[problem.odometry.j[problem.odometry.robot == one.robot]].max()
-            is_old = newest >= span(problem, one)[1] + SETTLES_S * GRID_HZ
+            is_old = _newest(problem, one) >= span(problem, one)[1] + SETTLES_S * GRID_HZ
             freed[at] = replace(one, is_settled=bool(is_clear and is_old))
     return Equations(replace(problem, freed=tuple(freed)), like=equations), point

@@ -14,8 +14,8 @@ from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.banded.sight.hidden import long_for_long
 
 FAR = 10
-"""Times the steps that a solution takes otherwise: two or three times as many are the most that was
-seen, eight now and then, and a way that is broken off looks like another cause for a while."""
+"""Times the steps that a solution takes else: twice as many mostly suffice, eight times was seen,
+and a way that is broken off looks like another cause for half a minute."""
 HOPELESS = 0.3
 """Share of ranges of any pair that are too short after the first steps: no sight explains them."""
 

@@ -14,8 +14,10 @@ from drslamd.slam.graph.estimate import Lapse
 from drslamd.slam.optimizer.banded.lapses import known_lapses
 from drslamd.slam.optimizer.banded.lapses.known_lapses import (
     GAIN,
+    REGARDED_S,
     SETTLES_S,
     freed_again,
+    freed_lately,
     lapse_of,
     settled,
     still_freed,
@@ -124,3 +126,16 @@ def test_of_what_is_settled_nothing_is_asked(monkeypatch: pytest.MonkeyPatch) ->
     equations = Equations(with_freed(problem, replace(freed, is_settled=True)))
     point = nominal(a_team()[0])
     assert settled(equations, point, 60, TOLERANCE) == (equations, point)
+
+
+@pytest.mark.parametrize(("later_s", "is_lately"), [(0.0, True), (0.1, False)])
+def test_what_was_freed_is_asked_about_again_for_a_minute(later_s: float, is_lately: bool) -> None:
+    problem, freed = freed_team()
+    assert not freed_lately(problem)
+    problem = with_freed(problem, freed)
+    odometry = problem.odometry
+    newest = odometry.j[odometry.robot == freed.robot].max()
+    end = problem.n[odometry.j[freed.links[-1]]]
+    n = problem.n.copy()
+    n[newest] = end + round(10 * (REGARDED_S + later_s))
+    assert freed_lately(replace(problem, n=n)) is is_lately
