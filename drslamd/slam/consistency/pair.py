@@ -265,6 +265,7 @@ class PairTracker:
             believed = False
         kept = {m.number: m for m in self.kept} if believed else {}
         remembered = min((m.number for m in self._checked.measurements), default=0)
+        answered = self.history[0].number if self.history else 0
         gone += [
             replace(m, kept=False)
             for number, m in self._told.items()
@@ -275,7 +276,7 @@ class PairTracker:
         self._told = {
             number: m
             for number, m in self._told.items()
-            if number not in withdrawn and (number >= remembered or m.a_n == recent)
+            if number not in withdrawn and (number >= min(remembered, answered) or m.a_n == recent)
         }
         new: list[ClosureMeasurement] = []
         recent = max((told.a_n for told in self._told.values()), default=-TELL_EVERY)

@@ -64,6 +64,9 @@ NEWEST = 3
 odometry that has just failed look alike."""
 NEWEST_SIGMAS = 2.0
 """In the median they may be so many sigmas off."""
+BESIDE = 10
+"""So many before them, as they all, may say what they are off: what odometry adds up bends the far
+part of a long window away from an end that is right."""
 
 
 def solve(window: Window, noise: PairNoise, delta: float) -> RelativePoseEstimate:
@@ -188,13 +191,28 @@ def _is_poor(refined: Refined, stack: WindowStack, noises: Sequence[PairNoise]) 
     best = refined.groups.starts
     of = refined.groups.of[best]
     e, counts = refined.e[best], stack.counts[of]
-    newest = np.take_along_axis(e, counts[:, None] - 1 - np.arange(NEWEST), axis=1)
-    newest = np.abs(newest - middle(e, counts)[:, None])
     sigma = np.array([noises[k].ranges.sigma for k in of.tolist()])
-    end_is_off = np.sort(newest, axis=1)[:, NEWEST // 2] > NEWEST_SIGMAS * sigma
+    end_is_off = end_off(e, counts) > NEWEST_SIGMAS * sigma
     misfit = refined.minima.chi2[best] > POOR_FIT * (counts - 3)
     poor: list[bool] = (misfit | end_is_off).tolist()
     return poor
+
+
+def end_off(e: Array, counts: Index) -> Array:
+    """(k,) how far the newest residuals are off the rest, in the median, m.
+
+    The rest is all of the window, or what lies just before them, whichever is nearer.
+
+    Args:
+        e: (k, n) residuals, of which the first `counts` (k,) are some.
+    """
+    newest = np.take_along_axis(e, counts[:, None] - 1 - np.arange(NEWEST), axis=1)
+    beside = counts[:, None] - 1 - NEWEST - np.arange(BESIDE)
+    near = np.median(np.take_along_axis(e, beside.clip(min=0), axis=1), axis=1)
+    rest = middle(e, counts)
+    near = np.where(counts >= NEWEST + BESIDE, near, rest)
+    off = np.sort(np.abs(newest[:, None] - np.stack([rest, near], axis=1)[..., None]), axis=2)
+    return np.asarray(off[..., NEWEST // 2].min(axis=1))
 
 
 def _not_excluded(fit: RangeFit, refined: Refined) -> dict[int, tuple[Hypothesis, ...]]:

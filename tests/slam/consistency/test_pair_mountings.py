@@ -178,6 +178,21 @@ def test_what_was_told_is_taken_back_before_what_was_checked_since_is_told() -> 
     assert pair.told() == []
 
 
+def test_what_module_2_has_forgotten_is_taken_back_as_well() -> None:
+    """Corrections that were learned meanwhile let it begin anew."""
+    pair = OwnedPair(TWO)
+    pair.see(BESIDE, 2)
+    assert pair.told() == [(0, True), (1, True)]
+    pair.answer(30, BESIDE)
+    known = Correction(0.1, 0.02, 0.4), Correction(-0.06, 0.01, -0.2)
+    run = pair.tracker.begin_check(pair.own, pair.peer, pair.own.model.noise, known)
+    assert run is not None
+    pair.tracker.on_check(run())
+    assert pair.told() == []
+    search(pair, Case(b=TRACKS[0]))
+    assert pair.told() == [(0, False), (1, False)]
+
+
 def test_what_was_told_is_taken_back_while_a_check_runs() -> None:
     pair = OwnedPair(TWO)
     pair.see(BESIDE, 2)

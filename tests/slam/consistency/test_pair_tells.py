@@ -104,7 +104,20 @@ def test_closures_that_module_2_has_forgotten_stay_said(monkeypatch: pytest.Monk
         pair.check()
         said += pair.told()
     assert said == [(number, True) for number in range(19)]
-    assert len(pair.tracker._told) <= 8
+
+
+def test_of_what_was_told_as_much_is_remembered_as_module_1_can_be_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(pcm, "MAX_VERTICES", 8)
+    monkeypatch.setattr(pcm, "FORGET", 4)
+    monkeypatch.setattr("drslamd.slam.consistency.pair.HISTORY", 10)
+    pair = OwnedPair(TWO)
+    for n in range(10, 200, 10):
+        pair.answer(n, BESIDE)
+        pair.check()
+        pair.told()
+    assert list(pair.tracker._told) == list(range(19 - 10, 19))
 
 
 def test_one_in_a_while_is_said_also_when_the_last_one_was_forgotten(

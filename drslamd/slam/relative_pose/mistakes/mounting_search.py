@@ -21,6 +21,7 @@ from drslamd.conventions import SECOND_US
 from drslamd.slam.relative_pose.estimate import PairNoise, Verdict
 from drslamd.slam.relative_pose.mistakes import what_if
 from drslamd.slam.relative_pose.mistakes.evidence import (
+    BETTER,
     EXCLUDED,
     FITS,
     INDIFFERENT,
@@ -227,7 +228,9 @@ class MountingSearch:
         total = worth * np.mean([answer.costs for answer in self._answers], axis=0)
         freedom = worth * float(np.mean([answer.freedom for answer in self._answers]))
         if asked == MOST_ASKED:
-            self._confirm(bool(least_of_backwards(total - total[0], True) >= INDIFFERENT))
+            is_other = total.min() <= min(total[0] - BETTER, FITS * freedom)
+            is_backwards = least_of_backwards(total - total[0], True) < INDIFFERENT
+            self._confirm(not (is_other or is_backwards))
         case, is_clear = winner(total, freedom)
         # whatever happens to a mounting that was right is something else
         if case is None or self._is_final:

@@ -114,6 +114,30 @@ def test_who_is_the_same_in_a_mirror_for_long_is_believed_as_configured(
     assert search.found is None
 
 
+@pytest.mark.parametrize(
+    ("by", "fit", "confirms"),
+    [
+        (BETTER + LITTLE, GOOD, False),
+        (BETTER - LITTLE, GOOD, True),
+        # where nothing fits, as when sight is blocked, another track is better by chance
+        (BETTER + LITTLE, 2 * FITS * 30, True),
+    ],
+)
+def test_nor_is_that_believed_while_something_else_explains_what_it_does_not(
+    by: float, fit: float, confirms: bool
+) -> None:
+    """Of two robots one counts wrongly, and windows do not tell which: nothing is found. The same
+    in a mirror is what is configured."""
+    worth = FEWEST_ASKED + (MOST_ASKED - FEWEST_ASKED) / SHARED
+    search = MountingSearch()
+    for _ in range(MOST_ASKED):
+        either = {TRACK: fit, SCALE: fit, Case(a=TRACK.b): fit, Case(a=SCALE.b): fit}
+        as_it_is = fit + by / worth
+        ask(search, {AS_IT_IS: as_it_is, MIRROR: as_it_is, **either})
+        assert search.found is None
+    assert search.is_confirmed is confirms
+
+
 # what is found
 
 
