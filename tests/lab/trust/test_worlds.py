@@ -63,6 +63,19 @@ def test_wheels_that_slip_can_be_known_to_once_they_have() -> None:
                 soonest = min(soonest, trail.t[k])
                 break
     assert slips.evident_s(SLIPS_LATE, since) == pytest.approx(soonest)
-    assert sensor_faults.evident_s(right, wrong, 0.0) < since < soonest < np.inf
-    assert sensor_faults.evident_s(right, wrong, np.inf) == np.inf
-    assert worlds.BLOCKED.evident_s(0, since) == since
+    assert sensor_faults.evident_in_wheels(right, wrong, 0.0) < since < soonest < np.inf
+    assert sensor_faults.evident_in_wheels(right, wrong, np.inf) == np.inf
+    assert worlds.BENT.evident_s(0, since) == since
+
+
+def test_a_wall_can_be_known_to_be_there_once_it_is() -> None:
+    """By ranges that are a quarter of a metre too long, of whichever pair."""
+    right, wrong = replace(worlds.WALLED, faults=()).recording(4), worlds.WALLED.recording(4)
+    built = wrong.ranges[wrong.ranges[:, 3] != right.ranges[:, 3], 0].min()
+    assert 35 < built < 55
+    assert worlds.WALLED.evident_s(4, built - 20.0) == built
+    assert built + 20 < sensor_faults.evident_in_ranges(right, wrong, built + 20.0) < built + 20.2
+    slightly = replace(right, ranges=right.ranges + [0, 0, 0, 0.249])
+    assert sensor_faults.evident_in_ranges(right, slightly, 0.0) == np.inf
+    more = replace(right, ranges=right.ranges + [0, 0, 0, 0.251])
+    assert sensor_faults.evident_in_ranges(right, more, 0.05) == pytest.approx(0.1)

@@ -36,19 +36,19 @@ SWING_M = (0.04, 0.10)
 
 
 EVIDENT_M, EVIDENT_DEG = 0.25, 10.0
-"""Wheels that have been wrong by so much since their fault began can be known to be wrong."""
+"""Wheels that have been wrong by so much since their fault began can be known to be wrong; so can
+ranges that are."""
+
+Evidence = Callable[[Recording, Recording, float], float]
+"""From when it can be known that a recording is wrong, s: of the same drive measured as modelled,
+the recording, and a time before which nothing counts; infinite where it is not that wrong."""
 
 
 # wheels
 
 
-def evident_s(right: Recording, wrong: Recording, since_s: float) -> float:
-    """From when it can be known that odometry of one recording is wrong, of what it measured from
-    `since_s` on; infinite where it is not that wrong.
-
-    Args:
-        right: the same drive, measured as modelled.
-    """
+def evident_in_wheels(right: Recording, wrong: Recording, since_s: float) -> float:
+    """`Evidence` of odometry."""
     found = [float("inf")]
     for robot, trail in wrong.trails.items():
         off = _steps(trail) - _steps(right.trails[robot])
@@ -57,6 +57,13 @@ def evident_s(right: Recording, wrong: Recording, since_s: float) -> float:
         is_evident = (ways > EVIDENT_M) | (np.abs(turned) > EVIDENT_DEG)
         found += trail.t[1:][is_evident][:1].tolist()
     return min(found)
+
+
+def evident_in_ranges(right: Recording, wrong: Recording, since_s: float) -> float:
+    """`Evidence` of ranges."""
+    off = np.abs(wrong.ranges[:, 3] - right.ranges[:, 3]) > EVIDENT_M
+    found = wrong.ranges[off & (wrong.ranges[:, 0] > since_s), 0]
+    return float(found[0]) if len(found) else float("inf")
 
 
 def slipping(rng: np.random.Generator, recording: Recording) -> Recording:

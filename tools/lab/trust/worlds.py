@@ -14,7 +14,7 @@ from lab.recordings import world
 from lab.recordings.recording import Array, Recording
 from lab.recordings.world import OdometryModel, RangeModel, Scene
 from lab.trust import paths, sensor_faults
-from lab.trust.sensor_faults import Fault
+from lab.trust.sensor_faults import Evidence, Fault, evident_in_ranges, evident_in_wheels
 
 RECORDED = Scene(robots=3, seconds=75.0, odometry_hz=10, range_hz=10)
 """As wrong as recorded sensors mostly are."""
@@ -36,13 +36,13 @@ class World:
     """A scene, who drives where in it, and what breaks the model of its sensors.
 
     Attributes:
-        breaks_wheels: is that wheels which are wrong now and then, and not all along?
+        evidence: from when it shows, where that is now and then, and not all along.
     """
 
     scene: Scene
     truths: Callable[[np.random.Generator, Scene], list[Array]] = paths.each_alone
     faults: tuple[Fault, ...] = ()
-    breaks_wheels: bool = False
+    evidence: Evidence | None = None
 
     def recording(self, seed: int) -> Recording:
         """The same seed gives the same recording."""
@@ -54,10 +54,10 @@ class World:
 
     def evident_s(self, seed: int, localised_s: float) -> float:
         """From when it can be known that it is broken, of robots with a pose since then."""
-        if not self.breaks_wheels:
+        if self.evidence is None:
             return localised_s
         right = replace(self, faults=()).recording(seed)
-        return sensor_faults.evident_s(right, self.recording(seed), localised_s)
+        return self.evidence(right, self.recording(seed), localised_s)
 
 
 def clean(robots: int) -> World:
@@ -90,10 +90,12 @@ BENT = _driven(yaw_deg_per_m=10.0)
 SLOW_BIASES = _ranged(slow_s=30.0)
 HEAVY_TAILS = World(LONGER, faults=(sensor_faults.heavy_tailed,))
 BLOCKED = World(
-    replace(LONGER, ranges=RangeModel(burst_share=0.0)), faults=(sensor_faults.blocked,)
+    replace(LONGER, ranges=RangeModel(burst_share=0.0)),
+    faults=(sensor_faults.blocked,),
+    evidence=evident_in_ranges,
 )
-WALLED = World(LONGER, faults=(sensor_faults.walled,))
-SLIP = World(LONGER, faults=(sensor_faults.slipping,), breaks_wheels=True)
+WALLED = World(LONGER, faults=(sensor_faults.walled,), evidence=evident_in_ranges)
+SLIP = World(LONGER, faults=(sensor_faults.slipping,), evidence=evident_in_wheels)
 ON_THE_SPOT = World(
     replace(LONGER, robots=2),
     paths.on_the_spot,
