@@ -158,7 +158,8 @@ class PairTracker:
         """
         before = self.search.found
         if self.search.on_costs(costs, len(request.window), way_m > MOVED_M):
-            if before is None or self.search.found is None:
+            now = self.search.found
+            if before is None or now is None or now.kind != before.kind:
                 # what was told with another mounting is worth nothing
                 self._withdrawn += [replace(m, kept=False) for m in self._told.values()]
                 self._told.clear()

@@ -43,6 +43,7 @@ CORRECTED = (*LEARNED, Fault.MIRRORED)
 
 FINER = 1.06
 """Odometry that is wrong by half of that is right enough for windows of a minute."""
+FACTORS = (1.0, 1 / FINER, FINER)
 
 
 class Repair(NamedTuple):
@@ -58,12 +59,20 @@ class Repair(NamedTuple):
         """The same, way and turn a little more or less; of what has no factor only itself."""
         if self.fault not in LEARNED:
             return (self,)
-        factors = (1.0, 1 / FINER, FINER)
         return tuple(
             self._replace(way=self.way * way, turn=self.turn * turn)
-            for way in factors
-            for turn in factors
+            for way in FACTORS
+            for turn in FACTORS
         )
+
+    def alike(self) -> tuple[Repair, ...]:
+        """The tracks and the scales that turn as much, a little more or less: windows hardly tell
+        one from the other; of what has no factor none."""
+        if self.fault not in LEARNED:
+            return ()
+        turns = [self.turn * factor for factor in FACTORS]
+        tracks = [Repair(Fault.TRACK, turn=turn) for turn in turns]
+        return (*tracks, *(Repair(Fault.SCALE, turn, turn) for turn in turns))
 
 
 def paths(repairs: Sequence[Repair], poses: Array, half_track_m: float) -> Array:

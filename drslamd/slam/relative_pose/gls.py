@@ -11,7 +11,7 @@ from drslamd.slam.lapack.routines import small_cholesky, small_cholesky_solved
 from drslamd.slam.relative_pose.descent import WEAK_PRIOR
 from drslamd.slam.relative_pose.range_fit import Minima, RangeFit, stepped
 from drslamd.slam.relative_pose.window_noise import WindowNoise
-from drslamd.slam.relative_pose.window_stack import Groups, middle
+from drslamd.slam.relative_pose.window_stack import Groups
 from drslamd.slam.se2 import Array, Index
 
 MOST_ITERATIONS = 12
@@ -147,17 +147,11 @@ class _Refinement:
             return
         of, e, u = self._groups.of[anew], e[anew], u[anew]
         old_e[anew], old_u[anew] = e, u
-        weights = self._weights(e, of)
+        weights = self._noise.weights(of, e)
         covariance = self._noise.covariance(of, u, self._x[anew, 1], weights)
         factors, self._is_sound[anew] = _factors(covariance)
         for k, factor in zip(anew.tolist(), factors, strict=True):
             self._factors[k] = factor
-
-    def _weights(self, e: Array, of: Index) -> Array:
-        """(k, n): ranges lose weight that are far from the middle of all."""
-        beyond = self._noise.huber_sigmas * self._noise.sigmas(of)
-        off = np.abs(e - middle(e, self._noise.counts[of])[:, None])
-        return np.asarray((beyond / np.maximum(off, beyond)) ** 2)
 
     def _as_they_scatter(self, minima: Minima, weighted: Array, of: Index) -> Minima:
         """Weights are those of what must be allowed for, the covariance that of what is known."""

@@ -33,8 +33,9 @@ from drslamd.slam.relative_pose.range_fit import (
     RangeFit,
 )
 from drslamd.slam.relative_pose.window import Window
+from drslamd.slam.relative_pose.window_end import end_is_off
 from drslamd.slam.relative_pose.window_noise import WindowNoise
-from drslamd.slam.relative_pose.window_stack import Groups, WindowStack, middle
+from drslamd.slam.relative_pose.window_stack import Groups, WindowStack
 from drslamd.slam.se2 import Array, Index
 
 FEWEST_RANGES = 6
@@ -59,14 +60,6 @@ MOST_AT_ONCE = 16
 """Windows; of more, what is computed of them no longer stays in the caches."""
 MOST_CASES = 48
 """Likewise where only the best of each is held against the full noise."""
-NEWEST = 3
-"""So many last measurements may not lie off the rest: near the end of a window a burst and
-odometry that has just failed look alike."""
-NEWEST_SIGMAS = 2.0
-"""In the median they may be so many sigmas off."""
-BESIDE = 10
-"""So many before them, as they all, may say what they are off: what odometry adds up bends the far
-part of a long window away from an end that is right."""
 
 
 def solve(window: Window, noise: PairNoise, delta: float) -> RelativePoseEstimate:
@@ -135,10 +128,11 @@ def _solved(
     centred, groups = _candidates(stack, fit, noises, delta)  # eq. (2), then eq. (1) from each seed
     if not len(centred):
         return answers
-    refined = refine(fit, WindowNoise(stack, noises), centred, groups)
+    noise = WindowNoise(stack, noises)
+    refined = refine(fit, noise, centred, groups)
     if not len(refined.e):
         return answers
-    is_poor = _is_poor(refined, stack, noises)
+    is_poor = _is_poor(fit, noise, refined, stack)
     all_hypotheses = _not_excluded(fit, refined)
     for (window, _), poor in zip(refined.groups.slices(), is_poor, strict=True):
         hypotheses = all_hypotheses[window]
@@ -186,33 +180,13 @@ def _descent(
     return Descent(fit, centred, [noise.ranges for noise in noises], of, noises[0].model)
 
 
-def _is_poor(refined: Refined, stack: WindowStack, noises: Sequence[PairNoise]) -> list[bool]:
+def _is_poor(fit: RangeFit, noise: WindowNoise, refined: Refined, stack: WindowStack) -> list[bool]:
     """Does not even the best minimum explain a window, or its end?"""
     best = refined.groups.starts
-    of = refined.groups.of[best]
-    e, counts = refined.e[best], stack.counts[of]
-    sigma = np.array([noises[k].ranges.sigma for k in of.tolist()])
-    end_is_off = end_off(e, counts) > NEWEST_SIGMAS * sigma
+    counts = stack.counts[refined.groups.of[best]]
     misfit = refined.minima.chi2[best] > POOR_FIT * (counts - 3)
-    poor: list[bool] = (misfit | end_is_off).tolist()
+    poor: list[bool] = (misfit | end_is_off(fit, noise, refined)).tolist()
     return poor
-
-
-def end_off(e: Array, counts: Index) -> Array:
-    """(k,) how far the newest residuals are off the rest, in the median, m.
-
-    The rest is all of the window, or what lies just before them, whichever is nearer.
-
-    Args:
-        e: (k, n) residuals, of which the first `counts` (k,) are some.
-    """
-    newest = np.take_along_axis(e, counts[:, None] - 1 - np.arange(NEWEST), axis=1)
-    beside = counts[:, None] - 1 - NEWEST - np.arange(BESIDE)
-    near = np.median(np.take_along_axis(e, beside.clip(min=0), axis=1), axis=1)
-    rest = middle(e, counts)
-    near = np.where(counts >= NEWEST + BESIDE, near, rest)
-    off = np.sort(np.abs(newest[:, None] - np.stack([rest, near], axis=1)[..., None]), axis=2)
-    return np.asarray(off[..., NEWEST // 2].min(axis=1))
 
 
 def _not_excluded(fit: RangeFit, refined: Refined) -> dict[int, tuple[Hypothesis, ...]]:

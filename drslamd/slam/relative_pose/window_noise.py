@@ -21,7 +21,7 @@ from drslamd.conventions import GRID_HZ
 from drslamd.slam.odometry.gyro_noise import GyroNoise, turned_seconds
 from drslamd.slam.odometry.noise import GYRO, OdometryNoise, forwards, growth, random_covariance
 from drslamd.slam.relative_pose.estimate import PairNoise
-from drslamd.slam.relative_pose.window_stack import WindowStack
+from drslamd.slam.relative_pose.window_stack import WindowStack, middle
 from drslamd.slam.se2 import Array, Index
 
 _MATRIX = [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
@@ -140,7 +140,6 @@ class WindowNoise:
 
     Attributes:
         counts: (w,) measurements of each window; longest: to which all are filled up.
-        huber_sigmas: see `RangeModel`.
     """
 
     def __init__(self, stack: WindowStack, noises: Sequence[PairNoise]) -> None:
@@ -155,7 +154,7 @@ class WindowNoise:
         if any(noise.model is not model and noise.model != model for noise in noises):
             raise ValueError("windows of several range models")
         self.counts, self.longest = stack.counts, stack.t.shape[1]
-        self.huber_sigmas = model.huber_sigmas
+        self._huber_sigmas = model.huber_sigmas
         self._t, self._model, self._held = stack.t, model, stack.held
         ranges = [(n.ranges.sigma, n.ranges.bias_sigma, n.ranges.scatter) for n in noises]
         sigma, bias, scatter = np.array(ranges).T
@@ -180,6 +179,16 @@ class WindowNoise:
     def sigmas(self, of: Index) -> Array:
         """(k, 1) of single ranges of windows `of` (k,)."""
         return np.asarray(self._sigma[of, None])
+
+    def weights(self, of: Index, e: Array) -> Array:
+        """(k, n): ranges lose weight that are far from the middle of all.
+
+        Args:
+            of: (k,) windows; e: (k, n) residuals.
+        """
+        beyond = self._huber_sigmas * self.sigmas(of)
+        off = np.abs(e - middle(e, self.counts[of])[:, None])
+        return np.asarray((beyond / np.maximum(off, beyond)) ** 2)
 
     def covariance(self, of: Index, u: Array, heading: Array, weights: Array) -> Array:
         """(k, n, n), of which only the lower triangles are meant.

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pair_scenes import BESIDE, OwnedPair, asked_at
-from slam_scenes import Array, config, inverted, product
+from slam_scenes import Array, config, curved_window, inverted, product
 
 from drslamd.slam.closure_method import AGREEMENT
 from drslamd.slam.consistency.pair import Agreement
@@ -17,7 +17,7 @@ from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.mounting import SIDES, TRACKS
 from drslamd.slam.relative_pose.estimate import RelativePoseEstimate, Verdict
 from drslamd.slam.relative_pose.mistakes.mounting_search import FEWEST_ASKED, MOST, MOVED_M
-from drslamd.slam.relative_pose.mistakes.what_if import CASES, MIRROR, Case
+from drslamd.slam.relative_pose.mistakes.what_if import CASES, MIRROR, Case, variants
 from drslamd.slam.settings import closure_method
 
 TWO = Agreement(least=2, outnumber=2, confirms=False)
@@ -218,6 +218,24 @@ def test_a_mistake_that_was_none_takes_back_what_was_told_with_it() -> None:
     assert pair.tracker.search.found is None
     assert pair.told() == [(0, False), (1, False)]
     assert pair.told() == []
+
+
+@pytest.mark.parametrize(("place", "is_taken_back"), [(4, False), (-1, True)])
+def test_a_track_that_is_a_scale_after_all_takes_back_what_was_told_and_a_better_one_does_not(
+    place: int, is_taken_back: bool
+) -> None:
+    pair, found = OwnedPair(TWO), Case(b=TRACKS[0])
+    search(pair, found)
+    pair.see(BESIDE, 2)
+    assert len(pair.told()) == 2
+    better = variants(found)[place]
+    window, _ = curved_window(np.random.default_rng(1))
+    request = replace(asked_at(10), window=window)
+    for _ in range(FEWEST_ASKED):
+        costs = np.array([5.0 if case == better else 1e3 for case in variants(found)])
+        pair.tracker.on_costs(request, costs, 10.0)
+    assert pair.tracker.search.found == better
+    assert pair.told() == ([(0, False), (1, False)] if is_taken_back else [])
 
 
 @pytest.mark.parametrize(("way_m", "confirms"), [(MOVED_M - 0.01, True), (MOVED_M + 0.01, False)])

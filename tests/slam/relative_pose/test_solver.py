@@ -27,7 +27,7 @@ from drslamd.slam.relative_pose import algorithm_1, solver
 from drslamd.slam.relative_pose.algorithm_1 import linear, window_residuals
 from drslamd.slam.relative_pose.descent import ITERATIONS, Descent
 from drslamd.slam.relative_pose.estimate import PairNoise, RelativePoseEstimate, Verdict
-from drslamd.slam.relative_pose.solver import NEWEST, end_off, solve, solve_all
+from drslamd.slam.relative_pose.solver import solve, solve_all
 from drslamd.slam.relative_pose.window import Window
 
 SENSORS = PairNoise(RangeNoise(0.10, 0.30), NOISE, NOISE)
@@ -415,31 +415,6 @@ def test_the_same_burst_in_the_middle_does_no_harm() -> None:
     estimate = solved(with_ranges(window, ranges))
     assert estimate.verdict is Verdict.UNIQUE
     assert same_pose(estimate.hypotheses[0].a_T_b, true, 0.3)
-
-
-@pytest.mark.parametrize(
-    ("bent", "newest", "off"),
-    [
-        (0.0, 0.3, 0.3),
-        # what odometry bent long ago says nothing of the end
-        (-0.5, 0.0, 0.0),
-        (-0.5, 0.3, 0.3),
-        # nor does what lies just before it, where the rest is as the end is
-        (0.3, 0.3, 0.0),
-    ],
-)
-def test_an_end_is_off_where_it_is_off_all_the_rest_and_off_what_lies_just_before_it(
-    bent: float, newest: float, off: float
-) -> None:
-    e = np.zeros((1, 40))
-    e[0, :26], e[0, -NEWEST:] = bent, newest
-    assert end_off(e, np.array([40])) == pytest.approx([off])
-
-
-def test_the_end_of_a_short_window_is_held_against_all_of_it() -> None:
-    """Not more often against the first, which is as the end is, than there are ranges."""
-    e = np.array([[0.3, 0.0, 0.0, 0.0, 0.0, 0.3, 0.3, 0.3, 9.0]])
-    assert end_off(e, np.array([8])) == pytest.approx([0.15])
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3])

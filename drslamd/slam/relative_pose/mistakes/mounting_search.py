@@ -158,7 +158,7 @@ class MountingSearch:
         is_late = self._asked_at is None or utime - self._asked_at >= APART_US
         is_doubtful = self.poor >= MANY or awaits or self.is_provisional
         is_open = self.found is None and not self._is_final and is_doubtful
-        is_vague = self.found is not None and is_learned(self.found) and self.disagrees
+        is_vague = self.found is not None and is_learned(self.found) and self.poor >= MANY
         return is_late and (is_open or is_vague)
 
     def _is_quickly_due(self, utime: int, awaits: bool) -> bool:
@@ -263,11 +263,12 @@ class MountingSearch:
             return False
         freedom = sum(answer.freedom for answer in self._answers)
         self._answers.clear()
-        if total.min() > FITS * freedom:
-            # it was something else
+        if total.min() > freedom:
+            # not even what is allowed for explains it: it was something else
             self.found, self.is_clear, self.is_confirmed = None, False, False
             return True
         self.found = what_if.variants(found)[int(np.argmin(total))]
+        self.is_clear = self.is_clear and self.found.kind == found.kind
         return self.found != found
 
 

@@ -111,8 +111,13 @@ BEYOND = tuple(place for place in range(len(CASES)) if place not in OUTPOSTS)
 
 
 def variants(found: Case) -> tuple[Case, ...]:
-    """The same mistake a little smaller and larger, itself first."""
-    return tuple(Case(a, b) for a in found.a.variants() for b in found.b.variants())
+    """The same mistake a little smaller and larger, itself first; and where one robot is at fault,
+    that it is its track, or its scale."""
+    near = [Case(a, b) for a in found.a.variants() for b in found.b.variants()]
+    if AS_CONFIGURED in found:
+        near += [Case(a, found.b) for a in found.a.alike()]
+        near += [Case(found.a, b) for b in found.b.alike()]
+    return tuple(dict.fromkeys(near))
 
 
 @dataclass(frozen=True)

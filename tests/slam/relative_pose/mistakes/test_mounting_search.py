@@ -214,7 +214,17 @@ def test_a_mistake_is_refined_by_as_many_windows_as_found_it() -> None:
     assert search.is_confirmed
 
 
-@pytest.mark.parametrize(("level", "stays"), [(FITS - 0.01, True), (FITS + 0.01, False)])
+@pytest.mark.parametrize("place", [3, -1])
+def test_a_track_may_turn_out_to_be_a_scale_and_then_nothing_is_clear(place: int) -> None:
+    search, better = begun(), variants(TRACK)[place]
+    assert (better.kind != TRACK.kind) is (place == -1)
+    for _ in range(FEWEST_ASKED):
+        search.on_costs(of_variants(TRACK, better), 33, True)
+    assert search.found == better
+    assert search.is_clear is (place == 3)
+
+
+@pytest.mark.parametrize(("level", "stays"), [(0.99, True), (1.01, False)])
 def test_a_mistake_with_which_windows_do_not_fit_after_all_was_none(
     level: float, stays: bool
 ) -> None:
@@ -530,7 +540,7 @@ def test_chance_spares_cases_only_once_a_window_has_confirmed_the_pair(
 
 @pytest.mark.parametrize(
     ("found", "poor", "is_due"),
-    [(TRACK, MOST, True), (TRACK, MOST - 1, False), (LEFT, MOST, False)],
+    [(TRACK, MANY, True), (TRACK, MANY - 1, False), (LEFT, MANY, False)],
 )
 def test_what_was_found_is_asked_about_again_only_where_it_can_be_refined_and_does_not_fit(
     found: Case, poor: int, is_due: bool
