@@ -8,7 +8,6 @@ while a solve runs; their results come back as events.
 from __future__ import annotations
 
 import asyncio
-import signal
 from collections.abc import Callable, Coroutine
 from functools import partial
 from typing import Any
@@ -35,6 +34,7 @@ from drslamd.events import (
 )
 from drslamd.gossip.envelopes.opening import is_news_of_a_member
 from drslamd.gossip.seal import team_key
+from drslamd.host.ending import stops
 from drslamd.io.clock import Clock, MonotonicClock, cpu_s
 from drslamd.io.near_socket import NearSocket
 from drslamd.io.pace import Pace
@@ -125,9 +125,9 @@ class Daemon:
         }
 
     async def run(self) -> None:
-        """Until SIGTERM or SIGINT; a fault of ours is raised."""
+        """Until SIGTERM, SIGINT or the end of its terminal; a fault of ours is raised."""
         loop = asyncio.get_running_loop()
-        for number in (signal.SIGTERM, signal.SIGINT):
+        for number in stops():
             loop.add_signal_handler(number, self.stop)
         loop.set_exception_handler(
             lambda _, context: self._fail(

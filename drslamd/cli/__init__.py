@@ -23,10 +23,11 @@ from drslamd.cli import (
     trajectory,
     view,
 )
-from drslamd.cli.exit_codes import BAD_CONFIG
+from drslamd.cli.exit_codes import BAD_CONFIG, BUG, CANNOT_CREATE
 from drslamd.cli.parser import Parser
 from drslamd.cli.setting_up import calibrate, init
 from drslamd.config import ConfigError
+from drslamd.host.ending import in_order
 
 EXAMPLES = """\
 examples:
@@ -66,6 +67,10 @@ VERBS = (
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one verb; its exit code."""
+    return in_order(lambda: _main(arguments), unwritable=CANNOT_CREATE, bug=BUG)
+
+
+def _main(arguments: list[str] | None) -> int:
     options = parser().parse_args(arguments)
     try:
         return int(options.verb(options))

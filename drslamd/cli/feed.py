@@ -11,6 +11,7 @@ from typing import Any
 from drslamd.cli.ask import socket_of
 from drslamd.cli.exit_codes import CANNOT_CREATE, OK, UNAVAILABLE, USAGE
 from drslamd.cli.parser import Verbs, configured_verb, load
+from drslamd.host.ending import ended_by_a_signal
 from drslamd.host.unmade import unmade
 
 EXAMPLES = """\
@@ -62,7 +63,6 @@ def add(verbs: Verbs) -> None:
 
 
 def _feed(options: argparse.Namespace) -> int:
-    from drslamd.cli.watch import ended_by_a_signal
     from drslamd.feed.stream import told
     from drslamd.machine.folders import near_path
 

@@ -15,6 +15,7 @@ from drslamd.cli.parser import Verbs, load, verb
 from drslamd.config import ConfigError, GossipSection
 from drslamd.config_faults import sentences
 from drslamd.config_wheels import Section
+from drslamd.host.ending import stops
 from drslamd.host.unmade import unmade
 
 SAY_EVERY_S = 1.0
@@ -61,7 +62,7 @@ def _record(options: argparse.Namespace) -> int:
         print(unmade(path, error) if is_file else f"cannot join {where}: {reason}", file=sys.stderr)
         return CANNOT_CREATE if is_file else UNAVAILABLE
     stopped: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in stops():
         signal.signal(number, lambda got, _: stopped.append(got))
     print(f"listening to {where}, Ctrl-C ends", file=sys.stderr)
     shown = time.monotonic()

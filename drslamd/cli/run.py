@@ -12,6 +12,7 @@ from typing import NoReturn
 from drslamd.cli.exit_codes import BUG, OK
 from drslamd.cli.parser import Verbs, configured_verb, load
 from drslamd.config import Config
+from drslamd.host.ending import stops
 
 
 def add(verbs: Verbs) -> None:
@@ -49,7 +50,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _heed_signals() -> None:
     """Until the daemon listens itself: the modules take half a second to load."""
-    for number in (signal.SIGTERM, signal.SIGINT):
+    for number in stops():
         signal.signal(number, lambda *_: os._exit(OK))
 
 

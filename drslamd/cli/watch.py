@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -13,6 +12,7 @@ from typing import Any
 
 from drslamd.cli.ask import NoAnswer, answer
 from drslamd.cli.exit_codes import OK
+from drslamd.host.ending import ended_by_a_signal
 from drslamd.reports.status_table import fitted, table
 
 PERIOD_S = 1.0
@@ -81,13 +81,3 @@ def _screen() -> Iterator[None]:
     finally:
         sys.stdout.write(LEAVE)
         sys.stdout.flush()
-
-
-@contextmanager
-def ended_by_a_signal() -> Iterator[None]:
-    """SIGTERM ends it as Ctrl-C does, so that what was begun is put in order."""
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import signal
 from collections.abc import Callable, Iterator
 from typing import Any
 
 from drslamd import __version__
 from drslamd.conventions import SECOND_US
 from drslamd.events import ChannelMessage, Datagram, Event, NetworkState
+from drslamd.host.ending import stops
 from drslamd.io.clock import Clock, MonotonicClock
 from drslamd.view.door import files
 from drslamd.view.scene.hearing import Hearing
@@ -53,7 +53,7 @@ class LiveMap:
     async def run(self) -> None:
         """Until SIGTERM, SIGINT or `stop`."""
         loop = asyncio.get_running_loop()
-        for number in (signal.SIGTERM, signal.SIGINT):
+        for number in stops():
             loop.add_signal_handler(number, self.stop)
         work = (self._listener.run(), self._tell(), self._stop.wait())
         tasks = [asyncio.ensure_future(part) for part in work]

@@ -43,6 +43,14 @@ def test_a_bad_configuration_ends_with_78_and_one_sentence_per_fault(
     assert said[1].startswith(f"{config}: wheels.track_m = -4: ")
 
 
+def test_an_output_that_takes_no_more_ends_with_73(config: Path) -> None:
+    program = [sys.executable, "-m", "drslamd", "check", "--config-only", "-c", str(config)]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(program, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == exit_codes.CANNOT_CREATE == 73
+    assert len(done.stderr.splitlines()) == 1
+
+
 def test_the_module_can_be_run() -> None:
     answer = subprocess.run(
         [sys.executable, "-m", "drslamd", "--version"], capture_output=True, text=True, check=True

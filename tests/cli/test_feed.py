@@ -103,7 +103,7 @@ def test_a_file_that_cannot_be_made_is_one_sentence(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_file_has_its_end_however_the_feed_is_ended(tmp_path: Path, number: int) -> None:
     pytest.importorskip("mcap", reason="mcap is not installed")
     from mcap.reader import make_reader

@@ -72,7 +72,7 @@ def test_a_watchdog_that_is_meant_for_another_process_gets_nothing_special(tmp_p
 
 
 @pytest.mark.row("O4")
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_ends_it_in_order(tmp_path: Path, number: signal.Signals) -> None:
     with Daemon(example_in(tmp_path)) as daemon:
         daemon.manager.wait_for("READY=1")
