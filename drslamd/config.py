@@ -19,7 +19,7 @@ from pydantic import (
 )
 
 from drslamd.config_faults import one_line, sentences
-from drslamd.config_wheels import Baud, Section, Wheels
+from drslamd.config_wheels import Baud, FilePath, Port, Section, Wheels
 from drslamd.conventions import MAX_ROBOT_ID
 
 Rate = Annotated[float, Field(gt=0, le=50)]
@@ -30,12 +30,12 @@ RobotId = Annotated[int, Field(ge=0, le=MAX_ROBOT_ID)]
 class RobotSection(Section):
     id: RobotId
     """Unique in the team; the lowest living id of a group gives the frame of that group."""
-    calibration: str = ""
+    calibration: FilePath = ""
     """File made by `drslamd calibrate`: what a tape says of wheels and antennas."""
 
 
 class TeamSection(Section):
-    key_file: str = ""
+    key_file: FilePath = ""
     """File made by `drslamd keygen`, mode 0600, the same on every robot."""
     insecure: bool = False
     """True runs without a key: whoever is on the network can then forge messages. Without
@@ -54,14 +54,15 @@ class TeamSection(Section):
     def _key_or_explicitly_none(self) -> TeamSection:
         if bool(self.key_file) == self.insecure:
             raise ValueError(
-                "give either key_file (made by `drslamd keygen`) or insecure = true, not "
-                + ("both" if self.insecure else "neither")
+                "key_file and insecure = true exclude each other: leave out one of them"
+                if self.insecure
+                else "neither key_file (made by `drslamd keygen`) nor insecure = true is there"
             )
         return self
 
 
 class UwbSection(Section):
-    port: str
+    port: Port
     """Serial device of the LinkTrack module; a path below /dev/serial/by-id survives replugging."""
     baud: Baud = 921_600
     id: Annotated[int, Field(ge=0, le=0xFFFFFFFF)] | None = None
@@ -188,15 +189,15 @@ class NearSection(Section):
 
 
 class DaemonSection(Section):
-    state_dir: str = ""
+    state_dir: FilePath = ""
     """Default: $STATE_DIRECTORY under systemd, else ~/.local/state/drslamd."""
-    status_socket: str = ""
+    status_socket: FilePath = ""
     """Default: drslamd-<id>.sock in $RUNTIME_DIRECTORY under systemd, else in the state folder."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     log_format: Literal["text", "json"] = "text"
     record: bool = False
     """Keep everything that is heard and done, for `tools/replay` and LCM's own tools."""
-    record_dir: str = ""
+    record_dir: FilePath = ""
     """Default: recordings in the state folder."""
     record_mb: Annotated[int, Field(ge=16, le=1_000_000)] = 1000
     """Of this robot in that folder; the oldest files go first."""
@@ -230,8 +231,21 @@ class Config(Section):
         return self.robot.id if self.uwb.id is None else self.uwb.id
 
 
-FILES = (("robot", "calibration"), ("team", "key_file"), ("wheels", "dbc_file"))
-"""Keys that name files which the daemon reads."""
+PLACES = (
+    ("robot", "calibration"),
+    ("team", "key_file"),
+    ("uwb", "port"),
+    ("wheels", "port"),
+    ("wheels", "dbc_file"),
+    ("daemon", "state_dir"),
+    ("daemon", "status_socket"),
+    ("daemon", "record_dir"),
+)
+"""Keys that name files, devices and folders: the same ones from wherever a program is started."""
+
+
+BYTE_ORDER_MARK = "\ufeff"
+"""Some editors put it before the first line."""
 
 
 class ConfigError(Exception):
@@ -243,24 +257,33 @@ class ConfigError(Exception):
 
 
 def parse(text: str, base_dir: str = "") -> Config:
-    """Read TOML text; relative paths of files count from `base_dir`.
+    """Read TOML text; relative paths count from `base_dir`.
 
     Raises:
         ConfigError: with one sentence per fault.
     """
     try:
-        table = tomli.loads(text)
+        table = tomli.loads(text.removeprefix(BYTE_ORDER_MARK))
     except tomli.TOMLDecodeError as error:
         raise ConfigError([f"not valid TOML: {one_line(str(error))}"]) from None
     except ValueError:
         raise ConfigError(["not valid TOML: a number of thousands of digits"]) from None
     except RecursionError:
         raise ConfigError(["not valid TOML: brackets or keys nested too deep"]) from None
-    for section, key in FILES:
+    for section, key in PLACES:
         values = table.get(section)
-        if isinstance(values, dict) and isinstance(values.get(key), str) and values[key]:
+        if isinstance(values, dict) and _is_relative(values.get(key)):
             values[key] = str(PurePath(base_dir) / values[key])
     try:
-        return Config.model_validate(table)
+        config = Config.model_validate(table)
     except ValidationError as error:
         raise ConfigError(sentences(error, Config)) from None
+    if any(beacon.uwb_id == config.uwb_id for beacon in config.beacon):
+        fault = "the module of this robot; a beacon is one that no robot carries"
+        raise ConfigError([f"beacon.uwb_id = {config.uwb_id}: {fault}"])
+    return config
+
+
+def _is_relative(value: object) -> bool:
+    """Is it a path that counts from somewhere? (``~`` is refused as it stands.)"""
+    return isinstance(value, str) and value != "" and not value.startswith("~")

@@ -174,7 +174,7 @@ def _nearest(name: object, model: type[BaseModel]) -> str:
 
 
 def _close(name: object, allowed: Iterable[str]) -> list[str]:
-    return difflib.get_close_matches(str(name)[:SHOWN], list(allowed), n=1)
+    return difflib.get_close_matches(str(name)[:SHOWN].lower(), list(allowed), n=1)
 
 
 def _listed(names: Iterable[str]) -> str:

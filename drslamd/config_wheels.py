@@ -5,7 +5,15 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal, Union
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    field_validator,
+    model_validator,
+)
 
 Scale = Annotated[float, Field(ge=1e-9, le=1e9)]
 """Between two units; beyond it products with what a sensor says could overflow."""
@@ -56,6 +64,23 @@ def _is_value(one: object) -> bool:
     return isinstance(one, (bool, int)) or (isinstance(one, float) and math.isfinite(one))
 
 
+def _whole_path(path: str) -> str:
+    if path.startswith("~"):
+        raise ValueError("~ stands for no home here: write the whole path")
+    return path
+
+
+def _device(path: str) -> str:
+    if not path:
+        raise ValueError("a serial device; ls /dev/serial/by-id shows their names")
+    return path
+
+
+FilePath = Annotated[str, AfterValidator(_whole_path)]
+"""Of a file or a folder; a relative one counts from the folder of the configuration."""
+Port = Annotated[FilePath, AfterValidator(_device)]
+
+
 class CanSection(Section):
     interface: str = "socketcan"
     """A python-can interface name; `socketcan` on robots."""
@@ -86,7 +111,7 @@ class GyroKeys(Section):
 
 
 class SerialWheelSection(WheelSection):
-    port: str
+    port: Port
     baud: Baud = 115_200
 
 
@@ -145,7 +170,7 @@ class AgilexSection(CanWheelSection, GyroKeys):
 
 class DbcSection(CanWheelSection, GyroKeys):
     source: Literal["dbc"]
-    dbc_file: str
+    dbc_file: FilePath
     measures: Literal["counts", "wheel_speeds", "twist"]
     left: str = ""
     right: str = ""

@@ -58,7 +58,7 @@ WRONG = {
         changed("insecure = true", 'insecure = true\nkey_file = "k"'),
         "team",
         "",
-        "both",
+        "exclude each other",
     ),
     "a misspelt key": (changed("insecure", "insekure"), "team.insekure", "true", "insecure"),
     "a misspelt section": (changed("[robot]", "[robto]"), "robto", "", "robot"),
@@ -263,6 +263,49 @@ def test_file_names_count_from_the_folder_of_the_file() -> None:
     assert parse(text, "/etc/drslamd").team.key_file == "/etc/drslamd/team.key"
     absolute = changed("insecure = true", 'key_file = "/run/team.key"')
     assert parse(absolute, "/etc/drslamd").team.key_file == "/run/team.key"
+
+
+RELATIVE = changed('"/dev/serial/by-id/uwb"', '"uwb"').replace('"/dev/serial/by-id/base"', '"base"')
+
+
+def test_devices_and_folders_count_from_there_too_wherever_a_program_is_started() -> None:
+    folders = '[daemon]\nstate_dir = "s"\nstatus_socket = "run/s.sock"\nrecord_dir = "../r"\n'
+    config = parse(RELATIVE + folders, "/home/me/robot")
+    assert (config.uwb.port, config.wheels.port) == ("/home/me/robot/uwb", "/home/me/robot/base")  # type: ignore[union-attr]
+    daemon = config.daemon
+    assert (daemon.state_dir, daemon.status_socket) == (
+        "/home/me/robot/s",
+        "/home/me/robot/run/s.sock",
+    )
+    assert daemon.record_dir == "/home/me/robot/../r"
+    assert parse(GOOD, "/home/me").daemon.state_dir == ""
+
+
+@pytest.mark.parametrize("key", ["state_dir", "status_socket", "record_dir"])
+def test_a_tilde_is_refused_rather_than_made_a_folder_of_that_name(key: str) -> None:
+    (sentence,) = faults(f'{GOOD}[daemon]\n{key} = "~/drslamd"')
+    assert sentence == (
+        f"daemon.{key} = '~/drslamd': ~ stands for no home here: write the whole path"
+    )
+
+
+def test_a_port_without_a_name_is_told_where_names_are() -> None:
+    (sentence,) = faults(changed('"/dev/serial/by-id/uwb"', '""'))
+    assert sentence.startswith("uwb.port = '': a serial device; ls /dev/serial/by-id")
+
+
+def test_what_an_editor_puts_before_the_first_line_changes_nothing() -> None:
+    assert parse("\ufeff" + GOOD) == parse(GOOD)
+
+
+@pytest.mark.parametrize(("module", "is_own"), [(3, True), (4, False)])
+def test_a_beacon_is_not_the_module_of_this_robot(module: int, is_own: bool) -> None:
+    text = f"{GOOD}[[beacon]]\nuwb_id = {module}\nx_m = 1\ny_m = 2"
+    if is_own:
+        (sentence,) = faults(text)
+        assert sentence.startswith("beacon.uwb_id = 3: the module of this robot")
+    else:
+        assert parse(text).beacon[0].uwb_id == 4
 
 
 def test_a_configuration_cannot_be_changed() -> None:

@@ -221,6 +221,11 @@ def test_a_misspelt_key_stands_before_the_one_that_is_missing_for_it() -> None:
     )
 
 
+def test_capitals_hide_no_key() -> None:
+    said = faults(file_with("uwb", "port = 'x'").replace("[uwb]", "[UWB]"))
+    assert said[0] == "UWB = {...}: unknown key; did you mean uwb?"
+
+
 def test_a_rule_of_a_whole_section_stands_behind_what_may_be_its_cause() -> None:
     said = faults(file_with("team", "").replace("id = 3", "id = 999"))
     assert [sentence.split(":")[0] for sentence in said] == ["robot.id = 999", "team"]

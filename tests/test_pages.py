@@ -155,7 +155,7 @@ class Refused(Exception):
     """A parser does not take an argument."""
 
 
-class _Built(Exception):
+class _Built(BaseException):
     """A program has built its parser and is about to use it."""
 
     def __init__(self, parser: argparse.ArgumentParser) -> None:

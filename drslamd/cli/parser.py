@@ -54,7 +54,7 @@ def configured_verb(
 def load(path: str) -> Config:
     """The configuration in that file. Raises ConfigError, with a sentence for each fault."""
     try:
-        text = Path(path).read_text()
+        text = Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError([_unreadable(path, error)]) from None
     return parse(text, str(Path(path).resolve().parent))

@@ -86,7 +86,7 @@ def test_the_spy_sees_what_a_good_configuration_opens(tmp_path: Path) -> None:
         ("source =", "sauce =", "wheels.sauce = 'kobuki': unknown key; did you mean source?"),
         ('source = "kobuki"', 'source = "kabuki"', "wheels.source = 'kabuki': allowed are"),
         ("#baud = 921600", "baudrate = 921600", "uwb.baudrate = 921600: unknown key; did you"),
-        ("insecure = true", "", "team: give either key_file"),
+        ("insecure = true", "", "team: neither key_file (made by `drslamd keygen`) nor"),
         ("[uwb]", "[uwb", "not valid TOML: "),
     ],
 )

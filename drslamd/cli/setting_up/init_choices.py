@@ -48,6 +48,8 @@ class Chooser:
             WrongFlag: a flag cannot be meant.
         """
         self._options = options
+        options.port = [os.path.abspath(port) for port in options.port]
+        options.uwb_port, options.wheels_port = map(_whole, (options.uwb_port, options.wheels_port))
         self._is_person = is_person
         self._keys = wheel_keys(options.wheel)
         if options.id is not None and not 0 <= options.id <= MAX_ROBOT_ID:
@@ -152,7 +154,8 @@ class Chooser:
                 keys[key] = ask(f"wheels.{key}", partial(_fitting, wheels.source, keys, key))
             else:
                 flag = f"--wheel {key}=VALUE"
-                self.missing.append(Missing(f"a {wheels.source} base needs {key}", flag))
+                article = "an" if wheels.source[0] in "aeiou" else "a"
+                self.missing.append(Missing(f"{article} {wheels.source} base needs {key}", flag))
         return WheelsChoice(wheels.source, keys)
 
     def _key(self) -> Union[str, Missing]:
@@ -246,6 +249,11 @@ def _fitting(source: str, keys: Mapping[str, Any], key: str, line: str) -> Any:
         if wrong:
             raise ValueError(wrong[0]) from None
     return value
+
+
+def _whole(port: str) -> str:
+    """From wherever the daemon will be started."""
+    return os.path.abspath(port) if port else ""
 
 
 def _plain(line: str) -> str:

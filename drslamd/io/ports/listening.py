@@ -133,6 +133,9 @@ def _set_speed(line: int, baud: int) -> None:
         control &= ~(termios.CSIZE | termios.PARENB | termios.CSTOPB | termios.CRTSCTS)
         control &= ~termios.HUPCL
         control |= termios.CS8 | termios.CREAD | termios.CLOCAL
+        # a port keeps what its last user set: with pyserial's VMIN of 0 nothing to read looks like
+        # a device that is gone
+        special[termios.VMIN], special[termios.VTIME] = 1, 0
         termios.tcsetattr(line, termios.TCSANOW, [0, 0, control, 0, speed, speed, special])
         termios.tcflush(line, termios.TCIFLUSH)
     except termios.error as error:

@@ -61,6 +61,27 @@ def test_a_person_is_asked_what_nobody_can_see(
     assert "  counts_per_metre = 'many': a number" in said
 
 
+def test_ports_are_written_as_they_are_found_from_everywhere() -> None:
+    flags = options(port=["a", "/dev/b"], uwb_port="a", base="kobuki", wheels_port="/dev/b", id=3)
+    here = Path.cwd()
+    chooser = Chooser(flags, is_person=False)
+    chooser.ports = [MODULES[0]._replace(path=str(here / "a")), QUIET._replace(path="/dev/b")]
+    flags.insecure = True
+    chosen = chooser.chosen()
+    assert chosen is not None
+    assert (chosen.uwb.port, chosen.wheels.keys["port"]) == (str(here / "a"), "/dev/b")
+
+
+@pytest.mark.parametrize(
+    ("base", "name"), [("ascii", "an ascii base"), ("roboteq", "a roboteq base")]
+)
+def test_what_a_base_needs_is_said_in_english(base: str, name: str) -> None:
+    chooser = Chooser(options(base=base, wheels_port="/dev/q"), is_person=False)
+    chooser.ports = [*MODULES, QUIET]
+    assert chooser.chosen() is None
+    assert f"{name} needs counts_per_metre" in [m.why for m in chooser.missing]
+
+
 def test_without_a_person_everything_that_is_missing_is_said_at_once() -> None:
     chooser = Chooser(options(), is_person=False)
     chooser.ports = [*MODULES, QUIET]

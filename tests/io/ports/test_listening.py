@@ -36,6 +36,20 @@ def test_a_kobuki_is_found_at_its_own_speed(tmp_path: Path) -> None:
     assert (found.who.device, found.baud) == (Device.KOBUKI, 115_200)
 
 
+def test_what_the_last_user_of_a_port_set_does_not_make_its_device_gone(tmp_path: Path) -> None:
+    """pyserial leaves a VMIN of 0: to read nothing is then what an unplugged port says."""
+    port = kobuki(tmp_path / "tty")
+    line = os.open(port.path, os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK)
+    try:
+        settings = termios.tcgetattr(line)
+        settings[3] = 0  # raw, or VMIN means nothing
+        settings[6][termios.VMIN] = settings[6][termios.VTIME] = 0
+        termios.tcsetattr(line, termios.TCSANOW, settings)
+    finally:
+        os.close(line)
+    assert heard(port).who.device is Device.KOBUKI
+
+
 def test_what_speaks_and_is_nobody_we_know_is_unknown(tmp_path: Path) -> None:
     port = SpeakingPort(tmp_path / "tty", lambda t: b"$GPGGA,1,2*00\r\n", 115_200)
     assert heard(port) == Listened(Recognised(Device.UNKNOWN))
