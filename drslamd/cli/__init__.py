@@ -1,8 +1,9 @@
 """The command ``drslamd``: one file for each verb.
 
 Exit codes: 0 done, 1 something that doctor or calibrate found, 64 wrong usage, 69 no daemon or
-sensor answers (view: no aiohttp, or its port is taken), 70 a bug of ours, 73 a file that cannot be
-made, 75 another daemon already runs, 78 an unusable set-up.
+sensor answers, or a package is missing (view: or its port is taken), 70 a bug of ours, 73 a file
+that cannot be made, or an output that takes no more, 75 another daemon already runs, 78 an unusable
+set-up.
 """
 
 from __future__ import annotations
@@ -45,8 +46,8 @@ examples:
   drslamd record run.lcmlog --interface wlan0   what all robots say, for LCM tools
 
 exit codes: 0 done, 1 doctor or calibrate found something, 64 wrong usage, 69 no daemon or sensor
-answers (view: no aiohttp, or its port is taken), 70 a bug, 73 a file cannot be made, 75 another
-daemon already runs, 78 the set-up cannot be used
+answers or a package is missing (view: or its port is taken), 70 a bug, 73 a file or the output
+cannot be written, 75 another daemon already runs, 78 the set-up cannot be used
 """
 
 VERBS = (

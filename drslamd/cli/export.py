@@ -77,13 +77,17 @@ def _write(options: argparse.Namespace, answers: dict[str, Any]) -> int:
         print(sentence, file=sys.stderr)
     if said["frame"] is None:
         print("this robot is not localised: there are no paths and no graph yet", file=sys.stderr)
-    try:
-        written = [path for name in options.format for path in write(name, options.to, answers)]
-        print("".join(f"{path}\n" for path in dict.fromkeys(written)), end="")
-    except CannotWrite as error:
-        print(error, file=sys.stderr)
-        return UNAVAILABLE
-    except OSError as error:
-        print(unmade(options.to, error), file=sys.stderr)
-        return CANNOT_CREATE
-    return OK
+    written: dict[Path, None] = {}
+    unwritten = []
+    for name in options.format:
+        try:
+            written.update(dict.fromkeys(write(name, options.to, answers)))
+        except CannotWrite as error:
+            unwritten.append(error)
+        except OSError as error:
+            print(unmade(options.to, error), file=sys.stderr)
+            return CANNOT_CREATE
+    print("".join(f"{path}\n" for path in written), end="")
+    for fault in unwritten:
+        print(fault, file=sys.stderr)
+    return UNAVAILABLE if unwritten else OK

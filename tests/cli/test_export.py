@@ -47,6 +47,19 @@ def test_all_formats_at_once_print_each_file_once(
     assert set(to.iterdir()) == set(printed)
 
 
+def test_a_format_that_cannot_be_written_keeps_no_other_from_being_written_and_named(
+    socket: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    to = tmp_path / "out"  # no place of this team is known by longitude and latitude
+    code = export(socket, to, team_answers.answers(), "g2o", "geojson", "tum")
+    said = capsys.readouterr()
+    assert code == UNAVAILABLE
+    assert {path.name for path in to.iterdir()} == {Path(line).name for line in said.out.split()}
+    assert {"graph.g2o", "robot1.txt"} <= {path.name for path in to.iterdir()}
+    assert len(said.err.splitlines()) == 1
+    assert "[[beacon]]" in said.err
+
+
 @pytest.mark.slow
 def test_a_wall_clock_that_nobody_sets_is_said_and_what_to_do(
     socket: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -99,7 +99,7 @@ def test_nothing_but_garbage_is_named_and_believed_never() -> None:
             await asyncio.sleep(0.01)
         answer = await status(robot)
         assert says("is uwb.baud right")(answer)
-        assert says("is wheels.baud right?")(answer)
+        assert says("are wheels.source and wheels.baud right?")(answer)
         assert not answer["uwb"]["ranges"]
 
     with_daemon(test)

@@ -119,6 +119,8 @@ _NOT_FINITE: Final = (
 
 REPEATED: Final = 3
 """So many refusals for one reason are a finding; noise is refused in fewer."""
+_WRONG_LINE: Final = "are wheels.source and wheels.baud right?"
+_WRONG_BUS: Final = "is this the bus of the base?"
 _DAMAGES: Final = {
     WheelRefusal.CHECKSUM: "they come with wrong checksums; check the cable, below 2 m, and its "
     "shield",
@@ -304,7 +306,7 @@ class WheelInput:
         if self.driver.tally.refused[WheelRefusal.NOT_FINITE] > self._not_finite_before:
             return _NOT_FINITE
         seconds = (utime - self._trying_since) // SECOND_US
-        remedy = "is wheels.baud right?" if self._serial else "is this the bus of the base?"
+        remedy = _WRONG_LINE if self._serial else _WRONG_BUS
         if damaged := self._damaged():
             # (noise at a wrong rate has frames too, now and then)
             cause = f"{damaged.rstrip('?')}, {remedy}" if self._serial else damaged

@@ -60,7 +60,7 @@ def test_nothing_is_a_right_name_where_nobody_is_at_fault() -> None:
     "sentence",
     [
         "not localised: no ranges to robots 1; are their modules on, and is uwb.id right?",
-        "input, but no frame for 3 s: is wheels.baud right?",
+        "input, but no frame for 3 s: are wheels.source and wheels.baud right?",
         "the odometry of robot 1 contradicts all others",
     ],
 )

@@ -165,7 +165,7 @@ def test_bytes_without_samples_lead_to_the_baud_rate(after_s: float, told: bool)
     advice = wheels.advice(T0 + round(after_s * SECOND_US))
     assert (advice is not None) == told
     assert not told or advice == (
-        "input, but no Kobuki packets (AA 55 ...) for 5 s: is wheels.baud right?"
+        "input, but no Kobuki packets (AA 55 ...) for 5 s: are wheels.source and wheels.baud right?"
     )
 
 
@@ -273,7 +273,7 @@ def test_an_odrive_at_50_ms_with_axes_11_ms_apart_moves() -> None:
     [
         (kobuki_packet(kobuki_core(1, 2, 3))[:-1] + b"\x00", "wrong checksums"),
         (kobuki_packet(b"\x01\x03abc"), "not of the form of the protocol"),
-        (b"something else\r\n", "is wheels.baud right?"),
+        (b"something else\r\n", "are wheels.source and wheels.baud right?"),
     ],
 )
 def test_what_a_kobuki_sends_without_odometry_has_its_own_sentence(
