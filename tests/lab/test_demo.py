@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -69,10 +70,14 @@ class Played:
         self.apart = False
         self.beside: Any = None
         self.failure = ""
+        self.signal: signal.Signals | None = None
 
     async def run(self, recording: Recording, *_: Any, beside: Any = None, **__: Any) -> Outcome:
         self.recordings.append(recording)
         self.beside = beside
+        if self.signal is not None:
+            signal.raise_signal(self.signal)
+            await asyncio.sleep(60)
         if self.failure:
             raise real_team.TeamFailed(self.failure)
         out = Outcome()
@@ -156,6 +161,17 @@ def test_a_daemon_that_failed_ends_with_70_and_its_last_words(
     played.failure = "robot 1 ended:\nlast words"
     assert demo.main(SMALL) == 70
     assert "robot 1 ended:\nlast words" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_whoever_interrupts_it_is_told_in_one_sentence(
+    played: Played, number: signal.Signals, capsys: pytest.CaptureFixture[str]
+) -> None:
+    played.signal = number
+    assert demo.main(SMALL) == 130
+    assert capsys.readouterr().err.strip() == (
+        "interrupted: all daemons are stopped, nothing was written"
+    )
 
 
 def test_a_recording_that_cannot_be_used_ends_with_66_before_anything_starts(

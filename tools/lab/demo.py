@@ -4,8 +4,8 @@ Each robot is a process of its own with two pseudo-terminals, on which an emulat
 and an emulated wheel controller speak their true bytes; the processes gossip over multicast on
 this host only. Exit codes: 0 the team is one group and at most 1.2 times as far off as dead
 reckoning that was given the true start poses, 1 it is not, 2 wrong usage, 66 unusable recording,
-70 a daemon failed, 73 a result cannot be written. What a run that failed found stands beside what a
-good one found, as `demo-failed.png`.
+70 a daemon failed, 73 a result cannot be written, 130 it was interrupted. What a run that failed
+found stands beside what a good one found, as `demo-failed.png`.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from drslamd.cli.view import HTTP_PORT
+from drslamd.host.ending import ended_by_a_signal
 from lab.files import beside_a_good_one, keep, result_file
 from lab.numbers import real, whole
 from lab.play import real_team
@@ -33,7 +34,7 @@ from lab.score import outcome, picture, table
 from lab.score.outcome import Outcome
 
 AT_MOST = 1.2
-NO_INPUT, FAILED = 66, 70
+NO_INPUT, FAILED, INTERRUPTED = 66, 70, 130
 MOST_ROBOTS = 30
 """Processes that a laptop bears."""
 
@@ -61,12 +62,16 @@ def main(arguments: list[str] | None = None) -> int:
     hardware = equip(recording, varied=options.dataset is None)
     try:
         beside, extra = (live_map, FOR_THE_MAP) if options.view else (None, "")
-        result = asyncio.run(
-            real_team.run(recording, hardware, extra, progress=progress, beside=beside)
-        )
+        with ended_by_a_signal():
+            result = asyncio.run(
+                real_team.run(recording, hardware, extra, progress=progress, beside=beside)
+            )
     except real_team.TeamFailed as error:
         print(f"\n{error}", file=sys.stderr)
         return FAILED
+    except KeyboardInterrupt:
+        print("\ninterrupted: all daemons are stopped, nothing was written", file=sys.stderr)
+        return INTERRUPTED
     progress.end()
     return _report(recording, result, options)
 
@@ -89,7 +94,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--seconds", type=real(5, 3600), default=75.0, help="of driving (default 75)"
     )
-    parser.add_argument("--png", type=result_file, default="out/demo.png", metavar="FILE")
+    parser.add_argument(
+        "--png",
+        type=result_file,
+        default="out/demo.png",
+        metavar="FILE",
+        help="the picture (default out/demo.png)",
+    )
     parser.add_argument("--json", type=result_file, metavar="FILE", help="write all figures there")
     return parser
 

@@ -196,8 +196,12 @@ class RealTeam:
         return RealRobot(hardware, clock, config, *devices, log=place / "log", tree=self._tree)
 
     async def __aenter__(self) -> RealTeam:
-        await asyncio.gather(*(robot.start() for robot in self.robots.values()))
-        await asyncio.gather(*(robot.ready() for robot in self.robots.values()))
+        try:
+            await asyncio.gather(*(robot.start() for robot in self.robots.values()))
+            await asyncio.gather(*(robot.ready() for robot in self.robots.values()))
+        except BaseException:
+            await self._end()
+            raise
         for robot in self.robots.values():
             robot.wheels.answer_with(robot.hardware.base.answer)
         self._listener = self._listen()
@@ -206,6 +210,10 @@ class RealTeam:
     async def __aexit__(self, *_: object) -> None:
         asyncio.get_running_loop().remove_reader(self._listener.fileno())
         self._listener.close()
+        await self._end()
+
+    async def _end(self) -> None:
+        """Stop who runs, and leave nothing behind."""
         await asyncio.gather(*(robot.stop() for robot in self.robots.values()))
         for robot in self.robots.values():
             robot.uwb.pull()
