@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from drslamd.cli.parser import load
+from drslamd.cli.service_user import unit_of
 from drslamd.host.owners import permissions, user_name
 from drslamd.io.status_socket import ask
 from drslamd.machine.folders import socket_to_ask
@@ -48,12 +49,18 @@ def answer(path: Path, question: str, config_path: str) -> Any:
     try:
         return asyncio.run(ask(path, question))
     except (OSError, ValueError, asyncio.TimeoutError) as error:
-        raise NoAnswer(f"no daemon answers at {path}: {_why(path, error, config_path)}") from None
+        raise NoAnswer(no_daemon(path, error, config_path)) from None
+
+
+def no_daemon(path: Path, error: Exception, config_path: str) -> str:
+    """Nobody answers there: why, and what to do."""
+    return f"no daemon answers at {path}: {_why(path, error, config_path)}"
 
 
 def _why(path: Path, error: Exception, config_path: str) -> str:
-    start = f"start it: systemctl start drslamd@{Path(config_path).stem}, or drslamd run -c "
-    start += config_path
+    unit = unit_of(config_path)
+    start = "start it: " + (f"systemctl start {unit}, or " if unit else "")
+    start += f"drslamd run -c {config_path}"
     if isinstance(error, FileNotFoundError):
         return f"none runs with this configuration; {start}"
     if isinstance(error, ConnectionRefusedError):
@@ -66,7 +73,10 @@ def _why(path: Path, error: Exception, config_path: str) -> str:
             f"usermod -aG drslamd {user_name()}"
         )
     if isinstance(error, (asyncio.TimeoutError, TimeoutError)):
-        unit = f"drslamd@{Path(config_path).stem}"
+        if unit is None:
+            return (
+                "it runs but hangs; its log may say why, end it with kill -ABRT and start it again"
+            )
         return f"it runs but hangs; journalctl -u {unit} may say why, systemctl restart {unit}"
     if isinstance(error, ValueError):
         return f"what came is no answer ({error}); is it a daemon of this version?"

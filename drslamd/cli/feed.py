@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from drslamd.cli.ask import socket_of
+from drslamd.cli.ask import no_daemon, socket_of
 from drslamd.cli.exit_codes import CANNOT_CREATE, OK, UNAVAILABLE, USAGE
 from drslamd.cli.parser import Verbs, configured_verb, load
 from drslamd.host.ending import ended_by_a_signal
@@ -96,11 +96,7 @@ def _feed(options: argparse.Namespace) -> int:
             for near in told(path):
                 feed.tell(near)
     except OSError as error:
-        reason = error.strerror or str(error)
-        print(
-            f"no daemon answers at {path}: {reason}; start it: drslamd run -c {options.config}",
-            file=sys.stderr,
-        )
+        print(no_daemon(path, error, options.config), file=sys.stderr)
         return UNAVAILABLE
     except KeyboardInterrupt:
         return OK

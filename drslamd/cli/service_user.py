@@ -24,14 +24,19 @@ PLACES = {"STATE_DIRECTORY": "/var/lib/drslamd", "RUNTIME_DIRECTORY": "/run/drsl
 
 def user_of_service(config_path: str) -> str | None:
     """Whose eyes count for this configuration; None when it is this user's own."""
-    is_the_services = Path(config_path).resolve().parent == SERVICE_FOLDER
-    if os.geteuid() != 0 or not is_the_services:
+    if os.geteuid() != 0 or unit_of(config_path) is None:
         return None
     try:
         pwd.getpwnam(SERVICE_USER)
     except KeyError:
         return None
     return SERVICE_USER
+
+
+def unit_of(config_path: str) -> str | None:
+    """The unit that reads this configuration; None where systemd knows nothing of it."""
+    path = Path(config_path).resolve()
+    return f"drslamd@{path.stem}" if path.parent == SERVICE_FOLDER else None
 
 
 def as_user(name: str, look: Callable[[], int]) -> int:

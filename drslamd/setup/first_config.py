@@ -41,7 +41,7 @@ def toml(chosen: FirstConfig) -> str:
     """The file, ready for ``drslamd check``."""
     lines = [
         f"# Robot {chosen.robot}, made by drslamd init. Is it right? drslamd check -c FILE",
-        "# Every other key with its default: etc/drslamd.toml in the repository.",
+        "# Every other key with its default: man drslamd.toml, or etc/drslamd.toml in the clone.",
         "",
         "[robot]",
         _line("id", chosen.robot, "0 to 254, another one for each robot of the team"),

@@ -23,8 +23,8 @@ def test_asking_when_no_daemon_runs_ends_with_69_and_how_to_start_one(
     assert cli.main([verb, "-c", str(config)]) == exit_codes.UNAVAILABLE == 69
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("no daemon answers at ")
-    assert "none runs with this configuration; start it: systemctl start drslamd@3, or " in line
-    assert line.endswith(f"drslamd run -c {config}")
+    # systemd reads /etc/drslamd/3.toml, and not this file
+    assert line.endswith(f"none runs with this configuration; start it: drslamd run -c {config}")
 
 
 def said(path: Path) -> str:
@@ -45,6 +45,11 @@ def test_what_a_dead_daemon_left_behind_answers_nothing(place: Path) -> None:
     assert "the last one ended without a goodbye; start it: " in said(place)
 
 
+def test_the_configuration_of_the_service_is_started_by_systemd(place: Path) -> None:
+    start = "start it: systemctl start drslamd@3, or drslamd run -c /etc/drslamd/3.toml"
+    assert said(place).endswith(start)
+
+
 def test_a_daemon_of_another_user_is_not_to_be_asked() -> None:
     with healthy() as setup:
         give_away(setup)
@@ -63,6 +68,8 @@ def test_a_daemon_that_hangs_is_said_to(place: Path, monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(ask, "ask", never)
     assert "it runs but hangs; journalctl -u drslamd@3 may say why" in said(place)
+    with pytest.raises(NoAnswer, match="its log may say why, end it with kill -ABRT"):
+        answer(place, "status", "3.toml")
 
 
 def test_what_is_no_answer_is_called_so(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -116,7 +116,7 @@ def _configuration() -> list[Fault]:
         Fault("source misspelt", changed("source", "sorce"), "wheels.sorce", "mean source?"),
         Fault("no such base", changed('"kobuki"', '"kabuki"'), "'kabuki'", '"kobuki", "roboteq"'),
         Fault("no key named", changed('key_file = "team.key"', ""), "neither", "drslamd keygen"),
-        Fault("key and none", changed("[team]", "[team]\ninsecure = true"), "both", "give either"),
+        Fault("key and none", changed("[team]", "[team]\ninsecure = true"), "exclude", "leave out"),
         Fault("no group", changed("[gossip]", '[gossip]\ngroup = "10.0.0.1"'), "10.0.0.1", "224."),
         Fault(
             "no scale",
