@@ -43,7 +43,7 @@ QUIET_US = 3 * SECOND_US
 """Between heartbeats of a robot that is localised, lacks nothing and hears the same as before."""
 POSE_US = SECOND_US
 """Longest silence about the pose of a localised robot."""
-BATCHES = 8
+BATCHES = 16
 """Batches that are remembered: more than go out between two statuses."""
 ON_THE_AIR_US = SECOND_US // 5
 """A status that comes so shortly after a batch cannot know of it."""
@@ -65,6 +65,8 @@ class Broadcast:
         """What was said before."""
         self._odometry_said: deque[tuple[int, int]] = deque(maxlen=BATCHES)
         """When batches were said, and one past the last sample of each."""
+        self._odometry_due = 0
+        """When all who need it are to have more, us."""
 
     # heartbeat
 
@@ -118,8 +120,13 @@ class Broadcast:
     # odometry
 
     def odometry(self, neighbours: list[PeerInRange], utime: int) -> list[Effect]:
-        """Short-term odometry, for peers whose windows need it (paper III-C)."""
+        """Short-term odometry, for peers whose windows need it (paper III-C): each second, and at
+        each call for who is lost, for where it is hangs on where we are now."""
         track = self._front.reckoning.track
+        if utime >= self._odometry_due:
+            self._odometry_due = utime + SECOND_US - SOONER_US
+        else:
+            neighbours = [peer for peer in neighbours if peer.is_lost]
         wants = [self._lacked(peer) for peer in neighbours if peer.wanted_n != NOTHING_WANTED]
         if not len(track) or not wants:
             return []

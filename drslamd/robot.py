@@ -141,7 +141,7 @@ class Robot:
         periods: dict[Action, int] = {
             self._repeat: TURN_US if config.optimizer.algorithm == "rbcd" else REPEAT_US,
             self._send_status: SECOND_US,
-            self._send_odometry: SECOND_US,
+            self._send_odometry: PLACE_US,
             self._place: PLACE_US,
             self._extend_log: SECOND_US,
             self.modules.relative_poses: round(SECOND_US / config.relative_pose.rate_hz),
@@ -295,7 +295,8 @@ class Robot:
         return self.modules.consistency(utime, pair) if module == RELATIVE_POSE else []
 
     def _tell_at_once(self, utime: int) -> list[Effect]:
-        return [*self._extend_log(utime), *self.modules.optimize_soon(utime)]
+        told = [*self._extend_log(utime), *self.modules.optimize_soon(utime)]
+        return [*told, *self.broadcast.pose(self.whereabouts(utime), utime)]
 
     # what we know of ourselves
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from drslamd.config import Config
@@ -89,10 +90,15 @@ class Standing:
         by_ranges, estimate = self._front.relocation.by_ranges(utime), self._back.estimate
         is_point = estimate is not None and self._robot in estimate.points
         most, pose = self._most_mps, self.pose()
-        if pose is not None and is_vague(pose.covariance) and self._comes_back(pose, utime):
+        placed = self._front.relocation.placed(estimate, track) if estimate is not None else None
+        is_placed = placed is not None and _turns_less(placed, pose)
+        if is_placed:
+            pose = placed
+        elif pose is not None and is_vague(pose.covariance) and self._comes_back(pose, utime):
             pose = None
         doubt, valid_us = self._doubt(), self._rhythm.valid_us
-        return whereabouts(pose, track, most, doubt, utime, gap_m, by_ranges, is_point, valid_us)
+        found = whereabouts(pose, track, most, doubt, utime, gap_m, by_ranges, is_point, valid_us)
+        return replace(found, is_placed=is_placed and not found.is_old)
 
     def _comes_back(self, pose: PoseNow, utime: int) -> bool:
         """Were we just placed, after a hole or after a start?"""
@@ -208,3 +214,8 @@ class Standing:
         windows, mountings = front.partners_by_windows(solved)
         boldness = self._back.revisions.boldness
         return doubt_of(self._robot, estimate, watch, windows, mountings, boldness)
+
+
+def _turns_less(one: PoseNow, other: PoseNow | None) -> bool:
+    """Is its heading known better?"""
+    return other is None or bool(one.covariance[2, 2] < other.covariance[2, 2])

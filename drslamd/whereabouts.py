@@ -42,12 +42,14 @@ class Whereabouts:
             been driven since in its covariance. None when it is not localised.
         age_us: of the odometry that it rests on.
         doubt: what speaks against it.
+        is_placed: is it not that of module 3, which does not know it as well yet?
     """
 
     state: PoseState
     pose: PoseNow | None = None
     age_us: int = 0
     doubt: Doubt | None = None
+    is_placed: bool = False
 
     @property
     def is_old(self) -> bool:

@@ -251,6 +251,7 @@ class Peer:
             of_us.utime if of_us else utime,
             self.clock.since,
             self.status.frame if self.status.state is PoseState.LOCALISED else None,
+            self.status.state is PoseState.STALE,
         )
 
 

@@ -5,6 +5,9 @@ The frames are those of REP 105. The pose in ``odom`` is dead reckoning and neve
 solution; a controller that works in ``odom`` does not feel it. A step of that by more than the pose
 was uncertain counts as a reset, as does another frame.
 
+Who was placed after a hole in its odometry has a pose sooner than module 3 (`slam/relocation`);
+here it is stale until module 3 has it, for the covariances are those of its solution.
+
 Peers are `peers_around`.
 """
 
@@ -19,6 +22,7 @@ import numpy as np
 from drslamd.config import Config
 from drslamd.conventions import GRID_US, MILLISECOND_US, SECOND_US, Chain
 from drslamd.events import Send
+from drslamd.gossip.message_types import PoseState
 from drslamd.gossip.team import Team
 from drslamd.near.leg import Leg
 from drslamd.near.near_message import NO_WALL, Near, Wall, encode, is_near, near_channel
@@ -143,7 +147,7 @@ class Surroundings:
             speed,
             turn,
             *wall,
-            state=where.state,
+            state=PoseState.STALE if where.is_placed else where.state,
             frame=estimate.frame.robot,
             frame_epoch=estimate.frame.epoch,
             correction=_taken_off(leg.end, odom),

@@ -18,6 +18,7 @@ class PeerInRange:
         track: its odometry of the last minutes.
         ahead_us: its clock minus ours; None while that is not known well enough.
         frame: robot in whose frame it says that it is localised, None while it does not.
+        is_lost: does it say that it has a hole in its odometry, or had one and is not back?
         wanted_n: first sample of our odometry that it lacked and needed when it last said so, at
             wanted_at, us; -1 when it needs none.
         clocks_since_us: from when on our clock that holds; either clock jumped before.
@@ -32,3 +33,4 @@ class PeerInRange:
     wanted_at: int = 0
     clocks_since_us: int = 0
     frame: int | None = None
+    is_lost: bool = False

@@ -295,6 +295,15 @@ def test_a_neighbour_carries_what_the_peer_said() -> None:
     assert not peer.neighbour(OWN, T0).ranges_to_us
 
 
+@pytest.mark.parametrize("state", PoseState)
+def test_a_neighbour_is_lost_whose_pose_is_stale_and_no_other(state: PoseState) -> None:
+    peer = a_peer()
+    peer.take_status(replace(a_status(), state=state), 1, OWN, 0)
+    neighbour = peer.neighbour(OWN, T0)
+    assert neighbour.is_lost is (state is PoseState.STALE)
+    assert (neighbour.frame is not None) is (state is PoseState.LOCALISED)
+
+
 @pytest.mark.parametrize(("excess_us", "known"), [(0, True), (2, False)])
 def test_a_clock_that_is_known_worse_than_a_grid_step_is_not_used(
     excess_us: int, known: bool

@@ -131,3 +131,18 @@ def test_what_is_said_on_lcm_does_not_depend_on_who_reads_the_socket() -> None:
         payloads.append([send.payload for send in said])
     assert payloads[0] == payloads[1]
     assert len(payloads[0]) == 3
+
+
+@pytest.mark.parametrize(
+    ("sigma_rad", "state"), [(1e-6, PoseState.STALE), (1.0, PoseState.LOCALISED)]
+)
+def test_a_pose_that_module_3_does_not_have_yet_is_stale_here(
+    steered: Steered, sigma_rad: float, state: PoseState, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its covariances are those of module 3."""
+    now = steered.robot.pose()
+    assert now is not None
+    placed = now._replace(covariance=np.diag([0.1, 0.1, sigma_rad]) ** 2)
+    relocation = steered.robot.front.relocation
+    monkeypatch.setattr(relocation, "placed", lambda estimate, track: placed)
+    assert steered.look().state is state

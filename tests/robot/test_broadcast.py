@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import cast
@@ -9,13 +10,15 @@ from typing import cast
 import numpy as np
 import pytest
 from lab.play.simulator import Network
+from message_builders import a_status
+from robot_scenes import RobotScene
 from teams import EASY, VirtualTeam
 
-from drslamd.broadcast import Broadcast
+from drslamd.broadcast import SOONER_US, Broadcast
 from drslamd.config import Config
 from drslamd.conventions import SECOND_US, Segment
 from drslamd.gossip import messages
-from drslamd.gossip.message_types import OdometryBatch, PoseState
+from drslamd.gossip.message_types import Heard, OdometryBatch, PoseState
 from drslamd.gossip.seal import Seal, team_key
 from drslamd.gossip.team import Team
 from drslamd.slam import se2
@@ -141,3 +144,28 @@ def test_a_robot_that_comes_late_gets_the_odometry_of_the_last_fifteen_seconds()
     team.run(36.0)
     track = team.member(0).robot.team.peers[2].track
     assert 150 <= len(track) <= 220
+
+
+@pytest.mark.parametrize(
+    ("state", "after_us", "is_said"),
+    [
+        (PoseState.STALE, 250_000, True),
+        (PoseState.LOCALISED, 250_000, False),
+        (PoseState.LOCALISED, SECOND_US - SOONER_US - 1, False),
+        (PoseState.LOCALISED, SECOND_US - SOONER_US, True),
+    ],
+)
+def test_who_is_lost_gets_odometry_at_each_call_and_all_others_once_a_second(
+    state: PoseState, after_us: int, is_said: bool
+) -> None:
+    scene = RobotScene()
+    scene.drive(2)
+    wants = Heard(0, 1, 0, wanted_n=scene.robot.front.reckoning.track.end - 5)
+    scene.hear(7, replace(a_status((wants,), ranged=(0,)), state=state))
+    scene.drive(1)
+    now, neighbours = scene.utime, scene.robot.neighbours(scene.utime)
+    assert [peer.wanted_n for peer in neighbours] == [wants.wanted_n]
+    broadcast = scene.robot.broadcast
+    assert broadcast.odometry(neighbours, now)
+    scene.drive(0.2)
+    assert bool(broadcast.odometry(neighbours, now + after_us)) is is_said

@@ -16,7 +16,7 @@ from slam_scenes import NOISE, closure
 from drslamd.conventions import GRID_US, Chain, Segment
 from drslamd.events import Effect, JobDone, Solve
 from drslamd.gossip import messages
-from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, Job
+from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, RELOCATION, Job
 from drslamd.slam.calibration.window_calibration import PairCalibration
 from drslamd.slam.closure_method import PairWindow
 from drslamd.slam.front_end import WindowJob
@@ -311,3 +311,13 @@ def test_each_module_runs_at_its_configured_rate(monkeypatch: pytest.MonkeyPatch
     for _ in range(100):
         scene.tick(0.1)
     assert calls == {"module1": 20, "module2": 50, "begin": 5}
+
+
+@pytest.mark.parametrize("is_news", [True, False])
+def test_a_pose_that_a_computation_has_changed_is_said_at_once(is_news: bool) -> None:
+    scene = RobotScene()
+    scene.drive(2)
+    scene.localise()
+    scene.robot.jobs.begin(Job(OPTIMIZER), lambda: None)  # module 3 is not done yet
+    effects = answered(scene, Job(RELOCATION, told=lambda result, utime: is_news), None)
+    assert len(sends(effects, "POSE")) == is_news

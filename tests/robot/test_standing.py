@@ -205,3 +205,24 @@ def test_who_was_just_placed_has_no_pose_before_its_heading_is_known(
     if is_told:
         scene.robot.front.resumption._told_at = scene.utime
     assert scene.robot.whereabouts(scene.utime).state is state
+
+
+@pytest.mark.parametrize(("sigma_rad", "is_placed"), [(0.09, True), (0.11, False)])
+def test_after_a_hole_the_pose_is_that_of_the_placing_or_of_module_3_whichever_turns_less(
+    sigma_rad: float, is_placed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Module 3 knows the heading to a tenth of a radian, and what wheels add since."""
+    scene = driven()
+    found = standing(scene)
+    solved = found.pose()
+    assert solved is not None
+    assert solved.covariance[2, 2] == pytest.approx(0.1**2, rel=0.02)
+    placed = solved._replace(pose=np.ones(3), covariance=np.diag([0.1, 0.1, sigma_rad]) ** 2)
+    monkeypatch.setattr(scene.robot.front.relocation, "placed", lambda estimate, track: placed)
+    where = found.whereabouts(scene.utime)
+    assert where.state is PoseState.LOCALISED
+    assert where.pose is not None
+    assert where.is_placed is is_placed
+    assert bool((where.pose.pose == 1.0).all()) is is_placed
+    later = found.whereabouts(scene.utime + 2 * SECOND_US)
+    assert (later.state, later.is_placed) == (PoseState.STALE, False)

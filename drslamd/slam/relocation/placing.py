@@ -39,7 +39,7 @@ POOR_FIT = 3.0
 """Chi-squared per range beyond which the model does not explain them."""
 MOST_OFF = 0.25
 """Share of ranges that may be off by more than `RangeModel.cauchy_sigmas`: bursts, and no more."""
-MAX_SIGMA_M, MAX_SIGMA_RAD = 0.4, np.radians(8.0)
+MAX_SIGMA_M, MAX_SIGMA_RAD = 0.5, np.radians(10.0)
 """What is vaguer is not said yet."""
 FEWEST = 10
 """Ranges."""
@@ -80,11 +80,13 @@ class WayUnder:
 
 class Placed(NamedTuple):
     """w_T_o (3,) of the odometry frame, and (3, 3) of x, y, theta of the robot's place at `at` in
-    it, where that is known best."""
+    it, where that is known best, if peers are where they are thought to be; and by how much each of
+    k sightings moves these if the peer was elsewhere, (3, k, 2)."""
 
     w_T_o: Array
     covariance: Array
     at: Array
+    by_peers: Array
 
 
 def place(seen: Sightings, stretch: WayUnder, prior: Prior, model: RangeModel) -> Placed | str:
@@ -113,10 +115,11 @@ def place(seen: Sightings, stretch: WayUnder, prior: Prior, model: RangeModel) -
 
 class _Judged(NamedTuple):
     """A minimum (3,) with its covariance (3, 3) and chi-squared; `before` is what where the robot
-    was adds to that."""
+    was adds to that, and `by_peers` (3, k, 2) see `Placed`."""
 
     x: Array
     covariance: Array
+    by_peers: Array
     chi2: float
     before: float
 
@@ -226,7 +229,8 @@ class _Problem:
             x = x + step * min(1.0, LONGEST / (float(np.abs(step).max()) + 1e-12))
         added = float(self._robust(before @ before))
         x[2] = float(se2.wrap(x[2]))
-        return _Judged(x, spread, float(e @ weighted[:, 3]) + added, added)
+        by_peers = (spread @ weighted[:, :3].T)[:, :, None] * j[:, :2]
+        return _Judged(x, spread, by_peers, float(e @ weighted[:, 3]) + added, added)
 
     def _noise(self, e: Array, j: Array, x: Array) -> Array:
         """(k, k) of the residuals: ranges share their errors with those before, with all of the
@@ -253,7 +257,7 @@ class _Problem:
     def placed(self, found: _Judged) -> Placed:
         c, theta = found.x[:2], found.x[2]
         xy = c - se2.rotate(theta, self._middle)
-        return Placed(np.append(xy, theta), found.covariance, self._middle)
+        return Placed(np.append(xy, theta), found.covariance, self._middle, found.by_peers)
 
 
 def _complex(points: Array) -> Array:

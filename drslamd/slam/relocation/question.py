@@ -32,12 +32,14 @@ nothing of a heading: until they do, there is no pose."""
 
 @dataclass(frozen=True)
 class Found:
-    """What a computation found, and of what: the solution and the first sample of the segment."""
+    """What a computation found, and of what: the solution, the first sample of the segment, and
+    what was seen."""
 
     estimate: TeamEstimate
     segment_start: int
     peers: tuple[int, ...]
     answer: Placed | str
+    seen: Sightings
 
 
 def localised_peers(
@@ -101,7 +103,7 @@ def _found(
     prior: Prior,
     who: Own,
 ) -> Found:
-    return Found(estimate, start, peers, place(seen, stretch, prior, who.ranges))
+    return Found(estimate, start, peers, place(seen, stretch, prior, who.ranges), seen)
 
 
 def last_keyframe(found: Found, own: PairEnd) -> int | None:

@@ -3,7 +3,8 @@
 While nothing is known of its way a cloud of places says where it may be: a position without a
 heading. What its wheels count after the hole is a segment of its own that nothing joins to the
 rest. As soon as ranges to localised peers allow one place for it only, this robot says so as a
-closure in its log; then module 3 has it, on all robots alike.
+closure in its log; then module 3 has it, on all robots alike. Until module 3 knows as much of the
+heading, the placing is asked again and is where the robot is.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from drslamd.slam.peer_in_range import PeerInRange
 from drslamd.slam.relative_pose.pair_end import PairEnd
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 from drslamd.slam.relocation.cloud import STEP_S, Cloud
+from drslamd.slam.relocation.placed_pose import PlacedPose, placed_pose
 from drslamd.slam.relocation.placing import Prior
 from drslamd.slam.relocation.question import (
     Found,
@@ -46,6 +48,8 @@ FIRST_NUMBER = 2**30
 """Of closures; windows count from 0 and never come so far."""
 AGAIN_US = 4 * SECOND_US
 """A closure has joined us to the others by then, or another one is needed."""
+SETTLES_US = 10 * SECOND_US
+"""So long at most after a closure a placing says where we are: then module 3 must know."""
 ANY_HEADING_RAD = math.pi / math.sqrt(3)
 """Sigma of a heading of which nothing is known."""
 
@@ -86,6 +90,10 @@ class Relocation:
         self._prior: Prior | None = None
         self._prior_start = -1
         self._told_at: int | None = None
+        self._is_joined = False
+        """Has module 3 what follows the hole?"""
+        self._placed: PlacedPose | None = None
+        """The last answer."""
         self._number = FIRST_NUMBER
         self._closures: list[ClosureMeasurement] = []
 
@@ -113,24 +121,22 @@ class Relocation:
             speed: how fast we drive, m/s; asked for only in a hole.
         """
         hole = _hole(estimate, self._own, track, utime)
-        is_placed = hole is None
-        if is_placed and estimate is not None and is_vague(estimate.covariance(self._own.robot)):
+        self._is_joined = hole is None
+        if hole is None and estimate is not None and self._knows_more(estimate, utime):
             hole = self._hole
         if hole is None or estimate is None:
-            self._hole = self._cloud = self._prior = self._told_at = None
+            self._hole = self._cloud = self._prior = self._told_at = self._placed = None
             return None
         data = graph.chains.get(self._own.robot)
         own = PairEnd(track, data) if data is not None else None
         if own is None:
             return None
         if self._hole is None or self._hole.frame != hole.frame:
-            self._cloud, self._prior = None, None
+            self._cloud = self._prior = self._placed = None
         self._hole, self._speed = hole, speed()
         beacons = localised_peers(neighbours, ranges, graph, estimate)
         until = known_until(beacons, utime)
         self._carry(beacons, estimate, own, until, utime)
-        if is_placed:
-            return None
         return self._placing(beacons, estimate, own, utime)
 
     # while nothing is known of the way
@@ -194,25 +200,45 @@ class Relocation:
     def _placing(
         self, beacons: list[Beacon], estimate: TeamEstimate, own: PairEnd, utime: int
     ) -> Callable[[], Found] | None:
-        is_told = self._told_at is not None and utime - self._told_at < AGAIN_US
         start = own.track.segment_start
-        if self._prior is None or self._prior_start != start or start < own.track.n0 or is_told:
+        if self._prior is None or self._prior_start != start or start < own.track.n0:
             return None
         # (each peer's odometry counts as far as it came, not only as far as everybody's did)
         return question(beacons, estimate, own, self._own, self._prior, utime)
 
     def on_found(self, found: Found, own: PairEnd | None, utime: int) -> bool:
         """A computation has ended: is there a closure to tell?"""
+        self._placed = None
         if isinstance(found.answer, str):
             self.verdict = found.answer
             return False
         n = last_keyframe(found, own) if own is not None else None
         if self._hole is None or own is None or n is None:
             return False
-        self.verdict, self._told_at = "", utime
+        self.verdict = ""
+        self._placed = placed_pose(found, found.answer, own.track, self._own.robot)
+        is_told = self._told_at is not None and utime - self._told_at < AGAIN_US
+        if self._is_joined or is_told:
+            return False
+        self._told_at = utime
         self._number += 1
         self._closures.append(closure(found, found.answer, own, n, self._number))
         return True
+
+    def _knows_more(self, estimate: TeamEstimate, utime: int) -> bool:
+        """Does module 3, which has what follows the hole, not yet know how it stands, or not as
+        well as the last placing?"""
+        known, placed = estimate.covariance(self._own.robot), self._placed
+        if known is None or placed is None or self._told_at is None:
+            return is_vague(known)
+        is_better = known[2, 2] > placed.covariance[2, 2] and utime - self._told_at < SETTLES_US
+        return bool(is_better) or is_vague(known)
+
+    def placed(self, estimate: TeamEstimate, track: Track) -> PoseNow | None:
+        """Where the last placing has us now, in the frame of a solution; None without one."""
+        if self._placed is None or self._placed.frame != estimate.frame:
+            return None
+        return self._placed.now(track, self._own.model.noise)
 
     def tell(self) -> list[ClosureMeasurement]:
         """Closures for our log."""

@@ -69,6 +69,24 @@ def test_who_has_hardly_moved_has_no_heading() -> None:
     assert place(*driven(0.05), prior(), LINKTRACK) == "not enough motion"
 
 
+@pytest.mark.parametrize(
+    ("sigma_m", "degrees", "is_named"),
+    [(0.49, 9.9, True), (0.51, 9.9, False), (0.49, 10.1, False)],
+)
+def test_half_a_metre_and_ten_degrees_are_known_or_nothing_is_said(
+    sigma_m: float, degrees: float, is_named: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judged = placing._Problem.judged
+    spread = np.diag([0.1, sigma_m, np.radians(degrees)]) ** 2
+
+    def with_spread(problem: placing._Problem, x: Array) -> placing._Judged:
+        return judged(problem, x)._replace(covariance=spread)
+
+    monkeypatch.setattr(placing._Problem, "judged", with_spread)
+    found = place(*driven(3.0), prior(), LINKTRACK)
+    assert isinstance(found, Placed) if is_named else found == "not enough motion"
+
+
 def test_two_places_that_fit_are_ambiguous() -> None:
     """On a straight line, and of where it was nothing is known: the other side of the line between
     both peers fits as well."""

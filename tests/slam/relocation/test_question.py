@@ -20,6 +20,7 @@ from drslamd.slam.relocation.question import (
     last_keyframe,
     localised_peers,
 )
+from drslamd.slam.relocation.sightings import NONE
 
 END_US = (UNTIL - 1) * 100_000
 """Of everybody's odometry."""
@@ -60,8 +61,8 @@ def test_a_closure_says_of_our_keyframe_what_was_found_of_the_odometry() -> None
     """The peer's last keyframe stands at the origin; a turn moves it, seen from ours, by as much as
     it is away from where the place is known best."""
     scene, at = ResumedScene(last()), np.array([1.0, 0.5])
-    placed = Placed(W_T_O, np.diag([0.01, 0.01, 0.1**2]), at)
-    found = Found(solved(), BEGAN, (0, 2), placed)
+    placed = Placed(W_T_O, np.diag([0.01, 0.01, 0.1**2]), at, np.zeros((3, 0, 2)))
+    found = Found(solved(), BEGAN, (0, 2), placed, NONE)
     n = last_keyframe(found, scene.own)
     assert n == 170
     told = closure(found, placed, scene.own, n, 5)
@@ -78,7 +79,7 @@ def test_a_closure_says_of_our_keyframe_what_was_found_of_the_odometry() -> None
 
 def test_a_segment_that_ended_has_no_keyframe_to_tell() -> None:
     scene = ResumedScene(last())
-    found = Found(solved(), BEGAN - 1, (0,), "ambiguous")
+    found = Found(solved(), BEGAN - 1, (0,), "ambiguous", NONE)
     assert last_keyframe(found, scene.own) is None
 
 
