@@ -39,7 +39,7 @@ POOR_FIT = 3.0
 """Chi-squared per range beyond which the model does not explain them."""
 MOST_OFF = 0.25
 """Share of ranges that may be off by more than `RangeModel.cauchy_sigmas`: bursts, and no more."""
-MAX_SIGMA_M, MAX_SIGMA_RAD = 0.5, np.radians(10.0)
+MAX_SIGMA_M, MAX_SIGMA_RAD = 0.4, np.radians(10.0)
 """What is vaguer is not said yet."""
 FEWEST = 10
 """Ranges."""

@@ -71,9 +71,9 @@ def test_who_has_hardly_moved_has_no_heading() -> None:
 
 @pytest.mark.parametrize(
     ("sigma_m", "degrees", "is_named"),
-    [(0.49, 9.9, True), (0.51, 9.9, False), (0.49, 10.1, False)],
+    [(0.39, 9.9, True), (0.41, 9.9, False), (0.39, 10.1, False)],
 )
-def test_half_a_metre_and_ten_degrees_are_known_or_nothing_is_said(
+def test_a_place_is_known_to_forty_centimetres_and_ten_degrees_or_not_named(
     sigma_m: float, degrees: float, is_named: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     judged = placing._Problem.judged
