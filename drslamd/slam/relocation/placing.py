@@ -3,12 +3,13 @@
     r_i = | p_i - (c + R(theta) q_i) | + bias of the peer
 
 Module 1's problem with several peers at once and a place to begin from. All minima are looked for
-and judged under the full noise of the ranges; while two cannot be told apart none is named.
+and judged under the full noise of the ranges; while two cannot be told apart none is named. How
+much ranges scatter is known badly soon after a start, so those of a placing have a say in it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -39,8 +40,11 @@ POOR_FIT = 3.0
 """Chi-squared per range beyond which the model does not explain them."""
 MOST_OFF = 0.25
 """Share of ranges that may be off by more than `RangeModel.cauchy_sigmas`: bursts, and no more."""
-MAX_SIGMA_M, MAX_SIGMA_RAD = 0.4, np.radians(10.0)
+MAX_SIGMA_M, MAX_SIGMA_RAD = 0.3, np.radians(8.0)
 """What is vaguer is not said yet."""
+KNOWN = 12
+"""So many independent ranges have told how much they scatter: half a minute of one a second, which
+share errors with those before, and what was configured (`calibration.range_scatter`)."""
 FEWEST = 10
 """Ranges."""
 BEATEN_CHI2 = 12.0
@@ -94,23 +98,27 @@ def place(seen: Sightings, stretch: WayUnder, prior: Prior, model: RangeModel) -
     if len(seen) < FEWEST:
         return "too few ranges"
     problem = _Problem(seen, stretch, prior, model)
-    x = problem.descended(problem.starts(), FIRST_STEPS)
-    best = np.argsort(problem.cost(x), kind="stable")[:CARRIED]
-    x = problem.descended(x[best], STEPS)
-    x = x[np.argsort(problem.cost(x), kind="stable")]
-    judged = [problem.judged(row) for row in distinct_poses(x, MERGE_M, MERGE_RAD)[:CANDIDATES]]
-    judged.sort(key=lambda one: one.chi2)
-    first = judged[0]
-    is_poor = not first.chi2 <= POOR_FIT * len(seen) or problem.share_off(first.x) > MOST_OFF
-    if is_poor:
+    minima = problem.minima()
+    first, *_ = problem.all_judged(minima)
+    if not first.chi2 <= POOR_FIT * len(seen) or problem.share_off(first.x) > MOST_OFF:
         return "ranges and odometry disagree"
-    rivals = [one for one in judged[1:] if not first.beats(one)]
+    problem = problem.as_it_scatters(first)
+    first, *others = problem.all_judged(minima)
+    if problem.share_off(first.x) > MOST_OFF:
+        return "ranges and odometry disagree"
+    rivals = [one for one in others if not first.beats(one)]
     if len(distinct_poses(np.array([one.x for one in (first, *rivals)]), MERGE_M, MERGE_RAD)) > 1:
         return "ambiguous"
     sigma_m = np.sqrt(np.linalg.eigvalsh(first.covariance[:2, :2])[-1])
     if sigma_m > MAX_SIGMA_M or np.sqrt(first.covariance[2, 2]) > MAX_SIGMA_RAD:
         return "not enough motion"
     return problem.placed(first)
+
+
+def scatter_about(chi2: float, ranges: int) -> float:
+    """True over known sigma of so many ranges about a pose; never more than 1, for then it may as
+    well be the wrong pose."""
+    return float(np.sqrt(min((KNOWN + chi2) / (KNOWN + ranges - 3), 1.0)))
 
 
 class _Judged(NamedTuple):
@@ -141,6 +149,25 @@ class _Problem:
         self._begin = complex(*(stretch.begin - self._middle))
         self._wide = np.hypot(seen.sigma_m, seen.bias_m)
         self._root = np.linalg.inv(np.linalg.cholesky(prior.covariance + 1e-4 * np.eye(2)))
+
+    def minima(self) -> Array:
+        """(m, 3) those of the cost, the lowest first, and no more than can be judged."""
+        x = self.descended(self.starts(), FIRST_STEPS)
+        best = np.argsort(self.cost(x), kind="stable")[:CARRIED]
+        x = self.descended(x[best], STEPS)
+        x = x[np.argsort(self.cost(x), kind="stable")]
+        return distinct_poses(x, MERGE_M, MERGE_RAD)[:CANDIDATES]
+
+    def all_judged(self, minima: Array) -> list[_Judged]:
+        """The likeliest first."""
+        return sorted((self.judged(row) for row in minima), key=lambda one: one.chi2)
+
+    def as_it_scatters(self, best: _Judged) -> _Problem:
+        """The same with ranges that scatter as little as they do about the best minimum: the
+        posterior mean of a variance of which something was known before."""
+        scatter = scatter_about(best.chi2 - best.before, len(self._seen))
+        seen = replace(self._seen, sigma_m=scatter * self._seen.sigma_m)
+        return _Problem(seen, self._stretch, self._prior, self._model)
 
     def starts(self) -> Array:
         """(m, 3)."""

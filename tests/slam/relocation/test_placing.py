@@ -11,7 +11,14 @@ from drslamd.slam import se2
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.range_model import LINKTRACK
 from drslamd.slam.relocation import placing
-from drslamd.slam.relocation.placing import FEWEST, Placed, Prior, WayUnder, place
+from drslamd.slam.relocation.placing import (
+    FEWEST,
+    Placed,
+    Prior,
+    WayUnder,
+    place,
+    scatter_about,
+)
 from drslamd.slam.relocation.sightings import Sightings
 from drslamd.slam.se2 import Array
 
@@ -71,9 +78,9 @@ def test_who_has_hardly_moved_has_no_heading() -> None:
 
 @pytest.mark.parametrize(
     ("sigma_m", "degrees", "is_named"),
-    [(0.39, 9.9, True), (0.41, 9.9, False), (0.39, 10.1, False)],
+    [(0.29, 7.9, True), (0.31, 7.9, False), (0.29, 8.1, False)],
 )
-def test_a_place_is_known_to_forty_centimetres_and_ten_degrees_or_not_named(
+def test_a_place_is_known_to_thirty_centimetres_and_eight_degrees_or_not_named(
     sigma_m: float, degrees: float, is_named: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     judged = placing._Problem.judged
@@ -130,6 +137,35 @@ def test_a_place_that_ranges_make_four_hundred_times_less_likely_is_none(
 
     monkeypatch.setattr(placing._Problem, "judged", with_costs)
     assert isinstance(place(*on_a_line(), LINKTRACK), Placed) is is_named
+
+
+@pytest.mark.parametrize(
+    ("chi2", "ranges", "scatter"),
+    [
+        (3.0, 51, 0.5),
+        (0.0, 39, 0.5),
+        (48.0, 51, 1.0),
+        (200.0, 51, 1.0),
+        (1.0, 10, (13 / 19) ** 0.5),
+    ],
+)
+def test_ranges_that_fit_better_than_was_thought_scatter_less_and_never_more(
+    chi2: float, ranges: int, scatter: float
+) -> None:
+    """Of n ranges three unknowns are determined; twelve were known before."""
+    assert scatter_about(chi2, ranges) == pytest.approx(scatter)
+
+
+def test_a_claim_is_as_narrow_as_ranges_fit() -> None:
+    """Ranges without noise, and the same with what was allowed for; not of the bias, which they do
+    not tell."""
+    seen, stretch = driven(3.0)
+    noise = np.random.default_rng(1).normal(size=20) * 0.05
+    exact = place(seen, stretch, prior(), LINKTRACK)
+    noisy = place(replace(seen, range_m=seen.range_m + noise), stretch, prior(), LINKTRACK)
+    assert isinstance(exact, Placed)
+    assert isinstance(noisy, Placed)
+    assert 0.6 < np.sqrt(exact.covariance[2, 2] / noisy.covariance[2, 2]) < 0.95
 
 
 @pytest.mark.parametrize("count", [FEWEST - 1, FEWEST])
