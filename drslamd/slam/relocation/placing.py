@@ -40,7 +40,7 @@ POOR_FIT = 3.0
 """Chi-squared per range beyond which the model does not explain them."""
 MOST_OFF = 0.25
 """Share of ranges that may be off by more than `RangeModel.cauchy_sigmas`: bursts, and no more."""
-MAX_SIGMA_M, MAX_SIGMA_RAD = 0.3, np.radians(8.0)
+MAX_SIGMA_M, MAX_SIGMA_RAD = 0.35, np.radians(8.0)
 """What is vaguer is not said yet."""
 KNOWN = 12
 """So many independent ranges have told how much they scatter: half a minute of one a second, which
@@ -50,7 +50,10 @@ FEWEST = 10
 BEATEN_CHI2 = 12.0
 """A minimum that ranges alone make so much worse than the best (2 log-likelihood, 400 to 1) is
 none. Where the robot was may be wrong in another way than was thought: with its help it takes
-`EXCLUDED_CHI2`."""
+`EXCLUDED_CHI2` ..."""
+LEAST_CHI2 = 3.0
+"""... and so much must be of ranges: a cloud may have gone on on the wrong side of its peers, and
+then is as sure of it."""
 
 
 class Prior(NamedTuple):
@@ -135,7 +138,8 @@ class _Judged(NamedTuple):
         """Is the other one so much less likely that it is none?"""
         apart = other.chi2 - self.chi2
         by_ranges = apart - (other.before - self.before)
-        return apart >= EXCLUDED_CHI2 or min(apart, by_ranges) >= BEATEN_CHI2
+        is_excluded = apart >= EXCLUDED_CHI2 and by_ranges >= LEAST_CHI2
+        return is_excluded or min(apart, by_ranges) >= BEATEN_CHI2
 
 
 class _Problem:

@@ -78,9 +78,9 @@ def test_who_has_hardly_moved_has_no_heading() -> None:
 
 @pytest.mark.parametrize(
     ("sigma_m", "degrees", "is_named"),
-    [(0.29, 7.9, True), (0.31, 7.9, False), (0.29, 8.1, False)],
+    [(0.34, 7.9, True), (0.36, 7.9, False), (0.34, 8.1, False)],
 )
-def test_a_place_is_known_to_thirty_centimetres_and_eight_degrees_or_not_named(
+def test_a_place_is_known_to_35_centimetres_and_eight_degrees_or_not_named(
     sigma_m: float, degrees: float, is_named: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     judged = placing._Problem.judged
@@ -118,13 +118,16 @@ def on_a_line() -> tuple[Sightings, WayUnder, Prior]:
         (11.9, 8.0, False),
         (11.9, 8.2, True),
         (12.1, -0.2, False),
-        (0.0, 20.1, True),
+        (2.9, 17.2, False),
+        (3.1, 17.0, True),
+        (3.1, 16.8, False),
     ],
 )
 def test_a_place_that_ranges_make_four_hundred_times_less_likely_is_none(
     by_ranges: float, by_prior: float, is_named: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Or a hundred times less than that, where the place before the hole has a say in it."""
+    """Or a hundred times less than that, where the place before the hole has a say in it, but for
+    what ranges must say themselves."""
     judged = placing._Problem.judged
     first: list[float] = []
 
