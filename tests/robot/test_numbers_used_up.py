@@ -164,7 +164,8 @@ def test_a_peer_that_wants_odometry_from_the_future_gets_what_there_is(
     wanted = Heard(1, robot.own.epoch, 0, 2**31 - 1)
     named = replace(peer.status, heard=(wanted,))
     peer.take_status(named, peer._status_counter + 1, robot.own, utime)
-    (send,) = robot.broadcast.odometry(robot.neighbours(utime), utime)
+    later = utime + SECOND_US
+    (send,) = robot.broadcast.odometry(robot.neighbours(later), later)
     assert isinstance(send, Send)
     batch = messages.decode("ODOMETRY", send.payload)
     assert isinstance(batch, OdometryBatch)
