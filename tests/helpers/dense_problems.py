@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import brentq, least_squares
 from slam_scenes import Array
 
-from drslamd.slam.optimizer.banded.assembly import System
+from drslamd.slam.optimizer.banded.assembly import FewEntries, LeanSystem, System
 from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout
 from drslamd.slam.optimizer.banded.normal_equations import GAUGE_SIGMA
 from drslamd.slam.optimizer.banded.point import Point
@@ -332,6 +332,13 @@ def dense(system: System, layout: BandLayout) -> Array:
     """The whole matrix of a system in the order of `packed`."""
     order = places(layout)
     return np.asarray(matrix_of(system)[np.ix_(order, order)])
+
+
+def lean(system: System) -> LeanSystem:
+    """The same, with those entries of its border that are not zero."""
+    row, column = np.nonzero(system.border)
+    border = FewEntries.of(row, column, system.border[row, column], system.border.shape)
+    return LeanSystem(system.band, border, system.corner)
 
 
 def matrix_of(system: System) -> Array:

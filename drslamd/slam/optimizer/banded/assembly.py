@@ -16,8 +16,42 @@ SPARSE = 32
 """Where a matrix has so many times more entries than are added to it, they are added one by one."""
 
 
+class Bordered:
+    """What systems share, however they hold their border."""
+
+    band: Array
+    corner: Array
+
+    def add_prior(self, unknowns: Index, stiffness: Array | float) -> None:
+        """Add independent priors by the information with which they hold unknowns (k,)."""
+        n = self.band.shape[1]
+        inside = unknowns < n
+        if not inside.any():
+            self.corner[unknowns - n, unknowns - n] += stiffness
+            return
+        stiffness = np.broadcast_to(stiffness, unknowns.shape)
+        self.band[0, unknowns[inside]] += stiffness[inside]
+        outside = unknowns[~inside] - n
+        self.corner[outside, outside] += stiffness[~inside]
+
+    def add_blocks(self, unknowns: Index, stiffness: Array) -> None:
+        """Hold m groups of unknowns (m, d) of the border with information (m, d, d)."""
+        at = unknowns - self.band.shape[1]
+        self.corner[at[:, :, None], at[:, None, :]] += stiffness
+
+    def add_difference(self, unknowns: Index, one: Index, stiffness: Array) -> None:
+        """Hold unknowns (k,) of the border beside one other (1,) with information (k, k)."""
+        n = self.band.shape[1]
+        many, single = unknowns - n, one - n
+        self.corner[many[:, None], many] += stiffness
+        sums = stiffness.sum(axis=0)
+        self.corner[many, single] -= sums
+        self.corner[single, many] -= sums
+        self.corner[single, single] += sums.sum()
+
+
 @dataclass
-class System:
+class System(Bordered):
     """A symmetric matrix: lower band (w, n), border (n, b) and corner (b, b)."""
 
     band: Array
@@ -43,32 +77,44 @@ class System:
         self.border += other.border
         self.corner += other.corner
 
-    def add_prior(self, unknowns: Index, stiffness: Array | float) -> None:
-        """Add independent priors by the information with which they hold unknowns (k,)."""
-        n = len(self.border)
-        inside = unknowns < n
-        if not inside.any():
-            self.corner[unknowns - n, unknowns - n] += stiffness
-            return
-        stiffness = np.broadcast_to(stiffness, unknowns.shape)
-        self.band[0, unknowns[inside]] += stiffness[inside]
-        outside = unknowns[~inside] - n
-        self.corner[outside, outside] += stiffness[~inside]
 
-    def add_blocks(self, unknowns: Index, stiffness: Array) -> None:
-        """Hold m groups of unknowns (m, d) of the border with information (m, d, d)."""
-        at = unknowns - len(self.border)
-        self.corner[at[:, :, None], at[:, None, :]] += stiffness
+@dataclass(frozen=True)
+class FewEntries:
+    """(n, b) of which few are not zero: a range knows one bias, of the thousands of a large team.
 
-    def add_difference(self, unknowns: Index, one: Index, stiffness: Array) -> None:
-        """Hold unknowns (k,) of the border beside one other (1,) with information (k, k)."""
-        n = len(self.border)
-        many, single = unknowns - n, one - n
-        self.corner[many[:, None], many] += stiffness
-        sums = stiffness.sum(axis=0)
-        self.corner[many, single] -= sums
-        self.corner[single, many] -= sums
-        self.corner[single, single] += sums.sum()
+    Attributes:
+        starts: (n + 1,) of the entries of each row; column, value: of each entry, several of which
+            may be for the same place.
+    """
+
+    starts: Index
+    column: Index
+    value: Array
+    columns: int
+
+    @staticmethod
+    def of(row: Index, column: Index, value: Array, shape: tuple[int, int]) -> FewEntries:
+        """Of entries in any order; those of one place are added in this order."""
+        order = np.argsort(row, kind="stable")
+        starts = np.searchsorted(row[order], np.arange(shape[0] + 1))
+        return FewEntries(starts, column[order], value[order], shape[1])
+
+    def rows(self, first: int, end: int) -> Array:
+        """(end - first, b) in full."""
+        mine = slice(*self.starts[[first, end]].tolist())
+        row = np.repeat(np.arange(end - first), np.diff(self.starts[first : end + 1]))
+        at = row * self.columns + self.column[mine]
+        sums = np.bincount(at, self.value[mine], (end - first) * self.columns)
+        return sums.reshape(end - first, self.columns)
+
+
+@dataclass
+class LeanSystem(Bordered):
+    """The same matrix, of whose border few entries are not zero."""
+
+    band: Array
+    border: FewEntries
+    corner: Array
 
 
 def entries_of(layout: BandLayout) -> int:
@@ -136,6 +182,24 @@ class Assembly:
 
     def matrix(self, sets: Sequence[Linearised]) -> System:
         """J' W J."""
+        at, products = self._places[0], self._products(sets)
+        return System.of_entries(self._layout, _sums(at, products, entries_of(self._layout)))
+
+    def lean_matrix(self, sets: Sequence[Linearised]) -> LeanSystem:
+        """J' W J, with as little memory as its entries need."""
+        n, b, width = self._layout.band, self._layout.border, self._layout.width
+        at, products = self._places[0], self._products(sets)
+        band = _sums(np.minimum(at, width * n), products, width * n)
+        beyond = np.flatnonzero((at >= width * n) & (at < entries_of(self._layout)))
+        column, row = np.divmod(at[beyond] - width * n, max(n + b, 1))
+        products, is_corner = products[beyond], row >= n
+        of_corner = column[is_corner] * b + row[is_corner] - n
+        corner = _sums(of_corner, products[is_corner], b * b).reshape(b, b).T
+        border = FewEntries.of(row[~is_corner], column[~is_corner], products[~is_corner], (n, b))
+        return LeanSystem(band.reshape(n, width).T, border, corner)
+
+    def _products(self, sets: Sequence[Linearised]) -> Array:
+        """What is added at each of the places."""
         at, apart = self._places
         products, end = np.empty(len(at)), 0
         for columns, factors in zip(self._columns, sets, strict=True):
@@ -149,7 +213,7 @@ class Assembly:
                 else:
                     np.einsum("dm,tdm->tm", column, weighed[: k + 1], out=out)
         products[end:] = products[apart]
-        return System.of_entries(self._layout, _sums(at, products, entries_of(self._layout)))
+        return products
 
     def gradient(self, sets: Sequence[Linearised]) -> Array:
         """(n + b,) J' f."""

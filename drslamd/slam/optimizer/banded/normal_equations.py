@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from drslamd.slam.optimizer.banded import linearised
-from drslamd.slam.optimizer.banded.assembly import Assembly, System
+from drslamd.slam.optimizer.banded.assembly import Assembly, Bordered, LeanSystem, System
 from drslamd.slam.optimizer.banded.layout import BandLayout
 from drslamd.slam.optimizer.banded.linearised import Linearised
 from drslamd.slam.optimizer.banded.point import Point
@@ -175,8 +175,15 @@ class Equations:
 
     def factors_weighed(self, point: Point, claims: Array) -> System:
         """What the factors alone say by weights and claims."""
+        return self._assembly.matrix(self._weighed_sets(point, claims))
+
+    def factors_weighed_leanly(self, point: Point, claims: Array) -> LeanSystem:
+        """The same, of a border of which few entries are not zero."""
+        return self._assembly.lean_matrix(self._weighed_sets(point, claims))
+
+    def _weighed_sets(self, point: Point, claims: Array) -> list[Linearised]:
         ranges = linearised.weighed_ranges(self.problem, point, claims, self._has_antennas)
-        return self._assembly.matrix(self._sets(point, ranges))
+        return self._sets(point, ranges)
 
     def add_heavy_priors(self, system: System, calibration: Calibration, least: float) -> None:
         """Those with heavy tails, of the constants of sensors."""
@@ -203,7 +210,7 @@ class Equations:
         ):
             system.add_blocks(numbers, prior.curvature(values, least))
 
-    def add_gaussian_priors(self, system: System) -> None:
+    def add_gaussian_priors(self, system: Bordered) -> None:
         """Those of the gauge and of the near-range bias, which never change."""
         layout, priors = self.layout, self.problem.priors
         system.add_prior(layout.near_bias, priors.near_bias**-2.0)

@@ -20,11 +20,13 @@ from numpy.typing import NDArray
 
 from drslamd.slam import headway
 from drslamd.slam.lapack.routines import inverse_triangular
-from drslamd.slam.optimizer.banded.assembly import System
+from drslamd.slam.optimizer.banded.assembly import FewEntries, LeanSystem
 from drslamd.slam.se2 import Array, Index
 
 LEAST_COLUMNS, MOST_COLUMNS = 128, 256
 """Of a block: fewer leave the processor idle, more do work that the band would not need."""
+AT_ONCE = 2**22
+"""Numbers of V, 32 MB, that are multiplied with themselves together: all of a small team."""
 SINGLE = np.float32
 Singles = NDArray[np.float32]
 
@@ -102,16 +104,22 @@ class Rest:
         return Elimination.of(numbers[own], numbers[below], *parts), left
 
 
-def eliminated(system: System, count: int) -> tuple[list[Elimination], Rest] | None:
+def eliminated(
+    system: LeanSystem, count: int, with_blocks: bool = True
+) -> tuple[list[Elimination], Rest] | None:
     """The first `count` unknowns of the band, in its order; None where they cannot be.
 
     What is left are the other unknowns of the band, then the border.
+
+    Args:
+        with_blocks: also what solutions pass through, which is most of the memory?
     """
     band, border = system.band, system.border
-    n, b = border.shape
+    n, b = band.shape[1], border.columns
     ends = _ends(band)
     blocks: list[Elimination] = []
-    asides = np.empty((count, b))
+    corner = system.corner
+    asides, held = np.empty((min(count, max(AT_ONCE // max(b, 1), MOST_COLUMNS)), b)), 0
     carried, carried_border, at = np.zeros((0, 0)), np.zeros((0, b)), 0
     while at < count:
         headway.mark()
@@ -125,16 +133,20 @@ def eliminated(system: System, count: int) -> tuple[list[Elimination], Rest] | N
         if parts is None:
             return None
         inverse, gain, aside = parts
-        asides[at : at + columns] = aside
-        own, below = slice(at, at + columns), slice(at + columns, end)
-        blocks.append(Elimination.of(own, below, inverse, gain, aside))
+        if held + columns > len(asides):
+            corner, held = corner - asides[:held].T @ asides[:held], 0
+        asides[held : held + columns] = aside
+        held += columns
+        if with_blocks:
+            own, below = slice(at, at + columns), slice(at + columns, end)
+            blocks.append(Elimination.of(own, below, inverse, gain, aside))
         carried = window[columns:, columns:] - gain @ gain.T
         carried_border = beside[columns:] - gain @ aside
         at += columns
     window, beside = _window(band, border, count, n - count, n, carried, carried_border)
     matrix = np.tril(window)
     matrix += np.tril(matrix, -1).T
-    return blocks, Rest(matrix, beside, system.corner - asides.T @ asides)
+    return blocks, Rest(matrix, beside, corner - asides[:held].T @ asides[:held])
 
 
 def _eliminated(own: Array, below: Array, border: Array) -> tuple[Array, Array, Array] | None:
@@ -155,7 +167,7 @@ def _ends(band: Array) -> Index:
 
 def _window(
     band: Array,
-    border: Array,
+    border: FewEntries,
     at: int,
     columns: int,
     end: int,
@@ -177,7 +189,7 @@ def _window(
     window[:height, :columns] = dense[:height]
     known = min(len(carried), size)
     window[:known, :known] += carried[:known, :known]
-    beside = np.zeros((size, border.shape[1]))
-    beside[:columns] = border[at : at + columns]
+    beside = np.zeros((size, border.columns))
+    beside[:columns] = border.rows(at, at + columns)
     beside[:known] += carried_border[:known]
     return window, beside

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drslamd.slam.lapack.routines import cholesky_solved
-from drslamd.slam.optimizer.banded.assembly import System
+from drslamd.slam.optimizer.banded.assembly import LeanSystem, System
 from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout, border_poses
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
@@ -23,6 +23,10 @@ from drslamd.slam.optimizer.kept.elimination import SINGLE, Elimination, Rest, e
 from drslamd.slam.optimizer.kept.head import Flags, Head, Pair, Places, keys_of, tail_of
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array, Index
+
+
+AT_ONCE = 128
+"""Right-hand sides that are solved together: a large team has hundreds."""
 
 
 @dataclass(frozen=True)
@@ -37,13 +41,24 @@ class Believed:
     point: Point
     claims: Array | None = None
 
-    def of_factors(self, which: Flags, layout: BandLayout, priors: bool) -> System:
+    def of_factors(self, which: Flags, layout: BandLayout) -> System:
         """What some factors add.
 
         Args:
             which: (all,) of odometry, closures and ranges, in this order.
-            priors: also those that never change?
         """
+        equations, point, claims = self._chosen(which, layout)
+        return equations.factors_weighed(point, claims)
+
+    def of_head(self, which: Flags, layout: BandLayout) -> LeanSystem:
+        """The same of the many of a head, with the priors that never change."""
+        equations, point, claims = self._chosen(which, layout)
+        system = equations.factors_weighed_leanly(point, claims)
+        equations.add_gaussian_priors(system)
+        return system
+
+    def _chosen(self, which: Flags, layout: BandLayout) -> tuple[Equations, Point, Array]:
+        """Equations of some factors, the point for them, and claims."""
         problem = self.problem
         cuts = np.cumsum([len(problem.odometry), len(problem.closures)])
         odometry, closures, ranges = np.split(which, cuts)
@@ -55,12 +70,8 @@ class Believed:
         )
         sight = RangeErrors(*(column[ranges] for column in self.point.sight))
         point = replace(self.point, link=self.point.link[odometry], sight=sight)
-        equations = Equations(some, layout=layout)
         claims = np.ones(problem.pairs) if self.claims is None else self.claims
-        system = equations.factors_weighed(point, claims)
-        if priors:
-            equations.add_gaussian_priors(system)
-        return system
+        return Equations(some, layout=layout), point, claims
 
     def add_priors(self, system: System, layout: BandLayout) -> None:
         """Those that depend on where the constants are."""
@@ -91,7 +102,7 @@ class KeptFactor:
         i, j = problem.ends
         is_tail = np.zeros(len(problem.n), dtype=bool)
         is_tail[places.tail] = True
-        system = believed.of_factors(is_tail[i] | is_tail[j], layout, priors=False)
+        system = believed.of_factors(is_tail[i] | is_tail[j], layout)
         believed.add_priors(system, layout)
         _add(system.corner, self.rest, 3 * len(places.tail))
         try:
@@ -111,7 +122,7 @@ class KeptFactor:
         is_more[more] = True
         i, j = problem.ends
         which = is_head[i] & is_head[j] & (is_more[i] | is_more[j])
-        system = believed.of_factors(which, layout, priors=False)
+        system = believed.of_factors(which, layout)
         _add(system.corner, self.rest, 3 * len(more))
         apart = np.concatenate([places.front, more])
         needed = _needed(problem, is_head)[apart]
@@ -196,9 +207,9 @@ def build(
     place[far] = len(inside) + np.arange(len(far))
     poses = np.where(place[:, None] == NOWHERE, NOWHERE, 3 * place[:, None] + np.arange(3))
     layout = BandLayout.placed(problem, poses, 3 * len(inside), 3 * len(far), 3 * reach + 3)
-    system = believed.of_factors(which, layout, priors=True)
+    system = believed.of_head(which, layout)
     front = int(np.count_nonzero(needed[inside]))
-    parts = eliminated(system, 3 * (len(inside) - front))
+    parts = eliminated(system, 3 * (len(inside) - front), with_blocks)
     if parts is None:
         return None
     blocks, rest = parts
@@ -211,7 +222,7 @@ def build(
         paired=len(pairs),
         doubted=problem.doubted,
     )
-    return KeptFactor(head, tuple(blocks) if with_blocks else (), rest)
+    return KeptFactor(head, tuple(blocks), rest)
 
 
 @dataclass(frozen=True)
@@ -251,4 +262,6 @@ class Current:
 
     def squared(self, right: Array) -> Array:
         """See `Solver.squared`."""
-        return np.asarray(right.T @ self.solved(right))
+        columns = range(0, right.shape[1], AT_ONCE)
+        solved = [right.T @ self.solved(right[:, k : k + AT_ONCE]) for k in columns]
+        return np.concatenate(solved, axis=1)

@@ -67,6 +67,24 @@ def test_all_sets_are_summed_where_their_unknowns_stand(band: int, is_sparse: bo
     assert np.allclose(assembly.gradient(found), gradient, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.parametrize("band", [8, 100])
+def test_a_lean_system_is_the_same_to_the_last_bit(band: int) -> None:
+    layout = a_layout(band, 4, 8)
+    there = [np.where(unknowns < 8, unknowns, unknowns + band - 8) for unknowns in TWO_SETS]
+    # each factor twice: several entries are for one place
+    there = [np.concatenate([unknowns, unknowns]) for unknowns in there]
+    found = [factors(unknowns, rows, rows) for unknowns, rows in zip(there, (3, 1), strict=True)]
+    full, few = (
+        made(found)
+        for made in (Assembly(layout, there).matrix, Assembly(layout, there).lean_matrix)
+    )
+    assert np.array_equal(few.band, full.band)
+    assert np.array_equal(few.corner, full.corner)
+    assert full.border.any()
+    for first, end in ((0, band), (3, band), (3, 7), (band, band)):
+        assert np.array_equal(few.border.rows(first, end), full.border[first:end])
+
+
 def test_of_no_factors_there_is_nothing() -> None:
     layout = a_layout(6, 2, 3)
     none = np.zeros((0, 4), dtype=np.int64)

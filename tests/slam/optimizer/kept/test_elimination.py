@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from dense_problems import matrix_of
+from dense_problems import lean, matrix_of
 from slam_scenes import Array
 
 from drslamd.slam.optimizer.banded.assembly import System
+from drslamd.slam.optimizer.kept import elimination
 from drslamd.slam.optimizer.kept.elimination import Elimination, Rest, eliminated
 
 
@@ -60,7 +61,7 @@ def test_what_is_left_is_the_schur_complement_and_solutions_are_those_of_the_who
     poses: int, reach: int, border: int, count: int
 ) -> None:
     system = a_system(poses, reach, border)
-    parts = eliminated(system, count)
+    parts = eliminated(lean(system), count)
     assert parts is not None
     blocks, rest = parts
     assert np.allclose(whole(rest), left_of(system, count), atol=1e-9)
@@ -71,9 +72,33 @@ def test_what_is_left_is_the_schur_complement_and_solutions_are_those_of_the_who
         assert np.allclose(found, np.linalg.solve(full, right), atol=1e-5)
 
 
+def test_what_the_border_loses_is_the_same_however_many_rows_are_multiplied_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of so large a team that not all of them are held."""
+    system = a_system(200, 3, 6)
+    at_once = eliminated(lean(system), 560)
+    monkeypatch.setattr(elimination, "AT_ONCE", 6 * 256)
+    in_parts = eliminated(lean(system), 560)
+    assert at_once is not None
+    assert in_parts is not None
+    assert len(in_parts[0]) > 2
+    assert np.allclose(whole(in_parts[1]), left_of(system, 560), atol=1e-9)
+    assert np.allclose(whole(in_parts[1]), whole(at_once[1]), atol=1e-12)
+
+
+def test_the_rest_is_the_same_where_no_solutions_are_wanted() -> None:
+    system = lean(a_system(90, 4, 5))
+    parts, alone = eliminated(system, 240), eliminated(system, 240, with_blocks=False)
+    assert parts is not None
+    assert alone is not None
+    assert np.array_equal(whole(parts[1]), whole(alone[1]))
+    assert alone[0] == []
+
+
 def test_a_rest_can_be_eliminated_further() -> None:
     system = a_system(40, 3, 4)
-    parts = eliminated(system, 90)
+    parts = eliminated(lean(system), 90)
     assert parts is not None
     blocks, rest = parts
     own, below = np.array([1, 4, 5]), np.setdiff1d(np.arange(30), [1, 4, 5])
@@ -92,8 +117,8 @@ def test_a_rest_can_be_eliminated_further() -> None:
 def test_what_is_not_positive_definite_has_no_factor() -> None:
     system = a_system(30, 2, 1)
     system.band[0, 50] = -1e6
-    assert eliminated(system, 90) is None
-    assert eliminated(system, 32) is not None
+    assert eliminated(lean(system), 90) is None
+    assert eliminated(lean(system), 32) is not None
     assert (
         Rest(-np.eye(3), np.zeros((3, 0)), np.zeros((0, 0))).without(
             np.arange(2), np.array([2]), np.arange(3)
