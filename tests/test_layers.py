@@ -88,6 +88,7 @@ OPTIMIZER_ORDER = [
     "vertex_cover",
     "mirror_factors",
     "factors",
+    "near_pairs",
     "contract",
     "banded",
     "kept",

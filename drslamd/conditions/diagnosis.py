@@ -130,18 +130,21 @@ def _sleep(slept: Slept | None, utime: int) -> str | None:
 
 
 def _load(robot: Stages, utime: int) -> str | None:
-    """Modules that cannot run as often as they should."""
+    """Modules that cannot run as often as they should, and pairs that module 3 has no room for."""
     config = robot.config
     rates = {RELATIVE_POSE: config.relative_pose.rate_hz, OPTIMIZER: config.optimizer.rate_hz}
-    late = []
+    found = []
     for module, rate in rates.items():
         since, until = robot.jobs.cycles.get(module, DutyCycle())
         cycle = (until - since) / SECOND_US
         if until + LATE * SECOND_US > utime and cycle > LATE / rate:
-            late.append(f"{module} runs every {cycle:.1f} s instead of every {1 / rate:.1f} s")
-    if not late:
-        return None
-    return f"{', '.join(late)}, to leave time for the sensors; the team is large for this computer"
+            found.append(f"{module} runs every {cycle:.1f} s instead of every {1 / rate:.1f} s")
+    late = f"{', '.join(found)}, to leave time for the sensors" if found else ""
+    estimate = robot.back.estimate
+    left_out = estimate.left_out if estimate is not None else 0
+    few = f"ranges of {left_out} pairs are left out, to bound memory" if left_out else ""
+    said = "; ".join(part for part in (late, few) if part)
+    return f"{said}; the team is large for this computer" if said else None
 
 
 def _doubted_partners(robot: Stages) -> Iterable[int]:

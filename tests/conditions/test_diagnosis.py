@@ -174,6 +174,15 @@ def test_it_is_named_while_it_is_still_at_it(after_us: int, is_said: bool) -> No
     assert (said(scene, "load") is not None) is is_said
 
 
+def test_ranges_that_there_is_no_room_for_are_counted() -> None:
+    scene = RobotScene()
+    scene.robot.back.estimate = TeamEstimate(Segment(0, 1, 0), {}, left_out=993)
+    few = "ranges of 993 pairs are left out, to bound memory; the team is large for this computer"
+    assert said(scene, "load") == few
+    computed(scene, OPTIMIZER, 0.5)
+    assert str(said(scene, "load")).endswith(f"to leave time for the sensors; {few}")
+
+
 def test_both_modules_that_take_long_may_be_named() -> None:
     scene = RobotScene(extra="[relative_pose]\nrate_hz = 2.0\n")
     computed(scene, OPTIMIZER, 0.6)

@@ -108,6 +108,7 @@ class TeamEstimate:
         fitted: by robot, the last keyframe of the last solution that was as modelled.
         contradicted: pairs whose ranges of late do not fit the rest.
         blocked: pairs of whose ranges many are too long.
+        left_out: pairs of which there was no room for ranges (`near_pairs`).
         boldness: by how much variances of pairs a < b that were claimed of late were too small
             (`revisions`), where they were.
         narrower: times `joint`, variances of pairs a < b in each other, where sensors were seen to
@@ -144,6 +145,7 @@ class TeamEstimate:
     fitted: dict[int, int] = field(default_factory=dict)
     contradicted: frozenset[tuple[int, int]] = frozenset()
     blocked: frozenset[tuple[int, int]] = frozenset()
+    left_out: int = 0
     boldness: dict[tuple[int, int], float] = field(default_factory=dict)
     narrower: dict[tuple[int, int], float] = field(default_factory=dict)
     is_explained: bool = True

@@ -23,7 +23,7 @@ from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.noise import OdometryNoise
-from drslamd.slam.optimizer import factors, mirror_factors
+from drslamd.slam.optimizer import factors, mirror_factors, near_pairs
 from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.banded.banded_solver import SETTLED
 from drslamd.slam.optimizer.banded.lapses.known_lapses import freed_again, lapse_of
@@ -109,6 +109,7 @@ class TeamProblem:
         is_near: is there one of nearly all of them, with a model that was right?
         by_gyro: robots whose constant yaw rate is that of a gyro.
         left: modules of which only places are here that they have left since.
+        left_out: pairs of which there was no room for ranges.
     """
 
     problem: Problem
@@ -120,6 +121,7 @@ class TeamProblem:
     by_gyro: frozenset[int]
     is_near: bool = False
     left: frozenset[int] = frozenset()
+    left_out: int = 0
 
 
 def build_problem(
@@ -130,7 +132,8 @@ def build_problem(
     places = factors.numbering(graph, group.members | group.mirrored, group.points, mirrored)
     robots = sorted({s.robot for s in group.everything})
     chains = [graph.view.chains[robot] for robot in robots]
-    ranges, pairs = factors.ranges(graph, places)
+    ranges, met = factors.ranges(graph, places)
+    ranges, pairs = near_pairs.solvable(graph, places, ranges, met)
     closures = factors.closures(graph, places)
     hints = replace(closures, covariance=closures.covariance + HINT * np.eye(3))
     known = factors.corrections(graph, robots, previous, mirrored)
@@ -168,9 +171,9 @@ def build_problem(
         if is_node(data.chain.robot) and data.keyframes.n[-1] > solved[data.chain][-1]
     )
     by_gyros = frozenset(by_gyro)
-    return TeamProblem(
-        problem, start, list(solved), pairs, places, is_known, by_gyros, is_near, left
-    )
+    named = list(solved), pairs, places
+    out = len(met) - len(pairs)
+    return TeamProblem(problem, start, *named, is_known, by_gyros, is_near, left, out)
 
 
 def _yaw_prior(noise: OdometryNoise) -> float:
@@ -312,6 +315,7 @@ def solved(
         lapses=tuple(lapse_of(team.problem, list(mine), one) for one in solution.freed),
         contradicted=frozenset(compress(team.pairs, solution.contradicted)),
         blocked=frozenset(compress(team.pairs, solution.blocked)),
+        left_out=team.left_out,
         is_explained=solution.is_explained,
         cost=solution.cost,
         iterations=solution.iterations,

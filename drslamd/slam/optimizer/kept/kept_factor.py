@@ -24,7 +24,6 @@ from drslamd.slam.optimizer.kept.head import Flags, Head, Pair, Places, keys_of,
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array, Index
 
-
 AT_ONCE = 128
 """Right-hand sides that are solved together: a large team has hundreds."""
 

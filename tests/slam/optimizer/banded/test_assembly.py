@@ -74,10 +74,7 @@ def test_a_lean_system_is_the_same_to_the_last_bit(band: int) -> None:
     # each factor twice: several entries are for one place
     there = [np.concatenate([unknowns, unknowns]) for unknowns in there]
     found = [factors(unknowns, rows, rows) for unknowns, rows in zip(there, (3, 1), strict=True)]
-    full, few = (
-        made(found)
-        for made in (Assembly(layout, there).matrix, Assembly(layout, there).lean_matrix)
-    )
+    full, few = Assembly(layout, there).matrix(found), Assembly(layout, there).lean_matrix(found)
     assert np.array_equal(few.band, full.band)
     assert np.array_equal(few.corner, full.corner)
     assert full.border.any()
