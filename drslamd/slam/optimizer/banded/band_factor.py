@@ -17,6 +17,8 @@ ROOM = 64
 """Poses that `selected_inverse` does before it moves its window: moving costs as much as some."""
 AT_ONCE, ROWS_AT_ONCE = 128, 4096
 """Columns and rows between two signs of headway: a second, with a hundred robots."""
+FACTORS_AT_ONCE = 512
+"""Of a large team, whose rows of the border are 70 MB."""
 MANY = 512
 """Columns, as of thirty robots that have met, that are worth dense blocks ..."""
 ROWS = 256
@@ -108,16 +110,30 @@ class BandFactor:
             outer = np.linalg.inv(self.schur)
         except np.linalg.LinAlgError:
             return None
-        rows = np.zeros((*unknowns.shape, len(outer)))
-        inside, outside = (unknowns < n) & (unknowns != NOWHERE), unknowns >= n
-        rows[inside] = -across[unknowns[inside]]
-        rows[outside] = np.eye(len(outer))[unknowns[outside] - n]
-        blocks = rows @ outer @ np.swapaxes(rows, 1, 2)
+        blocks = np.empty((*unknowns.shape, unknowns.shape[1]))
+        for first in range(0, len(unknowns), FACTORS_AT_ONCE):
+            some = slice(first, first + FACTORS_AT_ONCE)
+            rows = _of_border(unknowns[some], across)
+            blocks[some] = rows @ outer @ np.swapaxes(rows, 1, 2)
         row = np.maximum(unknowns[:, :, None], unknowns[:, None, :])
         column = np.minimum(unknowns[:, :, None], unknowns[:, None, :])
         both = (row < n) & (column != NOWHERE)
         blocks[both] += selected_inverse(self.lower)[(row - column)[both], column[both]]
         return np.asarray(blocks)
+
+
+def _of_border(unknowns: Index, across: Array) -> Array:
+    """(m, c, b) how unknowns (m, c) follow those of the border.
+
+    Args:
+        across: (n, b) minus that, of the band.
+    """
+    n, border = across.shape
+    rows = np.zeros((*unknowns.shape, border))
+    inside, outside = (unknowns < n) & (unknowns != NOWHERE), unknowns >= n
+    rows[inside] = -across[unknowns[inside]]
+    rows[outside] = np.eye(border)[unknowns[outside] - n]
+    return rows
 
 
 def _through(lower: Array, columns: Array, transposed: bool = False) -> Array:
