@@ -335,10 +335,14 @@ def dense(system: System, layout: BandLayout) -> Array:
 
 
 def lean(system: System) -> LeanSystem:
-    """The same, with those entries of its border that are not zero."""
-    row, column = np.nonzero(system.border)
-    border = FewEntries.of(row, column, system.border[row, column], system.border.shape)
-    return LeanSystem(system.band, border, system.corner)
+    """The same, with those entries that are not zero."""
+    band, border = _few(system.band.T), _few(system.border)
+    return LeanSystem(band, border, system.corner, np.zeros(len(system.border)))
+
+
+def _few(full: Array) -> FewEntries:
+    row, column = np.nonzero(full)
+    return FewEntries.of(row, column, full[row, column], full.shape)
 
 
 def matrix_of(system: System) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,32 +17,36 @@ SPARSE = 32
 """Where a matrix has so many times more entries than are added to it, they are added one by one."""
 
 
-class Bordered:
-    """What systems share, however they hold their border."""
+class Bordered(ABC):
+    """What systems share, however they hold their band and border."""
 
-    band: Array
     corner: Array
+
+    @property
+    @abstractmethod
+    def diagonal(self) -> Array:
+        """(n,) of the band, to be added to."""
 
     def add_prior(self, unknowns: Index, stiffness: Array | float) -> None:
         """Add independent priors by the information with which they hold unknowns (k,)."""
-        n = self.band.shape[1]
+        n = len(self.diagonal)
         inside = unknowns < n
         if not inside.any():
             self.corner[unknowns - n, unknowns - n] += stiffness
             return
         stiffness = np.broadcast_to(stiffness, unknowns.shape)
-        self.band[0, unknowns[inside]] += stiffness[inside]
+        self.diagonal[unknowns[inside]] += stiffness[inside]
         outside = unknowns[~inside] - n
         self.corner[outside, outside] += stiffness[~inside]
 
     def add_blocks(self, unknowns: Index, stiffness: Array) -> None:
         """Hold m groups of unknowns (m, d) of the border with information (m, d, d)."""
-        at = unknowns - self.band.shape[1]
+        at = unknowns - len(self.diagonal)
         self.corner[at[:, :, None], at[:, None, :]] += stiffness
 
     def add_difference(self, unknowns: Index, one: Index, stiffness: Array) -> None:
         """Hold unknowns (k,) of the border beside one other (1,) with information (k, k)."""
-        n = self.band.shape[1]
+        n = len(self.diagonal)
         many, single = unknowns - n, one - n
         self.corner[many[:, None], many] += stiffness
         sums = stiffness.sum(axis=0)
@@ -57,6 +62,10 @@ class System(Bordered):
     band: Array
     border: Array
     corner: Array
+
+    @property
+    def diagonal(self) -> Array:
+        return np.asarray(self.band[0])
 
     @staticmethod
     def empty(layout: BandLayout) -> System:
@@ -80,7 +89,8 @@ class System(Bordered):
 
 @dataclass(frozen=True)
 class FewEntries:
-    """(n, b) of which few are not zero: a range knows one bias, of the thousands of a large team.
+    """(n, b) of which few are not zero: a range knows one bias of the thousands of a large team,
+    and two poses of many.
 
     Attributes:
         starts: (n + 1,) of the entries of each row; column, value: of each entry, several of which
@@ -105,16 +115,43 @@ class FewEntries:
         row = np.repeat(np.arange(end - first), np.diff(self.starts[first : end + 1]))
         at = row * self.columns + self.column[mine]
         sums = np.bincount(at, self.value[mine], (end - first) * self.columns)
-        return sums.reshape(end - first, self.columns)
+        # (of nothing it counts whole numbers)
+        return sums.reshape(end - first, self.columns).astype(float, copy=False)
+
+    def lengths(self) -> Index:
+        """(n,) up to the last entry of each row that is not zero; all of a row that has none."""
+        row, length = (
+            np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts)),
+            self.column + 1,
+        )
+        found = np.zeros(len(self.starts) - 1, dtype=np.int64)
+        np.maximum.at(found, row, np.where(self.value != 0, length, 0))
+        return np.where(found == 0, self.columns, found)
 
 
 @dataclass
 class LeanSystem(Bordered):
-    """The same matrix, of whose border few entries are not zero."""
+    """The same matrix, of which few entries are not zero.
 
-    band: Array
+    Attributes:
+        band: (n, w) column by column; added: (n,) to the diagonal.
+        border: (n, b); corner: (b, b).
+    """
+
+    band: FewEntries
     border: FewEntries
     corner: Array
+    added: Array
+
+    @property
+    def diagonal(self) -> Array:
+        return self.added
+
+    def columns(self, first: int, end: int) -> Array:
+        """(w, end - first) of the band, in full."""
+        found = self.band.rows(first, end)
+        found[:, 0] += self.added[first:end]
+        return np.asarray(found.T)
 
 
 def entries_of(layout: BandLayout) -> int:
@@ -189,14 +226,15 @@ class Assembly:
         """J' W J, with as little memory as its entries need."""
         n, b, width = self._layout.band, self._layout.border, self._layout.width
         at, products = self._places[0], self._products(sets)
-        band = _sums(np.minimum(at, width * n), products, width * n)
+        inside = np.flatnonzero(at < width * n)
+        band = FewEntries.of(*np.divmod(at[inside], width), products[inside], (n, width))
         beyond = np.flatnonzero((at >= width * n) & (at < entries_of(self._layout)))
         column, row = np.divmod(at[beyond] - width * n, max(n + b, 1))
         products, is_corner = products[beyond], row >= n
         of_corner = column[is_corner] * b + row[is_corner] - n
         corner = _sums(of_corner, products[is_corner], b * b).reshape(b, b).T
         border = FewEntries.of(row[~is_corner], column[~is_corner], products[~is_corner], (n, b))
-        return LeanSystem(band.reshape(n, width).T, border, corner)
+        return LeanSystem(band, border, corner, np.zeros(n))
 
     def _products(self, sets: Sequence[Linearised]) -> Array:
         """What is added at each of the places."""

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from drslamd.slam import headway
 from drslamd.slam.lapack.routines import inverse_triangular
-from drslamd.slam.optimizer.banded.assembly import FewEntries, LeanSystem
+from drslamd.slam.optimizer.banded.assembly import LeanSystem
 from drslamd.slam.se2 import Array, Index
 
 LEAST_COLUMNS, MOST_COLUMNS = 128, 256
@@ -114,9 +114,8 @@ def eliminated(
     Args:
         with_blocks: also what solutions pass through, which is most of the memory?
     """
-    band, border = system.band, system.border
-    n, b = band.shape[1], border.columns
-    ends = _ends(band)
+    n, b = len(system.diagonal), system.border.columns
+    ends = _ends(system)
     blocks: list[Elimination] = []
     corner = system.corner
     asides, held = np.empty((min(count, max(AT_ONCE // max(b, 1), MOST_COLUMNS)), b)), 0
@@ -126,7 +125,7 @@ def eliminated(
         columns = int(np.clip(ends[at] - at, LEAST_COLUMNS, MOST_COLUMNS))
         columns = min(columns, count - at)
         end = max(int(ends[at + columns - 1]), at + len(carried))
-        window, beside = _window(band, border, at, columns, end, carried, carried_border)
+        window, beside = _window(system, at, columns, end, carried, carried_border)
         parts = _eliminated(
             window[:columns, :columns], window[columns:, :columns], beside[:columns]
         )
@@ -143,7 +142,7 @@ def eliminated(
         carried = window[columns:, columns:] - gain @ gain.T
         carried_border = beside[columns:] - gain @ aside
         at += columns
-    window, beside = _window(band, border, count, n - count, n, carried, carried_border)
+    window, beside = _window(system, count, n - count, n, carried, carried_border)
     matrix = np.tril(window)
     matrix += np.tril(matrix, -1).T
     return blocks, Rest(matrix, beside, corner - asides[:held].T @ asides[:held])
@@ -158,16 +157,14 @@ def _eliminated(own: Array, below: Array, border: Array) -> tuple[Array, Array, 
     return inverse, below @ inverse.T, inverse @ border
 
 
-def _ends(band: Array) -> Index:
+def _ends(system: LeanSystem) -> Index:
     """(n,) the row behind the last one that a column reaches, itself or through those before."""
-    width, n = band.shape
-    reach = width - np.argmax(band[::-1] != 0, axis=0) if n else np.zeros(0, dtype=np.int64)
-    return np.minimum(np.maximum.accumulate(np.arange(n) + reach), n)
+    n = len(system.diagonal)
+    return np.minimum(np.maximum.accumulate(np.arange(n) + system.band.lengths()), n)
 
 
 def _window(
-    band: Array,
-    border: FewEntries,
+    system: LeanSystem,
     at: int,
     columns: int,
     end: int,
@@ -178,18 +175,18 @@ def _window(
 
     Only the first columns are there in full, below the diagonal; the others are what was carried.
     """
-    width, size = len(band), end - at
+    width, size = system.band.columns, end - at
     dense = np.zeros((width + columns, columns))
     if columns:
         # each diagonal of the band is one column of a sheared view
         step = dense.strides[0], dense.strides[0] + dense.strides[1]
-        as_strided(dense, (width, columns), step)[:] = band[:, at : at + columns]
+        as_strided(dense, (width, columns), step)[:] = system.columns(at, at + columns)
     window = np.zeros((size, size))
     height = min(size, len(dense))
     window[:height, :columns] = dense[:height]
     known = min(len(carried), size)
     window[:known, :known] += carried[:known, :known]
-    beside = np.zeros((size, border.columns))
-    beside[:columns] = border.rows(at, at + columns)
+    beside = np.zeros((size, system.border.columns))
+    beside[:columns] = system.border.rows(at, at + columns)
     beside[:known] += carried_border[:known]
     return window, beside
