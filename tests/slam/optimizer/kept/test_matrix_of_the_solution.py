@@ -1,4 +1,4 @@
-"""Large teams: what is asked of a solution is asked of its own matrix, not of that where it began."""
+"""What is asked of a large team's solution is asked of its own matrix, not of where it began."""
 
 from __future__ import annotations
 
