@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from lab.benchmark import growth
 
+from drslamd.slam.optimizer import near_pairs
+
 
 def test_time_by_hours_is_a_row_for_each_mark_their_ratio_and_what_it_takes_to_go_on(
     monkeypatch: pytest.MonkeyPatch,
@@ -30,3 +32,18 @@ def test_in_a_crowd_nobody_measures_beyond_the_reach_of_the_radio(
     assert recording.ranges[:, 3].max() < 6.0
     ends = np.array([trail.truth[0, :2] for trail in recording.trails.values()])
     assert np.abs(ends).max() < growth.SQUARE_M * np.sqrt(6)
+
+
+def test_a_crowd_is_what_its_solutions_cost_and_how_many_pairs_there_is_no_room_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(growth, "CROWDS", (12,))
+    monkeypatch.setattr(growth, "MINUTE_S", 12)
+    monkeypatch.setattr(growth, "SECONDS", 2)
+    monkeypatch.setattr(near_pairs, "MOST", 40)
+    rows = list(growth.by_crowd(quick=False))
+    assert [row.unit for row in rows] == ["ms", "ms", "MB"]
+    left_out = int(rows[0].work.split(", ")[1].split()[0])
+    assert 0 < left_out < 12 * 11 / 2 - 20
+    assert rows[2].value > 30
+    assert list(growth.by_crowd(quick=True)) == []

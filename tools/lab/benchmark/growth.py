@@ -18,7 +18,7 @@ from drslamd.slam.graph.measurements import (
     RangeMeasurement,
 )
 from lab.benchmark import timing
-from lab.benchmark.met_team import begun
+from lab.benchmark.met_team import MetTeam, begun
 from lab.benchmark.rows import Row
 from lab.play import virtual_team
 from lab.recordings import world
@@ -42,6 +42,12 @@ RANGE_M = 12.0
 """How far its radio reaches, so that each has a handful of neighbours."""
 TEAM_S = 60.0
 MOST_OF_A_CORE = 0.5
+CROWDS = (100, 200)
+CROWD_RANGE_M = 20.4
+"""Of its radios: on six times six metres each robot has 28 in reach, those at the walls fewer."""
+MINUTE_S, SECONDS = 60, 4
+GOAL_MB = 2000.0
+"""Of a process that holds and solves a crowd of two hundred."""
 
 
 # hours
@@ -223,7 +229,31 @@ def _neighbours(recording: Recording) -> float:
     return len(pairs) / len(recording.trails)
 
 
+# crowds
+
+
+def by_crowd(quick: bool) -> Iterator[Row]:
+    """What a team costs that is too large for all its pairs: CPU of module 3, memory of all."""
+    for robots in () if quick else CROWDS:
+        team = MetTeam(robots, MINUTE_S, SECONDS, range_m=CROWD_RANGE_M)
+        team.know_the_truth()
+        taken, left_out = [], 0
+        for _ in range(SECONDS):
+            started = timing.now_ms()
+            job = begun(team.back, team.living)
+            found = job()
+            taken.append(timing.now_ms() - started)
+            left_out = found.left_out
+            team.back.on_solution(found)
+            team.drive()
+        of = f"{robots} robots with 28 in reach, {left_out} pairs left out"
+        yield Row(3, f"first solution of {of}", taken[0], "ms")
+        yield Row(3, f"the next ones of {of}, mean", float(np.mean(taken[1:])), "ms")
+        yield Row(3, f"memory of the process with {of}", timing.peak_mb(), "MB", GOAL_MB)
+
+
 def rows(quick: bool) -> Iterator[Row]:
-    """Both kinds of growth."""
+    """All kinds of growth; crowds first, since memory is that of the process so far."""
+    yield from by_crowd(quick)
     yield from by_hours(quick)
     yield from by_team_size(quick)

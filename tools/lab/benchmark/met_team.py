@@ -50,13 +50,17 @@ class MetTeam:
         truth: (seconds, robots, 3).
     """
 
-    def __init__(self, robots: int, seconds: int, more: int, seed: int = 8) -> None:
+    def __init__(
+        self, robots: int, seconds: int, more: int, seed: int = 8, range_m: float = RANGE_M
+    ) -> None:
         """
         Args:
             seconds: to drive at once; more: that may follow one by one.
+            range_m: how far its radio reaches.
         """
         self._rng = np.random.default_rng(seed)
         self.robots, self._whole_from = robots, seconds - WHOLE_S
+        self._range_m = range_m
         self.truth = self._driven(seconds + more)
         self._scale = self._rng.normal(0, 0.02, robots)
         self._odometry = self._measured()
@@ -84,7 +88,7 @@ class MetTeam:
         distance = np.hypot(apart[..., 0], apart[..., 1])
         noisy = distance + self._bias + self._rng.normal(0, SIGMA_M, distance.shape)
         is_told = second >= self._whole_from or second % SPARSE_S == 0
-        in_reach = np.triu(distance < RANGE_M, 1) & is_told
+        in_reach = np.triu(distance < self._range_m, 1) & is_told
         return [(c, self._entry(c, second, in_reach[c.robot], noisy[c.robot])) for c in self.chains]
 
     def _entry(self, chain: Chain, second: int, in_reach: Array, noisy: Array) -> GraphEntry:

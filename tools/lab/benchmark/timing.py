@@ -8,6 +8,7 @@ down slows all of them down.
 from __future__ import annotations
 
 import os
+import resource
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -51,6 +52,11 @@ def in_turns(
         if now_ms() - began > most_s * 1e3:
             break
     return {name: times(values) for name, values in taken.items()}
+
+
+def peak_mb() -> float:
+    """Memory that this process had resident at most."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def now_ms() -> float:
