@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from drslamd.slam.se2 import Array, Index
 
 SPARSE = 32
 """Where a matrix has so many times more entries than are added to it, they are added one by one."""
+
+LEAN = 8
+"""Where it has so many times more, they are held one by one: to sort them takes as much memory."""
 
 
 class Bordered(ABC):
@@ -87,6 +91,37 @@ class System(Bordered):
         self.corner += other.corner
 
 
+class Entries(Protocol):
+    """(n, b), however it is held."""
+
+    @property
+    def columns(self) -> int:
+        """b."""
+
+    def rows(self, first: int, end: int) -> Array:
+        """(end - first, b) in full."""
+
+    def lengths(self) -> Index:
+        """(n,) up to the last entry of each row that is not zero; all of a row that has none."""
+
+
+@dataclass(frozen=True)
+class AllEntries:
+    """In full, (n, b)."""
+
+    full: Array
+
+    @property
+    def columns(self) -> int:
+        return int(self.full.shape[1])
+
+    def rows(self, first: int, end: int) -> Array:
+        return np.array(self.full[first:end])
+
+    def lengths(self) -> Index:
+        return np.asarray(self.columns - np.argmax(self.full[:, ::-1] != 0, axis=1))
+
+
 @dataclass(frozen=True)
 class FewEntries:
     """(n, b) of which few are not zero: a range knows one bias of the thousands of a large team,
@@ -100,7 +135,7 @@ class FewEntries:
     starts: Index
     column: Index
     value: Array
-    columns: int
+    width: int
 
     @staticmethod
     def of(row: Index, column: Index, value: Array, shape: tuple[int, int]) -> FewEntries:
@@ -109,8 +144,11 @@ class FewEntries:
         starts = np.searchsorted(row[order], np.arange(shape[0] + 1))
         return FewEntries(starts, column[order], value[order], shape[1])
 
+    @property
+    def columns(self) -> int:
+        return self.width
+
     def rows(self, first: int, end: int) -> Array:
-        """(end - first, b) in full."""
         mine = slice(*self.starts[[first, end]].tolist())
         row = np.repeat(np.arange(end - first), np.diff(self.starts[first : end + 1]))
         at = row * self.columns + self.column[mine]
@@ -131,15 +169,15 @@ class FewEntries:
 
 @dataclass
 class LeanSystem(Bordered):
-    """The same matrix, of which few entries are not zero.
+    """The same matrix, held as it takes less memory.
 
     Attributes:
         band: (n, w) column by column; added: (n,) to the diagonal.
         border: (n, b); corner: (b, b).
     """
 
-    band: FewEntries
-    border: FewEntries
+    band: Entries
+    border: Entries
     corner: Array
     added: Array
 
@@ -223,18 +261,23 @@ class Assembly:
         return System.of_entries(self._layout, _sums(at, products, entries_of(self._layout)))
 
     def lean_matrix(self, sets: Sequence[Linearised]) -> LeanSystem:
-        """J' W J, with as little memory as its entries need."""
+        """J' W J, with as little memory as it needs."""
         n, b, width = self._layout.band, self._layout.border, self._layout.width
+        if len(self._places[0]) * LEAN >= entries_of(self._layout):
+            whole = self.matrix(sets)
+            band, border = AllEntries(whole.band.T), AllEntries(whole.border)
+            return LeanSystem(band, border, whole.corner, np.zeros(n))
         at, products = self._places[0], self._products(sets)
         inside = np.flatnonzero(at < width * n)
-        band = FewEntries.of(*np.divmod(at[inside], width), products[inside], (n, width))
+        row, column = np.divmod(at[inside], width)
+        few_of_band = FewEntries.of(row, column, products[inside], (n, width))
         beyond = np.flatnonzero((at >= width * n) & (at < entries_of(self._layout)))
-        column, row = np.divmod(at[beyond] - width * n, max(n + b, 1))
+        column, row = np.divmod(at[beyond] - width * n, n + b)
         products, is_corner = products[beyond], row >= n
         of_corner = column[is_corner] * b + row[is_corner] - n
         corner = _sums(of_corner, products[is_corner], b * b).reshape(b, b).T
-        border = FewEntries.of(row[~is_corner], column[~is_corner], products[~is_corner], (n, b))
-        return LeanSystem(band, border, corner, np.zeros(n))
+        of_border = row[~is_corner], column[~is_corner], products[~is_corner]
+        return LeanSystem(few_of_band, FewEntries.of(*of_border, (n, b)), corner, np.zeros(n))
 
     def _products(self, sets: Sequence[Linearised]) -> Array:
         """What is added at each of the places."""

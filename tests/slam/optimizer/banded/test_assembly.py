@@ -9,7 +9,14 @@ import pytest
 from dense_problems import matrix_of
 from slam_problems import team_problem
 
-from drslamd.slam.optimizer.banded.assembly import SPARSE, Assembly, FewEntries, System, entries_of
+from drslamd.slam.optimizer.banded.assembly import (
+    SPARSE,
+    AllEntries,
+    Assembly,
+    FewEntries,
+    System,
+    entries_of,
+)
 from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout
 from drslamd.slam.optimizer.banded.linearised import Linearised
 from drslamd.slam.se2 import Array, Index
@@ -75,6 +82,9 @@ def test_a_lean_system_is_the_same_to_the_last_bit(band: int) -> None:
     there = [np.concatenate([unknowns, unknowns]) for unknowns in there]
     found = [factors(unknowns, rows, rows) for unknowns, rows in zip(there, (3, 1), strict=True)]
     full, few = Assembly(layout, there).matrix(found), Assembly(layout, there).lean_matrix(found)
+    kind = FewEntries if band == 100 else AllEntries
+    assert isinstance(few.band, kind)
+    assert isinstance(few.border, kind)
     for system in (few, full):
         system.add_prior(np.array([3, band]), np.array([0.3, 0.7]))
     assert np.array_equal(few.corner, full.corner)
@@ -88,6 +98,7 @@ def test_a_row_is_as_long_as_its_last_entry_that_is_not_zero() -> None:
     rows, columns = np.array([2, 0, 0, 3]), np.array([1, 4, 2, 3])
     few = FewEntries.of(rows, columns, np.array([1.0, 0.0, 5.0, 0.0]), (4, 6))
     assert few.lengths().tolist() == [3, 6, 2, 6]
+    assert AllEntries(few.rows(0, 4)).lengths().tolist() == [3, 6, 2, 6]
 
 
 def test_of_no_factors_there_is_nothing() -> None:
