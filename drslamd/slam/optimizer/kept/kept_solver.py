@@ -181,11 +181,11 @@ def _solved(
     point = approach(equations, start, current, tolerance, most)
     if point is None:
         return None
-    asked = _asked(equations, point, current, kept)
+    asked = _as_modelled(equations, point, current, kept)
     if kept is None and len(problem.n) >= MANY and (asked is None or _is_far(start, point)):
         del current
         current = _matrix(None, Believed(problem, point), pairs)
-        asked = _asked(equations, point, current, None) if current else None
+        asked = _as_modelled(equations, point, current, None) if current else None
     if asked is None or current is None:
         return None
     variances, checked, ratio = asked
@@ -216,7 +216,7 @@ def _is_far(start: Point, point: Point) -> bool:
     return bool(np.abs(point.poses - start.poses).max() > FAR)
 
 
-class Asked(NamedTuple):
+class AsModelled(NamedTuple):
     """What says that all is as modelled.
 
     Attributes:
@@ -228,7 +228,9 @@ class Asked(NamedTuple):
     ratio: Array
 
 
-def _asked(equations: Equations, point: Point, matrix: Current, kept: Kept | None) -> Asked | None:
+def _as_modelled(
+    equations: Equations, point: Point, matrix: Current, kept: Kept | None
+) -> AsModelled | None:
     """None where something may not be as modelled.
 
     Args:
@@ -241,7 +243,7 @@ def _asked(equations: Equations, point: Point, matrix: Current, kept: Kept | Non
     is_fresh = kept is not None and kept.checked.is_fresh(problem)
     checked = kept.checked if kept and is_fresh else Freedom.of(equations, point, matrix)
     ratio = quick_check.misfit_as_modelled(problem, point, checked, variances)
-    return None if ratio is None else Asked(variances, checked, ratio)
+    return None if ratio is None else AsModelled(variances, checked, ratio)
 
 
 class JustSolved(NamedTuple):
