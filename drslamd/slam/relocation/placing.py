@@ -45,6 +45,8 @@ MAX_SIGMA_M, MAX_SIGMA_RAD = 0.35, np.radians(8.0)
 KNOWN = 12
 """So many independent ranges have told how much they scatter: half a minute of one a second, which
 share errors with those before, and what was configured (`calibration.range_scatter`)."""
+LEAST = 0.7
+"""Times the sigma that was known: errors that last longer than a placing do not show in it."""
 FEWEST = 10
 """Ranges."""
 BEATEN_CHI2 = 12.0
@@ -120,8 +122,8 @@ def place(seen: Sightings, stretch: WayUnder, prior: Prior, model: RangeModel) -
 
 def scatter_about(chi2: float, ranges: int) -> float:
     """True over known sigma of so many ranges about a pose; never more than 1, for then it may as
-    well be the wrong pose."""
-    return float(np.sqrt(min((KNOWN + chi2) / (KNOWN + ranges - 3), 1.0)))
+    well be the wrong pose, and no less than `LEAST`."""
+    return float(np.clip(np.sqrt((KNOWN + chi2) / (KNOWN + ranges - 3)), LEAST, 1.0))
 
 
 class _Judged(NamedTuple):
