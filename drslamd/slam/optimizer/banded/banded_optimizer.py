@@ -23,7 +23,7 @@ from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.noise import OdometryNoise
-from drslamd.slam.optimizer import factors, mirror_factors, near_pairs
+from drslamd.slam.optimizer import factors, mirror_factors, near_pairs, valleys
 from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.banded.banded_solver import SETTLED
 from drslamd.slam.optimizer.banded.lapses.known_lapses import freed_again, lapse_of
@@ -263,6 +263,10 @@ def _begun(
     team = build_problem(graph, group, previous, numbers)
     kept, fitted = (previous.kept, previous.fitted) if previous else (None, {})
     found = solved(team, group, solve=numbers.solve, kept=kept)
+    for start in valleys.other_starts(found, previous):
+        team = build_problem(graph, group, start, numbers)
+        other = solved(team, group, solve=numbers.solve)
+        found = other if valleys.is_better(other, found) else found
     return found if found.is_as_modelled else replace(found, fitted=fitted)
 
 
