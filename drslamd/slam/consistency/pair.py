@@ -23,7 +23,7 @@ from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.relative_pose.estimate import RelativePoseEstimate
 from drslamd.slam.relative_pose.mistakes.mounting_search import MOVED_M, MountingSearch
-from drslamd.slam.relative_pose.mistakes.what_if import MIRROR, is_corrected
+from drslamd.slam.relative_pose.mistakes.what_if import MIRROR, Case, is_corrected, is_curve
 from drslamd.slam.relative_pose.range_buffer import RangeBuffer
 from drslamd.slam.relative_pose.range_sampler import RangeSampler
 from drslamd.slam.relative_pose.window_request import WindowRequest
@@ -156,10 +156,11 @@ class PairTracker:
         Args:
             way_m: how far the robot drove that drove less.
         """
-        before = self.search.found
+        before, asked = self.search.found, self.search.cases
         if self.search.on_costs(costs, len(request.window), way_m > MOVED_M):
             now = self.search.found
-            if before is None or now is None or now.kind != before.kind:
+            is_another = before is None or now is None or now.kind != before.kind
+            if is_another and not self._is_learned_curve(now or asked[int(np.argmin(costs))]):
                 # what was told with another mounting is worth nothing
                 self._withdrawn += [replace(m, kept=False) for m in self._told.values()]
                 self._told.clear()
@@ -167,6 +168,10 @@ class PairTracker:
             self._checked, self.connected, self.kept = None, False, ()
             self._is_obsolete = self._is_busy
         self._judge()
+
+    def _is_learned_curve(self, likeliest: Case) -> bool:
+        """Does a curve explain windows that module 3 has learned from what was told?"""
+        return is_curve(likeliest) and any(one.yaw for one in self._corrections)
 
     # module 2
 

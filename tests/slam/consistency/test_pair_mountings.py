@@ -14,7 +14,7 @@ from drslamd.slam.consistency.pair import Agreement
 from drslamd.slam.graph.chain_data import ChainData
 from drslamd.slam.graph.measurements import Keyframe
 from drslamd.slam.odometry.correction import Correction
-from drslamd.slam.odometry.mounting import SIDES, TRACKS
+from drslamd.slam.odometry.mounting import CURVES, SIDES, TRACKS, Repair
 from drslamd.slam.relative_pose.estimate import RelativePoseEstimate, Verdict
 from drslamd.slam.relative_pose.mistakes.mounting_search import FEWEST_ASKED, MOST, MOVED_M
 from drslamd.slam.relative_pose.mistakes.what_if import CASES, MIRROR, Case, variants
@@ -191,6 +191,44 @@ def test_what_module_2_has_forgotten_is_taken_back_as_well() -> None:
     assert pair.told() == []
     search(pair, Case(b=TRACKS[0]))
     assert pair.told() == [(0, False), (1, False)]
+
+
+@pytest.mark.parametrize(("yaw", "stays"), [(0.02, True), (0.0, False)])
+def test_what_module_3_has_learned_a_curve_from_stays_but_for_what_module_2_remembers(
+    yaw: float, stays: bool
+) -> None:
+    pair = OwnedPair(TWO)
+    pair.see(BESIDE, 2)
+    assert len(pair.told()) == 2
+    pair.answer(30, BESIDE)
+    known = Correction(0.1, yaw, 0.4), Correction(0.0, 0.0, 0.0)
+    run = pair.tracker.begin_check(pair.own, pair.peer, pair.own.model.noise, known)
+    assert run is not None
+    pair.tracker.on_check(run())
+    search(pair, Case(b=CURVES[0]))
+    assert pair.tracker.is_refused
+    assert pair.told() == ([] if stays else [(0, False), (1, False)])
+
+
+@pytest.mark.parametrize(("repair", "stays"), [(CURVES[0], True), (TRACKS[0], False)])
+def test_so_does_it_where_a_later_window_would_have_that_curve_and_not_where_a_track(
+    repair: Repair, stays: bool
+) -> None:
+    """One window had confirmed the pair, and the next contradicts it."""
+    pair = OwnedPair(TWO)
+    pair.see(BESIDE, 2)
+    assert len(pair.told()) == 2
+    pair.answer(30, BESIDE)
+    known = Correction(0.0, 0.02, 0.0), Correction(0.0, 0.0, 0.0)
+    run = pair.tracker.begin_check(pair.own, pair.peer, pair.own.model.noise, known)
+    assert run is not None
+    pair.tracker.on_check(run())
+    pair.tracker.search.is_confirmed = pair.tracker.search.is_provisional = True
+    costs = np.array([5.0 if case == Case(b=repair) else 1e3 for case in CASES])
+    pair.tracker.on_costs(asked_at(10), costs, 10.0)
+    assert pair.tracker.search.found is None
+    assert not pair.tracker.search.is_confirmed
+    assert pair.told() == ([] if stays else [(0, False), (1, False)])
 
 
 def test_what_was_told_is_taken_back_while_a_check_runs() -> None:
