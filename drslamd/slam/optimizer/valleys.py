@@ -12,8 +12,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from drslamd.conventions import GRID_HZ
 from drslamd.slam.graph.estimate import TeamEstimate
 
+POSES = 500
+"""What stays unexplained is begun anew each second where there are fewer, every other one up to
+twice as many, and so on: a beginning costs some solutions."""
 BACKWARDS = 1.0
 """A scale beyond that: the way is longer the other way round."""
 
@@ -27,7 +31,10 @@ def other_starts(
         found: a solution; previous: what it began with.
     """
     if not found.is_explained and previous is not None:
-        yield None
+        second = int(found.trajectories[found.frame.robot].n[-1]) // GRID_HZ
+        period = 1 + sum(len(path.n) for path in found.trajectories.values()) // POSES
+        if previous.is_explained or second % period == 0:
+            yield None
     backwards = {r for r, scale in found.scale.items() if scale.value > BACKWARDS}
     backwards &= found.trajectories.keys() - {found.frame.robot}
     if backwards:

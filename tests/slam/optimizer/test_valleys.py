@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from slam_scenes import BANDED, SmallTeam, group_of, small_team
 
-from drslamd.conventions import Segment
+from drslamd.conventions import GRID_HZ, Segment
 from drslamd.slam.graph.estimate import Learned, TeamEstimate
 from drslamd.slam.optimizer import valleys
 from drslamd.slam.optimizer.banded import banded_optimizer
 from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem
 from drslamd.slam.optimizer.banded.solution import Solution
-from drslamd.slam.optimizer.valleys import BACKWARDS, is_better, other_starts
+from drslamd.slam.optimizer.valleys import BACKWARDS, POSES, is_better, other_starts
 
 
 @pytest.fixture(scope="module")
@@ -111,9 +111,25 @@ def test_only_a_robot_that_counts_backwards_is_turned_about_and_never_the_one_of
         assert start.kept is None
 
 
-def test_a_first_solution_that_nothing_explains_was_begun_at_the_closures_already(
-    right: TeamEstimate,
+@pytest.mark.parametrize(
+    ("poses", "second", "explained_before", "starts"),
+    [
+        (POSES - 1, 41, False, [None]),
+        (POSES, 41, False, []),
+        (POSES, 42, False, [None]),
+        (POSES, 41, True, [None]),
+        (2 * POSES, 41, False, []),
+        (2 * POSES, 42, False, [None]),
+    ],
+)
+def test_what_stays_unexplained_is_begun_anew_more_rarely_in_larger_graphs(
+    poses: int, second: int, explained_before: bool, starts: list[None], right: TeamEstimate
 ) -> None:
-    found = replace(right, is_explained=False)
+    """A first solution was begun at the closures already."""
+    path = right.trajectories[0]
+    n = GRID_HZ * second + 9 + np.arange(1 - poses, 1)
+    longer = replace(path, n=n, poses=np.zeros((poses, 3)))
+    found = replace(right, trajectories={0: longer}, is_explained=False)
+    before = replace(right, is_explained=explained_before)
+    assert list(other_starts(found, before)) == starts
     assert list(other_starts(found, None)) == []
-    assert list(other_starts(found, right)) == [None]
