@@ -44,7 +44,7 @@ WORLDS: dict[str, Callable[[int], Recording]] = {
 def main() -> int:
     """Print every figure beside its goal; 1 when one is missed."""
     parser = argparse.ArgumentParser(prog="lab.near", description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--seeds", type=whole(1), default=20)
+    parser.add_argument("--seeds", type=whole(), default=20)
     parser.add_argument("--first", type=whole(), default=1, help="seed")
     parser.add_argument("--world", nargs="*", default=["reproduce"], choices=tuple(WORLDS))
     parser.add_argument("--seconds", type=real(1), default=20.0)
