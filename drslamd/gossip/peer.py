@@ -46,6 +46,9 @@ FEW_GAPS = 2
 """Between statuses: of so few none is an exception."""
 NOT_KNOWN = -(1 << 40)
 """As the newest entry of a log: no entry lies near it."""
+LOST_US, DRIVES_US = 60 * SECOND_US, 3 * SECOND_US
+"""Who says that it is lost gets more odometry for so long, and after that while it was heard to
+drive so lately: wheels that are out for hours cost the team nothing."""
 REMEMBERED_US = 40 * SECOND_US
 """How long it counts that a peer named a robot, when it hears too many for one status: 254 take ten
 heartbeats, which come every three seconds at the slowest; a few may be lost. In such a crowd it
@@ -87,6 +90,9 @@ class Peer:
         """Epochs of the logs that it holds, by robot; ids bound their number."""
         self._answered: int | None = None
         self._gap_since: int | None = None
+        self._stale_since: int | None = None
+        self._drove: int | None = None
+        """When its odometry was last heard to go on, us."""
         self._tallies: deque[_Tally] = deque(maxlen=LOSS_STATUSES)
 
     def on_message(self, sent: int, utime: int) -> None:
@@ -147,6 +153,8 @@ class Peer:
         if _is_overtaken(counter, self._status_counter):
             return False
         self._status_counter, self.status = counter, status
+        since = utime if self._stale_since is None else self._stale_since
+        self._stale_since = since if status.state is PoseState.STALE else None
         # entries of its log have counters too, but are not heard from the peer alone
         entries = max((log.newest for log in status.logs if log.id == self.chain.robot), default=0)
         self._tallies.append(_Tally(counter - entries, self.received))
@@ -192,6 +200,7 @@ class Peer:
         for n, steps in enumerate(batch.steps, start=batch.n0):
             if not len(track) or n >= track.end:
                 track.append(n, steps)
+                self._drove = utime
         track.segment_start = max(track.segment_start, batch.segment_start)
 
     @property
@@ -251,8 +260,15 @@ class Peer:
             of_us.utime if of_us else utime,
             self.clock.since,
             self.status.frame if self.status.state is PoseState.LOCALISED else None,
-            self.status.state is PoseState.STALE,
+            self._is_lost(utime),
         )
+
+    def _is_lost(self, utime: int) -> bool:
+        """See `LOST_US`."""
+        if self._stale_since is None:
+            return False
+        drives = self._drove is not None and utime - self._drove < DRIVES_US
+        return drives or utime - self._stale_since < LOST_US
 
 
 def _is_overtaken(counter: int, latest: int) -> bool:

@@ -10,7 +10,7 @@ from message_builders import MS, SECOND, a_status
 
 from drslamd.conventions import Chain
 from drslamd.gossip.message_types import Heard, LogState, OdometryBatch, Pose, PoseState, Status
-from drslamd.gossip.peer import Peer
+from drslamd.gossip.peer import DRIVES_US, LOST_US, Peer
 from drslamd.slam.se2 import Array
 
 OWN, CHAIN = Chain(1, 10), Chain(3, 11)
@@ -298,10 +298,29 @@ def test_a_neighbour_carries_what_the_peer_said() -> None:
 @pytest.mark.parametrize("state", PoseState)
 def test_a_neighbour_is_lost_whose_pose_is_stale_and_no_other(state: PoseState) -> None:
     peer = a_peer()
-    peer.take_status(replace(a_status(), state=state), 1, OWN, 0)
+    peer.take_status(replace(a_status(), state=state), 1, OWN, T0)
     neighbour = peer.neighbour(OWN, T0)
     assert neighbour.is_lost is (state is PoseState.STALE)
     assert (neighbour.frame is not None) is (state is PoseState.LOCALISED)
+
+
+def test_who_is_lost_for_long_is_so_only_while_it_drives() -> None:
+    """Every further status that says so leaves the beginning as it is; a pose ends it."""
+    peer, stale = a_peer(), replace(a_status(), state=PoseState.STALE)
+    peer.take_status(stale, 1, OWN, T0)
+    peer.take_status(stale, 2, OWN, T0 + LOST_US // 2)
+    assert peer.neighbour(OWN, T0 + LOST_US - 1).is_lost
+    later = T0 + LOST_US
+    assert not peer.neighbour(OWN, later).is_lost
+    peer.extend_track(batch(0, 5), later)
+    assert peer.neighbour(OWN, later + DRIVES_US - 1).is_lost
+    assert not peer.neighbour(OWN, later + DRIVES_US).is_lost
+    # what is known already is not driven once more
+    peer.extend_track(batch(0, 5), later + DRIVES_US)
+    assert not peer.neighbour(OWN, later + DRIVES_US).is_lost
+    peer.take_status(replace(stale, state=PoseState.LOCALISED), 3, OWN, later)
+    peer.take_status(stale, 4, OWN, later + LOST_US)
+    assert peer.neighbour(OWN, later + 2 * LOST_US - 1).is_lost
 
 
 @pytest.mark.parametrize(("excess_us", "known"), [(0, True), (2, False)])

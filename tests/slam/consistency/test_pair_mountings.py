@@ -178,16 +178,20 @@ def test_what_was_told_is_taken_back_before_what_was_checked_since_is_told() -> 
     assert pair.told() == []
 
 
-def test_what_module_2_has_forgotten_is_taken_back_as_well() -> None:
-    """Corrections that were learned meanwhile let it begin anew."""
-    pair = OwnedPair(TWO)
-    pair.see(BESIDE, 2)
-    assert pair.told() == [(0, True), (1, True)]
+def begin_anew(pair: OwnedPair, learned: Correction) -> None:
+    """Module 2 does, because a correction of our odometry was learned."""
     pair.answer(30, BESIDE)
-    known = Correction(0.1, 0.02, 0.4), Correction(-0.06, 0.01, -0.2)
+    known = learned, Correction()
     run = pair.tracker.begin_check(pair.own, pair.peer, pair.own.model.noise, known)
     assert run is not None
     pair.tracker.on_check(run())
+
+
+def test_what_module_2_has_forgotten_is_taken_back_as_well() -> None:
+    pair = OwnedPair(TWO)
+    pair.see(BESIDE, 2)
+    assert pair.told() == [(0, True), (1, True)]
+    begin_anew(pair, Correction(0.1, 0.02, 0.4))
     assert pair.told() == []
     search(pair, Case(b=TRACKS[0]))
     assert pair.told() == [(0, False), (1, False)]
@@ -200,11 +204,7 @@ def test_what_module_3_has_learned_a_curve_from_stays_but_for_what_module_2_reme
     pair = OwnedPair(TWO)
     pair.see(BESIDE, 2)
     assert len(pair.told()) == 2
-    pair.answer(30, BESIDE)
-    known = Correction(0.1, yaw, 0.4), Correction(0.0, 0.0, 0.0)
-    run = pair.tracker.begin_check(pair.own, pair.peer, pair.own.model.noise, known)
-    assert run is not None
-    pair.tracker.on_check(run())
+    begin_anew(pair, Correction(0.1, yaw, 0.4))
     search(pair, Case(b=CURVES[0]))
     assert pair.tracker.is_refused
     assert pair.told() == ([] if stays else [(0, False), (1, False)])
@@ -218,11 +218,7 @@ def test_so_does_it_where_a_later_window_would_have_that_curve_and_not_where_a_t
     pair = OwnedPair(TWO)
     pair.see(BESIDE, 2)
     assert len(pair.told()) == 2
-    pair.answer(30, BESIDE)
-    known = Correction(0.0, 0.02, 0.0), Correction(0.0, 0.0, 0.0)
-    run = pair.tracker.begin_check(pair.own, pair.peer, pair.own.model.noise, known)
-    assert run is not None
-    pair.tracker.on_check(run())
+    begin_anew(pair, Correction(0.0, 0.02, 0.0))
     pair.tracker.search.is_confirmed = pair.tracker.search.is_provisional = True
     costs = np.array([5.0 if case == Case(b=repair) else 1e3 for case in CASES])
     pair.tracker.on_costs(asked_at(10), costs, 10.0)
