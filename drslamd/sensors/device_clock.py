@@ -12,7 +12,8 @@ arrival and never run backwards: the offset only falls to that of the reading at
 is then its arrival.
 
 A counter is believed once two readings in a row continue each other, at the start as well as after
-a jump: a single damaged reading changes nothing, a device that was restarted costs one reading.
+a jump: a single damaged reading changes nothing, a device that was restarted costs one reading. At
+the start it costs none: the second reading tells when the first was (`first_us`).
 """
 
 from __future__ import annotations
@@ -34,28 +35,32 @@ reads its backlog late by as much; a restarted device is off by its whole uptime
 
 
 class _Track:
-    """The readings of one uninterrupted run of a counter."""
+    """The readings of one uninterrupted run of a counter.
+
+    Attributes:
+        reading: the last one, with the turns of the counter since the first.
+        offset_us: the smallest (arrival - reading) of the window.
+    """
 
     def __init__(self, bits: int, unit_us: int, reading: int, arrival: int) -> None:
         self._bits = bits
         self._unit_us = unit_us
-        self._reading = reading
+        self.reading = reading
         self._arrival = arrival
         # One (bucket, smallest offset) for each half second of device time: a host that was held
         # up and reads its backlog late must not lose what it knew before.
         self._offsets: deque[tuple[int, int]] = deque(maxlen=BUCKETS)
         self.offset_us = arrival - reading * unit_us
-        """The smallest of them."""
         self._keep(arrival)
 
-    def host_time(self) -> int:
-        """Time of the last reading on the clock of the host."""
-        return self._reading * self._unit_us + self.offset_us
+    def host_time(self, reading: int | None = None) -> int:
+        """Time of a reading, by default the last one, on the clock of the host."""
+        return (self.reading if reading is None else reading) * self._unit_us + self.offset_us
 
     def step_to(self, reading: int, arrival: int) -> int:
         """Units from the last reading to this one, whole turns of the counter included."""
         expected = (arrival - self._arrival) // self._unit_us
-        beyond = wrapped_difference(reading, self._reading + expected, self._bits)
+        beyond = wrapped_difference(reading, self.reading + expected, self._bits)
         return expected + beyond
 
     def extend(self, reading: int, arrival: int) -> bool:
@@ -64,13 +69,13 @@ class _Track:
         step_us = step * self._unit_us
         if step_us <= 0 or abs(step_us - (arrival - self._arrival)) > CONTINUITY_US:
             return False
-        self._reading += step
+        self.reading += step
         self._arrival = arrival
         self._keep(arrival)
         return True
 
     def _keep(self, arrival: int) -> None:
-        device_us = self._reading * self._unit_us
+        device_us = self.reading * self._unit_us
         bucket, offset = device_us // BUCKET_US, arrival - device_us
         offsets = self._offsets
         if offsets and offsets[-1][0] == bucket:
@@ -89,6 +94,8 @@ class DeviceClock:
 
     Attributes:
         restarts: how often a believed counter was given up for another one.
+        first_us: host time of the reading before the last, if it waited for the last to be
+            believed; of the first that ever was believed, never of one after a restart.
     """
 
     def __init__(self, bits: int, unit_us: int) -> None:
@@ -97,6 +104,7 @@ class DeviceClock:
         self._believed: _Track | None = None
         self._candidate: _Track | None = None
         self.restarts = 0
+        self.first_us: int | None = None
 
     @property
     def offset_us(self) -> int | None:
@@ -112,10 +120,14 @@ class DeviceClock:
 
         None while the reading continues neither the believed counter nor the reading before it.
         """
+        self.first_us = None
+        waited = self._candidate.reading if self._candidate else None
         track = self._extended(reading, arrival)
         if track is None:
             self._candidate = _Track(self._bits, self._unit_us, reading, arrival)
             return None
+        if self._believed is None:
+            self.first_us = track.host_time(waited)
         if track is not self._believed:
             self.restarts += self._believed is not None
             self._believed = track

@@ -43,6 +43,24 @@ def test_nothing_is_believed_before_the_second_reading() -> None:
     assert clock.offset_us == -1000 * MS
 
 
+def test_when_the_first_reading_was_is_told_with_the_second_and_never_again() -> None:
+    clock = a_clock()
+    assert clock.to_host(1000, 30 * MS) is None
+    assert clock.first_us is None
+    assert clock.to_host(1020, 40 * MS) == 40 * MS
+    assert clock.first_us == 20 * MS  # 10 ms of its 30 were a delay
+    clock.to_host(1040, 60 * MS)
+    assert clock.first_us is None
+
+
+def test_a_reading_before_a_restart_was_believed_is_not_the_first() -> None:
+    clock = started()
+    far = 50 * SECOND_US
+    assert clock.to_host(900_000, far + 20 * MS) is None
+    assert clock.to_host(900_020, far + 40 * MS) == far + 40 * MS
+    assert (clock.restarts, clock.first_us) == (1, None)
+
+
 def test_a_delayed_arrival_is_stamped_as_if_it_had_not_been_delayed() -> None:
     clock = started()
     assert clock.to_host(1020, 50 * SECOND_US + 20 * MS + 300 * MS) == 50 * SECOND_US + 20 * MS

@@ -21,12 +21,16 @@ from functools import reduce
 from operator import xor
 from typing import Final
 
-from drslamd.conventions import MILLISECOND_US
-from drslamd.sensors.device_clock import DeviceClock
 from drslamd.sensors.line_scanner import LineScanner
 from drslamd.sensors.samples import GyroAngle, WheelCounts, WheelSample
 from drslamd.sensors.tally import Tally
-from drslamd.sensors.wheels.wheel_driver import Outcome, SerialDriver, WheelRefusal, tallied
+from drslamd.sensors.wheels.wheel_driver import (
+    BaseTime,
+    Outcome,
+    SerialDriver,
+    WheelRefusal,
+    tallied,
+)
 
 COUNTER_BITS: Final = 32
 TIME_BITS: Final = 32
@@ -46,7 +50,7 @@ class AsciiDriver(SerialDriver):
 
     def __init__(self) -> None:
         self._lines = LineScanner()
-        self._clock = DeviceClock(TIME_BITS, MILLISECOND_US)
+        self._time = BaseTime(TIME_BITS)
         self.tally: Tally[WheelRefusal] = Tally()
 
     def feed(self, data: bytes, utime: int) -> list[WheelSample]:
@@ -68,13 +72,15 @@ class AsciiDriver(SerialDriver):
         time_ms, left, right = (int(match[name]) for name in ("ms", "left", "right"))
         if time_ms >= 1 << TIME_BITS or not _fits(left) or not _fits(right):
             return WheelRefusal.MALFORMED
-        measured = self._clock.to_host(time_ms, utime)
-        if measured is None:
-            return WheelRefusal.TIME
-        counts = WheelCounts(measured, left, right, COUNTER_BITS)
-        if match["heading"] is None:
-            return [counts]
-        return [GyroAngle(measured, math.radians(float(match["heading"]))), counts]
+        heading = match["heading"]
+
+        def samples(measured: int) -> list[WheelSample]:
+            counts = WheelCounts(measured, left, right, COUNTER_BITS)
+            if heading is None:
+                return [counts]
+            return [GyroAngle(measured, math.radians(float(heading))), counts]
+
+        return self._time.stamped(time_ms, utime, samples)
 
 
 def _fits(count: int) -> bool:

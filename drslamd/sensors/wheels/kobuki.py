@@ -13,12 +13,16 @@ import re
 import struct
 from typing import Final
 
-from drslamd.conventions import MILLISECOND_US
-from drslamd.sensors.device_clock import DeviceClock
 from drslamd.sensors.frame_scanner import NEED_MORE, NOT_A_FRAME, FrameScanner
 from drslamd.sensors.samples import GyroAngle, GyroRate, WheelCounts, WheelSample
 from drslamd.sensors.tally import Tally
-from drslamd.sensors.wheels.wheel_driver import Outcome, SerialDriver, WheelRefusal, tallied
+from drslamd.sensors.wheels.wheel_driver import (
+    BaseTime,
+    Outcome,
+    SerialDriver,
+    WheelRefusal,
+    tallied,
+)
 
 COUNTER_BITS: Final = 16
 TIME_BITS: Final = 16
@@ -80,7 +84,7 @@ class KobukiDriver(SerialDriver):
 
     def __init__(self) -> None:
         self._scanner = FrameScanner(KobukiFormat())
-        self._clock = DeviceClock(TIME_BITS, MILLISECOND_US)
+        self._time = BaseTime(TIME_BITS)
         self.tally: Tally[WheelRefusal] = Tally()
 
     def feed(self, data: bytes, utime: int) -> list[WheelSample]:
@@ -97,11 +101,11 @@ class KobukiDriver(SerialDriver):
         if _CORE not in parts:
             return None
         time_ms, left, right = _TIME_AND_COUNTS.unpack_from(parts[_CORE])
-        measured = self._clock.to_host(time_ms, utime)
-        if measured is None:
-            return WheelRefusal.TIME
-        counts = WheelCounts(measured, left, right, COUNTER_BITS)
-        return [*_gyro(parts, measured), counts]
+
+        def samples(measured: int) -> list[WheelSample]:
+            return [*_gyro(parts, measured), WheelCounts(measured, left, right, COUNTER_BITS)]
+
+        return self._time.stamped(time_ms, utime, samples)
 
 
 def _gyro(parts: dict[int, bytes], utime: int) -> list[WheelSample]:

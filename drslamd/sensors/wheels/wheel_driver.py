@@ -7,10 +7,13 @@ counted in `tally`; only a wrong configuration raises, and only when the driver 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import Enum
 from typing import Protocol, Union, runtime_checkable
 
+from drslamd.conventions import MILLISECOND_US
 from drslamd.events import CanFrame
+from drslamd.sensors.device_clock import DeviceClock
 from drslamd.sensors.samples import WheelSample
 from drslamd.sensors.tally import Tally
 
@@ -45,6 +48,36 @@ def tallied(tally: Tally[WheelRefusal], outcome: Outcome) -> list[WheelSample]:
         return []
     tally.accepted += 1
     return outcome
+
+
+class BaseTime:
+    """Stamps on the clock of the host for a base that says its own time, in ms that wrap.
+
+    The first message waits until the second one shows that its time goes on. It is not lost: the
+    odometry, and so the frame of this robot, begins where the base said its first word.
+    """
+
+    def __init__(self, bits: int) -> None:
+        self._clock = DeviceClock(bits, MILLISECOND_US)
+        self._waiting: Callable[[int], list[WheelSample]] | None = None
+
+    def stamped(
+        self, time_ms: int, utime: int, samples: Callable[[int], list[WheelSample]]
+    ) -> Outcome:
+        """What a message completes that came at `utime` (us).
+
+        Args:
+            samples: those of this message, given when it was measured (us).
+        """
+        measured = self._clock.to_host(time_ms, utime)
+        waited, self._waiting = self._waiting, None
+        if measured is None:
+            self._waiting = samples
+            is_first = waited is None and self._clock.offset_us is None
+            return [] if is_first else WheelRefusal.TIME
+        first = self._clock.first_us
+        before = [] if waited is None or first is None else waited(first)
+        return [*before, *samples(measured)]
 
 
 class WheelDriver(Protocol):

@@ -20,38 +20,44 @@ MS = 1000
 T0 = 100 * SECOND_US
 
 
-def test_the_first_line_gives_nothing_the_others_counters() -> None:
+def begun() -> AsciiDriver:
+    """That has heard two lines, at T0 - 20 ms and at T0."""
+    driver = AsciiDriver()
+    driver.feed(ascii_line(980, 0, 0), T0 - 20 * MS)
+    driver.feed(ascii_line(1000, 0, 0), T0)
+    return driver
+
+
+def test_the_first_line_waits_for_the_second() -> None:
     driver = AsciiDriver()
     assert driver.feed(ascii_line(1000, 10, -20), T0) == []
     samples = driver.feed(ascii_line(1020, 15, -25), T0 + 20 * MS)
-    assert samples == [WheelCounts(T0 + 20 * MS, 15, -25, 32)]
+    assert samples == [WheelCounts(T0, 10, -20, 32), WheelCounts(T0 + 20 * MS, 15, -25, 32)]
 
 
 def test_the_line_in_the_documentation_is_read() -> None:
     driver = AsciiDriver()
     driver.feed(ascii_line(123_436, 1500, -40), T0)
-    (sample,) = driver.feed(b"$ODO,123456,1532,-48*4B\n", T0 + 20 * MS)
+    *_, sample = driver.feed(b"$ODO,123456,1532,-48*4B\n", T0 + 20 * MS)
     assert sample == WheelCounts(T0 + 20 * MS, 1532, -48, 32)
 
 
 def test_time_wraps_as_millis_does() -> None:
     driver = AsciiDriver()
     driver.feed(ascii_line((1 << 32) - 10, 0, 0), T0)
-    (sample,) = driver.feed(ascii_line(10, 1, 1), T0 + 20 * MS)
-    assert sample.utime == T0 + 20 * MS
+    samples = driver.feed(ascii_line(10, 1, 1), T0 + 20 * MS)
+    assert [sample.utime for sample in samples] == [T0, T0 + 20 * MS]
 
 
 @pytest.mark.parametrize(("count", "fits"), [(1 << 32, False), ((1 << 32) - 1, True)])
 def test_counters_may_be_unsigned(count: int, fits: bool) -> None:
-    driver = AsciiDriver()
-    driver.feed(ascii_line(1000, 0, 0), T0)
+    driver = begun()
     assert len(driver.feed(ascii_line(1020, count, 0), T0 + 20 * MS)) == fits
 
 
 @pytest.mark.parametrize(("count", "fits"), [(-(1 << 31) - 1, False), (-(1 << 31), True)])
 def test_counters_may_be_signed(count: int, fits: bool) -> None:
-    driver = AsciiDriver()
-    driver.feed(ascii_line(1000, 0, 0), T0)
+    driver = begun()
     assert len(driver.feed(ascii_line(1020, 0, count), T0 + 20 * MS)) == fits
 
 
@@ -65,13 +71,21 @@ def test_counters_may_be_signed(count: int, fits: bool) -> None:
         (b"$ODO,123456,1532,-48*4B,", WheelRefusal.MALFORMED),
         (b"$ODO,-5,1532,-48*4B", WheelRefusal.MALFORMED),
         (ascii_line(1 << 32, 1, 2).strip(), WheelRefusal.MALFORMED),
-        (ascii_line(5, 1, 2).strip(), WheelRefusal.TIME),
     ],
 )
 def test_a_damaged_line_is_refused_for_its_reason(line: bytes, reason: WheelRefusal) -> None:
     driver = AsciiDriver()
     assert driver.feed(line + b"\n", T0) == []
     assert driver.tally.refused == {reason: 1}
+
+
+def test_a_time_that_does_not_go_on_is_refused() -> None:
+    driver = begun()
+    assert driver.feed(ascii_line(20_000, 1, 2), T0 + 20 * MS) == []
+    assert driver.tally.refused == {WheelRefusal.TIME: 1}
+    (sample,) = driver.feed(ascii_line(1040, 3, 4), T0 + 40 * MS)
+    assert sample == WheelCounts(T0 + 40 * MS, 3, 4, 32)
+    assert driver.tally.accepted == 3
 
 
 def test_whatever_else_the_base_prints_is_ignored() -> None:
@@ -81,23 +95,20 @@ def test_whatever_else_the_base_prints_is_ignored() -> None:
 
 
 def test_a_line_behind_a_torn_one_is_read() -> None:
-    driver = AsciiDriver()
-    driver.feed(ascii_line(1000, 0, 0), T0)
+    driver = begun()
     assert len(driver.feed(b"$ODO,1020,1" + ascii_line(1040, 2, 2), T0 + 40 * MS)) == 1
 
 
 def test_a_poisoned_byte_before_a_line_costs_nothing() -> None:
     for value in range(256):
-        driver = AsciiDriver()
-        driver.feed(ascii_line(1000, 0, 0), T0)
+        driver = begun()
         assert len(driver.feed(bytes([value]) + ascii_line(1020, 2, 2), T0 + 20 * MS)) == 1, value
 
 
 @settings(derandomize=True, max_examples=200, deadline=None)
 @given(st.integers(0, 20), st.integers(0, 7))
 def test_no_single_bit_flip_in_an_odo_line_gives_a_sample(position: int, bit: int) -> None:
-    driver = AsciiDriver()
-    driver.feed(ascii_line(1000, 100, 200), T0)
+    driver = begun()
     line = bytearray(ascii_line(1020, 103, 205))
     line[position % (len(line) - 2)] ^= 1 << bit
     samples = driver.feed(bytes(line), T0 + 20 * MS)
@@ -137,8 +148,7 @@ def line(text: str) -> bytes:
     [("12.5", 12.5), ("-179.9999", -179.9999), ("1234567", 1_234_567.0), ("0", 0.0)],
 )
 def test_a_fourth_column_is_the_angle_of_a_gyro(column: str, degrees: float) -> None:
-    driver = AsciiDriver()
-    driver.feed(line("ODO,1000,0,0"), T0)
+    driver = begun()
     gyro, counts = driver.feed(line(f"ODO,1020,5,7,{column}"), T0 + 20 * MS)
     assert gyro == GyroAngle(T0 + 20 * MS, math.radians(degrees))
     assert counts == WheelCounts(T0 + 20 * MS, 5, 7, 32)

@@ -39,16 +39,33 @@ def fed(reads: list[bytes]) -> tuple[list[WheelSample], object]:
     return [s for read in reads for s in driver.feed(read, T0)], driver.tally
 
 
-def test_the_first_packet_gives_nothing_the_others_counters() -> None:
+def test_the_first_packet_waits_for_the_second() -> None:
     driver = KobukiDriver()
-    samples = []
-    for k, packet in enumerate(packets(3)):
-        samples += driver.feed(packet, T0 + 20 * k * MS)
-    assert counts(samples) == [
-        WheelCounts(T0 + 20 * MS, 11253, 11238, 16),
-        WheelCounts(T0 + 40 * MS, 11261, 11231, 16),
+    samples = [driver.feed(packet, T0 + 20 * k * MS) for k, packet in enumerate(packets(3))]
+    assert [counts(found) for found in samples] == [
+        [],
+        [WheelCounts(T0, 11245, 11245, 16), WheelCounts(T0 + 20 * MS, 11253, 11238, 16)],
+        [WheelCounts(T0 + 40 * MS, 11261, 11231, 16)],
     ]
-    assert driver.tally.refused[WheelRefusal.TIME] == 1
+    assert driver.tally.accepted == driver.tally.received == 3
+
+
+def test_a_first_packet_that_none_continues_is_no_sample() -> None:
+    """The base was switched off and on again after it."""
+    driver = KobukiDriver()
+    stream = [*packets(1, 40_000, 7), *packets(3)]
+    samples = [s for k, one in enumerate(stream) for s in driver.feed(one, T0 + 20 * k * MS)]
+    assert [s.left for s in counts(samples)] == [11245, 11253, 11261]
+    assert counts(samples)[0].utime == T0 + 20 * MS
+    assert driver.tally.refused == {WheelRefusal.TIME: 1}
+
+
+def test_a_base_that_was_restarted_costs_one_packet() -> None:
+    driver = KobukiDriver()
+    stream = [*packets(3), *packets(3, 30_000, 0)]
+    samples = [s for k, one in enumerate(stream) for s in driver.feed(one, T0 + 20 * k * MS)]
+    assert [s.left for s in counts(samples)] == [11245, 11253, 11261, 8, 16]
+    assert driver.tally.refused == {WheelRefusal.TIME: 1}
 
 
 def test_samples_carry_the_time_of_the_base_not_that_of_the_read() -> None:
@@ -65,7 +82,7 @@ def test_time_and_counters_wrap_at_16_bits() -> None:
     samples = []
     for k, packet in enumerate(packets(5, 65500, 65520)):
         samples += driver.feed(packet, T0 + 20 * k * MS)
-    assert [s.utime for s in counts(samples)] == [T0 + k * 20 * MS for k in range(1, 5)]
+    assert [s.utime for s in counts(samples)] == [T0 + k * 20 * MS for k in range(5)]
     assert samples[-1] == WheelCounts(T0 + 80 * MS, 16, 65492, 16)
 
 
@@ -84,7 +101,7 @@ def test_whole_and_byte_by_byte_and_random_reads_give_the_same(seed: int) -> Non
 def test_one_poisoned_byte_costs_no_packet() -> None:
     for value in range(256):
         stream = [*packets(1), bytes([value]), *packets(2, 61860)]
-        assert len(counts(fed([b"".join(stream)])[0])) == 2, value
+        assert len(counts(fed([b"".join(stream)])[0])) == 3, value
 
 
 def test_unknown_sub_payloads_are_skipped_by_their_length() -> None:
@@ -127,12 +144,8 @@ def test_every_packet_ends_in_exactly_one_count() -> None:
     broken = kobuki_packet(bytes([1, 14]) + bytes(14))
     for k, packet in enumerate([*good[:3], damaged, *good[4:], other, broken]):
         driver.feed(packet, T0 + 20 * k * MS)
-    assert (driver.tally.accepted, driver.tally.ignored) == (8, 1)
-    assert driver.tally.refused == {
-        WheelRefusal.TIME: 1,
-        WheelRefusal.CHECKSUM: 1,
-        WheelRefusal.MALFORMED: 1,
-    }
+    assert (driver.tally.accepted, driver.tally.ignored) == (9, 1)
+    assert driver.tally.refused == {WheelRefusal.CHECKSUM: 1, WheelRefusal.MALFORMED: 1}
     assert driver.tally.received == 12
 
 
@@ -157,8 +170,9 @@ def test_bit_flips_never_raise_and_good_packets_go_on(a: int, b: int) -> None:
 
 
 def after_a_first(rest: bytes) -> list[WheelSample]:
-    """Samples of a packet with sub-payloads `rest`, behind one with none."""
+    """Samples of a packet with sub-payloads `rest`, behind two with none."""
     driver = KobukiDriver()
+    driver.feed(kobuki_packet(kobuki_core(980, 0, 0)), T0 - 20 * MS)
     driver.feed(kobuki_packet(kobuki_core(1000, 0, 0)), T0)
     return driver.feed(kobuki_packet(kobuki_core(1020, 1, 2) + rest), T0 + 20 * MS)
 

@@ -28,8 +28,6 @@ from lab.trust.naming import Said
 
 LOCALISED, DOUBTFUL = "localised", "doubtful"
 """Words for a pose that is given: as one to rely on, or as one to take care with."""
-FIRST_S = 2.0
-"""A start before that is a robot's first, which began where its recording does."""
 
 
 @dataclass(frozen=True)
@@ -160,13 +158,15 @@ def _add_pose(
 
 
 def _origin(recording: Recording, simulator: Simulator, chain: Chain) -> Array | None:
-    """Where a robot truly stood when this start of it began; None when it has begun again since."""
+    """Where the odometry of this start of a robot truly began: its first keyframe, less the way to
+    there; None when it has begun again since."""
     member = simulator.members[chain.robot]
     if member.robot.own != chain:
         return None
-    begun = member.robot.back.graph.chains[chain.robot].keyframes.n[0]
-    t = member.clock.world(grid_utime(int(begun))) / 1e6
-    return _true(recording, chain.robot, t if t > FIRST_S else 0.0)
+    keyframes = member.robot.back.graph.chains[chain.robot].keyframes
+    t = member.clock.world(grid_utime(int(keyframes.n[0]))) / 1e6
+    way_back = metrics.relative(keyframes.poses[0], np.zeros(3))
+    return np.asarray(metrics.compose(_true(recording, chain.robot, t), way_back))
 
 
 def _add_pair(
