@@ -59,9 +59,8 @@ def test_bytes_of_the_wheels_become_odometry() -> None:
         assert scene.robot.handle(SerialData(scene.utime, "wheels", packet)) == []
         scene.later(0.02)
     reckoning = scene.robot.front.reckoning
-    assert reckoning.path_m == pytest.approx(48 * 117 / 11_724.4)
-    # the first packet starts the clock of the base, 20 ms late for the first tenth of a second
-    assert len(reckoning.track) == 9
+    assert reckoning.path_m == pytest.approx(49 * 117 / 11_724.4)
+    assert len(reckoning.track) == 10
 
 
 def test_can_frames_become_odometry() -> None:

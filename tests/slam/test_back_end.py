@@ -449,7 +449,7 @@ def test_what_pairs_are_narrowed_by_is_held_against_what_solutions_moved(
     back, _ = settled(team)
     asked: list[dict[tuple[int, int], float]] = []
 
-    def no_narrower(narrower: dict[tuple[int, int], float]) -> dict[tuple[int, int], float]:
+    def no_narrower(narrower: dict[tuple[int, ...], float]) -> dict[tuple[int, ...], float]:
         asked.append(narrower)
         return held
 
