@@ -161,11 +161,10 @@ def test_of_the_wheels_path_and_age_are_said() -> None:
     scene.later(1.0)
     found = section(scene, "wheels")
     assert found["age_s"] == 1.0
-    # the first packet starts the clock, the second the counters
-    assert found["path_m"] == round(2 * 117 / 11_724.4, 3)
+    assert found["path_m"] == round(3 * 117 / 11_724.4, 3)
     assert found["counters"] == scene.robot.wheels.counters()
     assert found["counters"]["gyro.slips"] == 0
-    # (one that was there in two packets, and not yet of any use)
+    # (one that was there in some packets, and not yet of any use)
     assert found["gyro"] == {
         "in_use": False,
         "fault": None,

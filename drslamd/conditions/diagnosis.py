@@ -139,12 +139,15 @@ def _load(robot: Stages, utime: int) -> str | None:
         cycle = (until - since) / SECOND_US
         if until + LATE * SECOND_US > utime and cycle > LATE / rate:
             found.append(f"{module} runs every {cycle:.1f} s instead of every {1 / rate:.1f} s")
-    late = f"{', '.join(found)}, to leave time for the sensors" if found else ""
+    late = (
+        f"{', '.join(found)}, to leave time for the sensors: the team is large for this computer, "
+        "or other programs take it"
+    )
     estimate = robot.back.estimate
     left_out = estimate.left_out if estimate is not None else 0
-    few = f"ranges of {left_out} pairs are left out, to bound memory" if left_out else ""
-    said = "; ".join(part for part in (late, few) if part)
-    return f"{said}; the team is large for this computer" if said else None
+    few = f"ranges of {left_out} pairs are left out, to bound memory: the team is large"
+    said = [part for part, is_said in ((late, found), (few, left_out)) if is_said]
+    return "; ".join(said) or None
 
 
 def _doubted_partners(robot: Stages) -> Iterable[int]:
@@ -219,6 +222,9 @@ def _why_not_localised(robot: Stages, where: Whereabouts, utime: int) -> str | N
     peers = robot.team.everybody
     living = robot.team.living(utime)
     if not peers:
+        network = robot.network
+        if network is not None and network.up and utime - network.utime <= PATIENCE_US:
+            return "not localised: the network has just been joined; others speak every few seconds"
         return (
             "not localised: no other robot is heard; is drslamd running on them, in this network, "
             "with the same gossip.group and port?"

@@ -157,7 +157,7 @@ def test_a_module_that_runs_half_as_often_as_it_should_is_named(
     computed(scene, OPTIMIZER, took_s)
     sentence = (
         f"optimizer runs every {5 * took_s:.1f} s instead of every {1 / rate_hz:.1f} s, to leave "
-        "time for the sensors; the team is large for this computer"
+        "time for the sensors: the team is large for this computer, or other programs take it"
     )
     assert said(scene, "load") == (sentence if is_late else None)
 
@@ -177,10 +177,10 @@ def test_it_is_named_while_it_is_still_at_it(after_us: int, is_said: bool) -> No
 def test_ranges_that_there_is_no_room_for_are_counted() -> None:
     scene = RobotScene()
     scene.robot.back.estimate = TeamEstimate(Segment(0, 1, 0), {}, left_out=993)
-    few = "ranges of 993 pairs are left out, to bound memory; the team is large for this computer"
+    few = "ranges of 993 pairs are left out, to bound memory: the team is large"
     assert said(scene, "load") == few
     computed(scene, OPTIMIZER, 0.5)
-    assert str(said(scene, "load")).endswith(f"to leave time for the sensors; {few}")
+    assert str(said(scene, "load")).endswith(f"or other programs take it; {few}")
 
 
 def test_both_modules_that_take_long_may_be_named() -> None:
@@ -207,6 +207,15 @@ def test_alone_it_asks_whether_the_others_run() -> None:
     sentence = why(RobotScene())
     assert sentence.startswith("not localised: no other robot is heard; is drslamd running")
     assert "gossip.group" in sentence
+
+
+@pytest.mark.parametrize(("after_us", "is_patient"), [(3 * SECOND_US, True), (3_000_001, False)])
+def test_nobody_is_missed_before_others_had_time_to_speak(after_us: int, is_patient: bool) -> None:
+    scene = RobotScene()
+    scene.robot.handle(NetworkState(scene.utime, True))
+    scene.utime += after_us
+    assert ("has just been joined" in why(scene)) is is_patient
+    assert ("no other robot is heard" in why(scene)) is not is_patient
 
 
 def test_of_peers_that_do_not_hear_it_the_other_direction_is_asked_for() -> None:

@@ -32,7 +32,7 @@ NOBODY = 65_534
 UDP_PORT = 47_123
 SECRET = "5e" * KEY_BYTES
 PATIENCE_S = 8.0
-ALONE = "not localised: no other robot is heard"
+ALONE = "not localised: no other robot is heard", "not localised: the network has just been joined"
 """What a daemon in good order says here: nobody else is there."""
 
 TOML = """\

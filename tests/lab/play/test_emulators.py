@@ -114,5 +114,4 @@ def test_the_angle_of_a_gyro_comes_back_from_a_kobuki() -> None:
         wheels.feed(base.stream(0.02 * k, 0.0, 0.0), at(0.02 * k))
     found = wheels.gyro.track.at(at(0.18))
     assert found is not None
-    # (the first packet only tells the time of the base)
-    assert found[1] == pytest.approx(0.16, abs=2e-4)
+    assert found[1] == pytest.approx(0.18, abs=2e-4)

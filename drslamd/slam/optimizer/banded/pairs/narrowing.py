@@ -130,7 +130,7 @@ def shares(poses: Array, claimed: Array, seen: Array) -> Array:
 def _left(wide: Array, narrow: Array) -> Array:
     """(m,) of covariances (m, 3, 3)."""
     left = np.einsum("kii->k", np.linalg.solve(wide, narrow)) / 3
-    return np.clip(left, LEAST_SHARE, 1.0)
+    return np.asarray(np.clip(left, LEAST_SHARE, 1.0))
 
 
 def narrower(robots: list[int], left: Array) -> dict[tuple[int, ...], float]:
