@@ -42,6 +42,11 @@ ROUNDING = 1.001
 """Sigmas travel as 32-bit numbers."""
 OTHER_PATH_M, OTHER_S = 10.0, 60.0
 """Over so much one yaw rate counts as random that is not the one which module 3 learns."""
+ACROSS = 0.3
+"""Random translation across a way over that along it: wheels roll, and hardly slip sideways. It
+counts where a gyro gives the heading; that of wheels is uncertain by more than this takes away."""
+LEAST_PATH_M = 1e-9
+"""Of a way that has a direction."""
 
 WHEELS, GYRO, PATH, SUMS = slice(0, 6), slice(6, 12), 12, 13
 """Which of the sums of `growth` are those of the heading by wheels and by gyro and the length of
@@ -233,12 +238,31 @@ def covariance_between(
 def link_covariance(noise: OdometryNoise, i_T_j: Array, sums: Array) -> Array:
     """(m, 3, 3): the same for links (m, 3) by themselves, in their frames i.
 
-    Sums over a whole trajectory would lose the last digits of a short link far from the origin.
+    Sums over a whole trajectory would lose the last digits of a short link far from the origin, and
+    they do not know where a way leads across which wheels hold (`ACROSS`).
 
     Args:
         sums: (m, 13) of `growth` over the way that was driven from i to j, in frame i.
     """
-    return _matrices(twist_covariance(noise, i_T_j[:, :2].T, sums.T))
+    way = i_T_j[:, :2].T
+    rows = twist_covariance(noise, way, sums.T)
+    if noise.learns_gyro:
+        rows[[0, 1, 3]] -= _held_across(noise, way, sums[:, PATH])
+    return _matrices(rows)
+
+
+def _held_across(noise: OdometryNoise, way: Array, path: Array) -> Array:
+    """(3, m) xx, xy, yy of the random translation that is not there, across ways (2, m).
+
+    Of an arc of length s about an angle a the part (1 + sin(a) / a) / 2 leads along its chord, and
+    the chord is 2 s / a sin(a / 2). By the first terms of both series that part is
+    2 chord / s - 1. Of a way that leads back nothing is taken, and along the chord nothing ever.
+    """
+    path, chord = np.abs(path), np.hypot(*way)
+    straight = np.clip(2 * chord / np.maximum(path, LEAST_PATH_M) - 1, 0.0, 1.0)
+    held = noise.translation_per_sqrt_m**2 * path * straight * (1 - ACROSS**2)
+    across = np.array([-way[1], way[0]]) / np.maximum(chord, LEAST_PATH_M)
+    return np.asarray(held * across[[0, 0, 1]] * across[[0, 1, 1]])
 
 
 def seen_from(sums: Array, a_T_b: Array) -> Array:

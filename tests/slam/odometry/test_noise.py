@@ -13,9 +13,7 @@ from slam_scenes import NOISE, Array, wander
 from drslamd.slam import se2
 from drslamd.slam.odometry.gyro_noise import OPEN, GyroNoise
 from drslamd.slam.odometry.noise import (
-    GYRO as BY_TIME,
-)
-from drslamd.slam.odometry.noise import (
+    ACROSS,
     OTHER_PATH_M,
     OTHER_S,
     PATH,
@@ -27,6 +25,9 @@ from drslamd.slam.odometry.noise import (
     link_covariance,
     seen_from,
     step_sums,
+)
+from drslamd.slam.odometry.noise import (
+    GYRO as BY_TIME,
 )
 
 QUIET = OdometryNoise(1e-12, 1e-12, 1e-12, 1e-12)
@@ -151,6 +152,59 @@ def test_a_link_alone_is_as_uncertain_as_in_its_chain() -> None:
     link = se2.between(path[:-1], path[1:])
     alone = link_covariance(NOISE, link, step_sums(link[:, :2], link[:, :2] / 2))
     assert np.allclose(alone, expected, atol=1e-12)
+
+
+def under_gyro(way: Array) -> tuple[Array, Array]:
+    """(3, 3) of a way (k, 2) from the origin under a gyro that errs by nothing, and what random
+    translation along each step, and `ACROSS` of it across, adds up to in x and y (2, 2)."""
+    noise = replace(QUIET, translation_per_sqrt_m=0.01, gyro=GyroNoise(1e-12, 1e-12, 0))
+    steps = np.diff(way, axis=0)
+    sums = step_sums(steps, (way[1:] + way[:-1]) / 2, np.ones(len(steps))).sum(axis=0)
+    link = np.array([[*way[-1], 0.0]])
+    length = np.hypot(*steps.T)
+    along = steps / length[:, None]
+    across = along[:, ::-1] * [-1, 1]
+    expected = 1e-4 * (
+        np.einsum("k,ki,kj->ij", length, along, along)
+        + ACROSS**2 * np.einsum("k,ki,kj->ij", length, across, across)
+    )
+    backwards = link_covariance(noise, link, -sums[None])[0]
+    assert np.allclose(backwards, link_covariance(noise, link, sums[None])[0], atol=1e-18)
+    return backwards, expected
+
+
+def arc(angle: float, metres: float = 2.0) -> Array:
+    """(k, 2) of a circle, and turned by 0.6 rad."""
+    s = np.linspace(0, angle, 400)
+    way = np.stack([np.sin(s), 1 - np.cos(s)], axis=-1) / angle * metres
+    return np.asarray(se2.rotate(0.6, way))
+
+
+@pytest.mark.parametrize("angle", [1e-3, 0.5, 1.0])
+def test_under_a_gyro_a_robot_slips_along_its_way_and_little_across(angle: float) -> None:
+    found, expected = under_gyro(arc(angle))
+    # nothing is taken away along the chord, where an arc has a little less
+    chord = arc(angle)[-1] / np.hypot(*arc(angle)[-1])
+    side = chord[::-1] * [-1, 1]
+    assert side @ found[:2, :2] @ side == pytest.approx(side @ expected @ side, rel=0.05)
+    assert chord @ found[:2, :2] @ chord == pytest.approx(2e-4, rel=1e-6)
+    assert np.linalg.eigvalsh(found[:2, :2] - expected)[0] > -0.05 * side @ expected @ side
+
+
+@pytest.mark.parametrize(("share", "is_held"), [(0.49, False), (0.51, True)])
+def test_of_a_way_that_leads_back_nothing_is_taken_away(share: float, is_held: bool) -> None:
+    """Driven a metre there and back, and so far away in the end."""
+    ends = np.array([0, (1 + share) / 2, share])
+    found, _ = under_gyro(np.stack([ends, 0 * ends], axis=-1))
+    assert found[0, 0] == pytest.approx(1e-4)
+    assert (found[1, 1] < 0.999e-4) == is_held
+
+
+def test_the_wheels_own_heading_leaves_a_way_as_uncertain_across_as_along() -> None:
+    noise = replace(QUIET, translation_per_sqrt_m=0.01)
+    way = np.array([[1.2, 1.6, 0.0]])
+    found = link_covariance(noise, way, step_sums(way[:, :2], way[:, :2] / 2))
+    assert np.allclose(found[0, :2, :2], 2e-4 * np.eye(2), atol=1e-12)
 
 
 def test_a_link_far_from_the_origin_keeps_its_digits() -> None:
