@@ -89,6 +89,7 @@ OPTIMIZER_ORDER = [
     "mirror_factors",
     "factors",
     "near_pairs",
+    "range_weights",
     "valleys",
     "contract",
     "banded",

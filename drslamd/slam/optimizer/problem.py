@@ -271,6 +271,7 @@ class Problem:
             out.
         blocked: (pairs,) between whom sight was blocked for long, nobody where left out: a signal
             that went around something is too long and never too short.
+        width: (pairs,) of how many times their sigma ranges weigh, of their own where left out.
     """
 
     robot: Index
@@ -289,6 +290,17 @@ class Problem:
     told: Problem | None = None
     fitted: Array | None = None
     blocked: NDArray[np.bool_] | None = None
+    width: Array | None = None
+
+    @cached_property
+    def widths(self) -> Array:
+        """(pairs,) `width` of each."""
+        return np.ones(self.pairs) if self.width is None else self.width
+
+    @cached_property
+    def weight(self) -> Array:
+        """(n,) of ranges that are no outliers, 1/m^2."""
+        return np.asarray((self.widths[self.ranges.pair] * self.ranges.sigma) ** -2.0)
 
     def cuts(self, threshold: Array, error: Array) -> Array:
         """(n,) sigmas beyond which each range loses weight.

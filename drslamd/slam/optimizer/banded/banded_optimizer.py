@@ -23,7 +23,7 @@ from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.odometry.correction import Correction
 from drslamd.slam.odometry.noise import OdometryNoise
-from drslamd.slam.optimizer import factors, mirror_factors, near_pairs, valleys
+from drslamd.slam.optimizer import factors, mirror_factors, near_pairs, range_weights, valleys
 from drslamd.slam.optimizer.banded import banded_solver
 from drslamd.slam.optimizer.banded.banded_solver import SETTLED
 from drslamd.slam.optimizer.banded.lapses.known_lapses import freed_again, lapse_of
@@ -137,6 +137,7 @@ def build_problem(
     closures = factors.closures(graph, places)
     hints = replace(closures, covariance=closures.covariance + HINT * np.eye(3))
     known = factors.corrections(graph, robots, previous, mirrored)
+    by_gyro = {c.chain.robot for c in chains if c.model.noise.learns_gyro}
     priors = Priors(
         bias=BiasPrior.of(numbers.bias_sigma, numbers.model),
         scale=np.array([data.model.noise.scale for data in chains]),
@@ -157,11 +158,11 @@ def build_problem(
         doubted=_doubted(previous, known, robots),
         range_sigma=numbers.range_sigma,
         model=numbers.model,
+        width=range_weights.widths(pairs, by_gyro),
     )
     if previous is not None:
         fitted = np.array([previous.fitted.get(robot, 0) for robot in robots], dtype=float)
         problem = freed_again(replace(problem, fitted=fitted), robots, previous.lapses)
-    by_gyro = {c.chain.robot for c in chains if c.model.noise.learns_gyro}
     start = _start(previous, known, pairs, robots, by_gyro)
     solved = {chain.chain: places.n[places.of_robot(chain.chain.robot)] for chain in chains}
     is_known, is_near = _knows(previous, group, solved), _is_near(previous, group, solved)

@@ -67,7 +67,7 @@ def ranges_at(
     factors = problem.ranges
     error, jacobian = point.sight.error, _range_jacobian(problem, point, antennas)
     squared = (error / (problem.cuts(point.threshold, error) * factors.sigma)) ** 2
-    weight = 1 / (1 + squared) / factors.sigma**2
+    weight = problem.weight / (1 + squared)
     # the second derivative makes the steps of an iteration shrink fast
     bent = weight * np.maximum((1 - squared) / (1 + squared), least)
     return Linearised(jacobian, bent[:, None, None], (weight * error)[:, None])

@@ -150,7 +150,7 @@ def squares_of_ranges(problem: Problem, point: Point) -> Array:
     """(pairs,) e' W e of the ranges of each, as far as they are believed."""
     ranges, error = problem.ranges, point.sight.error
     cut = point.threshold[ranges.pair] * ranges.sigma
-    squares = (error / ranges.sigma) ** 2 / (1 + (error / cut) ** 2)
+    squares = problem.weight * error**2 / (1 + (error / cut) ** 2)
     return np.bincount(ranges.pair, squares, problem.pairs)
 
 

@@ -144,7 +144,7 @@ class _Part(NamedTuple):
 def _parts(equations: Equations, point: Point) -> list[_Part]:
     problem, layout = equations.problem, equations.layout
     robots = len(problem.priors.scale)
-    ranges = linearised.weighed_ranges(problem, point, np.ones(problem.pairs))
+    ranges = linearised.weighed_ranges(problem, point, problem.widths)
     odometry = linearised.odometry_at(problem, point)
     # by robot: turns are columns 0 .. R - 1, antennas the 2 R behind them
     antennas = (robots + 2 * problem.ranges.robots[:, :, None] + np.arange(2)).reshape(-1, 4)

@@ -92,11 +92,11 @@ class Equations:
         odometry, closures, ranges = problem.odometry, problem.closures, problem.ranges
         poses, calibration = point.poses, point.calibration
         moved = poses[problem.gauge] - problem.initial[problem.gauge]
-        c = problem.cuts(threshold, point.sight.error)
+        cut = problem.cuts(threshold, point.sight.error) * ranges.sigma
         return (
             odometry.cost(point.link)
             + closures.cost(pose_errors(poses, closures, closures.measured))
-            + float(np.sum(c**2 * np.log1p((point.sight.error / (c * ranges.sigma)) ** 2)))
+            + float(problem.weight @ (cut**2 * np.log1p((point.sight.error / cut) ** 2)))
             + problem.priors.cost(calibration)
             + float(moved @ moved) * GAUGE_SIGMA**-2
         )
@@ -167,8 +167,7 @@ class Equations:
 
     def weighed(self, point: Point) -> System:
         """What the factors say by their weights: what is left of an outlier's counts still."""
-        claims = np.ones(self.problem.pairs)
-        system = self.factors_weighed(point, claims)
+        system = self.factors_weighed(point, self.problem.widths)
         self.add_gaussian_priors(system)
         self.add_heavy_priors(system, point.calibration, LEAST_CURVATURE)
         return system

@@ -55,7 +55,7 @@ def _range_pull(problem: Problem, point: Point) -> Array:
     """(m,) half the derivative of the cost by the error of each range."""
     ranges, error = problem.ranges, point.sight.error
     squared = (error / (point.threshold[ranges.pair] * ranges.sigma)) ** 2
-    return np.asarray(error / ((1 + squared) * ranges.sigma**2))
+    return np.asarray(problem.weight * error / (1 + squared))
 
 
 def _of_poses(problem: Problem, point: Point, turn: Array, pull: Array, of_ranges: Array) -> Array:

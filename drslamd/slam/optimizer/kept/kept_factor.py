@@ -69,7 +69,7 @@ class Believed:
         )
         sight = RangeErrors(*(column[ranges] for column in self.point.sight))
         point = replace(self.point, link=self.point.link[odometry], sight=sight)
-        claims = np.ones(problem.pairs) if self.claims is None else self.claims
+        claims = problem.widths if self.claims is None else self.claims
         return Equations(some, layout=layout), point, claims
 
     def add_priors(self, system: System, layout: BandLayout) -> None:

@@ -40,6 +40,7 @@ from drslamd.slam.optimizer.banded.banded_optimizer import (
 from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.bias_prior import BiasPrior
 from drslamd.slam.optimizer.problem import Doubted, Freed
+from drslamd.slam.optimizer.range_weights import STEADY
 from drslamd.slam.range_model import LINKTRACK
 from drslamd.slam.robot_model import RobotModel
 
@@ -343,6 +344,20 @@ def test_priors_are_those_of_the_robots_and_of_the_configuration() -> None:
     )
     assert problem.priors.near_bias == LINKTRACK.near_bias_sigma_m
     assert (problem.pairs, problem.range_sigma) == (3, 0.10)
+
+
+@pytest.mark.parametrize(("robots", "wider"), [((1,), ()), ((0, 1), ((0, 1),))])
+def test_ranges_weigh_less_between_robots_whose_headings_gyros_give(
+    robots: tuple[int, ...], wider: tuple[tuple[int, int], ...]
+) -> None:
+    team = small_team(5, count=20)
+    for robot in robots:
+        by_gyro = replace(NOISE, gyro=GyroNoise(1e-4, 1e-4, 0))
+        team.graph.insert(team.chains[robot], GraphEntry(9, RobotModel(by_gyro)))
+    found = build_problem(team.graph, group_of(team.graph), None, BANDED)
+    widths = dict(zip(found.pairs, found.problem.widths, strict=True))
+    assert len(widths) == 3
+    assert widths == {pair: STEADY if pair in wider else 1.0 for pair in widths}
 
 
 def test_a_gyro_whose_noise_by_time_is_that_of_the_wheels_by_path_changes_nothing_else() -> None:

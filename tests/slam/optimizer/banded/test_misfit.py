@@ -138,6 +138,8 @@ def test_squares_of_ranges_are_those_of_each_pair_as_far_as_they_are_believed() 
     far = point.threshold
     right = [1 / (1 + far[0] ** -2) + 4 / (1 + 4 * far[0] ** -2), 64 / (1 + 64 * far[1] ** -2), 0.0]
     assert squares_of_ranges(problem, point) == pytest.approx(right)
+    wider = replace(problem, width=np.array([1.0, 2.0, 1.0]))
+    assert squares_of_ranges(wider, point) == pytest.approx(np.array(right) / [1, 4, 1])
 
 
 def test_shares_of_outliers_are_those_of_each_pair() -> None:

@@ -106,6 +106,34 @@ def test_where_sight_is_blocked_the_gradient_is_that_of_the_cost_too() -> None:
         assert gradient[equations.layout.poses[at]] == pytest.approx(slope, rel=1e-4, abs=1e-3)
 
 
+def widened(problem: Problem) -> tuple[Problem, Problem, Array]:
+    """A problem with widths, the same by wider sigmas, and the widths."""
+    wide = np.array([1.0, 1.35, 2.0])[: problem.pairs]
+    sigma = problem.ranges.sigma * wide[problem.ranges.pair]
+    by_sigma = replace(problem, ranges=replace(problem.ranges, sigma=sigma))
+    return replace(problem, width=wide), by_sigma, wide
+
+
+def test_a_range_of_some_width_weighs_as_with_so_wide_a_sigma_but_is_an_outlier_as_ever() -> None:
+    by_width, by_sigma, wide = widened(small(3))
+    poses, calibration = somewhere(by_width, 2)
+    point = point_at(by_width, poses, calibration, THRESHOLD)
+    other = point_at(by_sigma, poses, calibration, THRESHOLD / wide)
+    one, two = Equations(by_width), Equations(by_sigma)
+    assert one.cost(point, THRESHOLD) == pytest.approx(two.cost(other, THRESHOLD / wide), rel=1e-9)
+    assert np.allclose(one.gradient(point), two.gradient(other), rtol=1e-9, atol=1e-9)
+    for found, expected in (
+        (one.at(point)[0], two.at(other)[0]),
+        (one.weighed(point), two.weighed(other)),
+    ):
+        assert np.allclose(dense(found, one.layout), dense(expected, two.layout), rtol=1e-9)
+    sent = replace(by_width, width=None)
+    plain = point_at(sent, poses, calibration, THRESHOLD)
+    claimed = one.claimed(point, THRESHOLD), Equations(sent).claimed(plain, THRESHOLD)
+    here, there = (dense(system, one.layout) for system in claimed)
+    assert np.array_equal(here, there)
+
+
 @pytest.mark.parametrize("gauge", [0, 11])
 def test_the_gauge_is_held_where_it_was(gauge: int) -> None:
     problem = replace(small(2), gauge=gauge)

@@ -18,6 +18,7 @@ from drslamd.slam.optimizer.problem import Doubted
 @pytest.mark.parametrize("is_doubted", [False, True])
 def test_the_gradient_is_that_of_the_normal_equations(is_doubted: bool) -> None:
     problem = a_problem(carried=True)
+    problem = replace(problem, width=np.linspace(1.0, 1.4, problem.pairs))
     robots = len(problem.priors.scale)
     if is_doubted:
         doubted = Doubted(np.arange(robots) == 1, np.arange(robots) != 1)
@@ -31,6 +32,7 @@ def test_the_gradient_is_that_of_the_normal_equations(is_doubted: bool) -> None:
 
 def test_pulls_at_mountings_are_those_that_scores_are_made_of() -> None:
     problem = a_problem(carried=True)
+    problem = replace(problem, width=np.linspace(1.0, 1.4, problem.pairs))
     point = shaken(problem)
     expected = mountings.pulls(Equations(problem), point)
     assert np.allclose(mounting_pulls(problem, point), expected, rtol=1e-9)

@@ -68,7 +68,7 @@ def current(kept: KeptFactor | None, believed: Believed, team: TeamProblem) -> C
 def test_of_one_point_it_is_the_factor_of_the_whole(
     team: TeamProblem, tail: int, is_claimed: bool
 ) -> None:
-    problem = team.problem
+    problem = replace(team.problem, width=np.array([1.0, 1.2, 1.4]))
     claims = np.array([1.5, 2.0, 1.2]) if is_claimed else None
     believed = Believed(problem, shaken(problem), claims)
     count = len(problem.n)

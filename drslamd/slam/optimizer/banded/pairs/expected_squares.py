@@ -33,7 +33,7 @@ def expected_squares(equations: Equations, point: Point, factor: Solver) -> Arra
     """
     problem, layout = equations.problem, equations.layout
     has_antennas = bool(problem.doubted.antenna.any())
-    factors = linearised.weighed_ranges(problem, point, np.ones(problem.pairs), has_antennas)
+    factors = linearised.weighed_ranges(problem, point, problem.widths, has_antennas)
     weight, unknowns = factors.information[:, 0], layout.range_unknowns(problem.ranges)
     jacobian = np.where(unknowns == NOWHERE, 0.0, factors.jacobian[:, 0])
     unknowns = np.maximum(unknowns, 0)

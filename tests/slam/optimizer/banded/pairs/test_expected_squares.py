@@ -54,7 +54,7 @@ def dense(equations: Equations, point: Point) -> Array:
     matrix[: layout.band, layout.band :] = system.border
     matrix[layout.band :, : layout.band] = system.border.T
     matrix[layout.band :, layout.band :] = system.corner
-    factors = linearised.weighed_ranges(problem, point, np.ones(problem.pairs), False)
+    factors = linearised.weighed_ranges(problem, point, problem.widths, False)
     unknowns, jacobian = (
         layout.range_unknowns(problem.ranges),
         np.zeros((len(problem.ranges), size)),
@@ -70,6 +70,7 @@ def dense(equations: Equations, point: Point) -> Array:
 def test_it_is_the_mean_of_all_errors_as_modelled(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "DRAWS", 400)
     problem, _ = team_problem(3, robots=3, count=20)
+    problem = replace(problem, width=np.array([1.0, 1.35, 1.7]))
     equations, point = solved(problem)
     factor = BandFactor.of(equations.weighed(point))
     assert factor is not None
