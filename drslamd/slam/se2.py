@@ -102,8 +102,14 @@ def unpacked(upper: Sequence[float] | Array) -> Array:
 
 def turned(covariance: Array, theta: Array | float) -> Array:
     """Covariance (..., 3, 3) of (x, y, theta), its axes turned by theta (...)."""
+    r = axes(theta)
+    return np.asarray(r @ covariance @ np.swapaxes(r, -1, -2))
+
+
+def axes(theta: Array | float) -> Array:
+    """(..., 3, 3): turns (x, y) of (x, y, theta) by theta (...)."""
     cos, sin = np.cos(theta), np.sin(theta)
     r = np.zeros((*np.shape(theta), 3, 3))
     r[..., 0, 0] = r[..., 1, 1] = cos
     r[..., 0, 1], r[..., 1, 0], r[..., 2, 2] = -sin, sin, 1.0
-    return np.asarray(r @ covariance @ np.swapaxes(r, -1, -2))
+    return r

@@ -92,7 +92,6 @@ def solve(
         blocked=blocked(problem, point),
         doubted=claims.still_doubted(problem.doubted, point.calibration, spread),
         freed=freed,
-        is_turning=nominal.is_turning,
     )
 
 

@@ -119,6 +119,15 @@ class BandLayout:
         constants = np.stack([self.yaw, self.scale], axis=-1)[carried.robots].reshape(-1, 4)
         return np.hstack([self.range_unknowns(carried), constants])
 
+    def ways(self) -> Index:
+        """(k - 1, 6) likewise of the ways from each pose to the next in time; `NOWHERE` for all of
+        one that is wider than the band."""
+        one, next_one = self.poses[:-1], self.poses[1:]
+        low, high = np.minimum(one, next_one), np.maximum(one, next_one)
+        is_wide = (high < self.band) & (high - low > self.width - 3)
+        is_out = (is_wide | (low == NOWHERE)).any(axis=1)
+        return np.where(is_out[:, None], NOWHERE, np.hstack([one, next_one]))
+
     @property
     def constants(self) -> Index:
         """All unknowns that are no poses, in the order of their numbers."""

@@ -103,7 +103,7 @@ def descend(
         if moved.metres > NEAR or size > FASTER * before or is_due:
             damping, factor = min(damping / 10, NO_DAMPING if is_due else np.inf), None
         point, converged = new, size < tolerance and not is_due
-    return replace(point, steps=steps, converged=converged, is_turning=is_turning)
+    return replace(point, steps=steps, converged=converged)
 
 
 class _Moved(NamedTuple):

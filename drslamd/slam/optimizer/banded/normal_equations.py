@@ -12,12 +12,12 @@ from drslamd.slam.optimizer.banded.layout import BandLayout
 from drslamd.slam.optimizer.banded.linearised import Linearised
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.banded.turning import curvature
-from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
+from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE, WHOLE
 from drslamd.slam.optimizer.factor_errors import pose_errors
 from drslamd.slam.optimizer.mounting_prior import ANTENNA, TRACK
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
-from drslamd.slam.se2 import Array
+from drslamd.slam.se2 import Array, Index
 
 GAUGE_SIGMA = 1e-5
 """The gauge pose is held to 10 um and 10 urad: far below all noise, far above rounding."""
@@ -41,8 +41,10 @@ class Equations:
     @cached_property
     def _assembly(self) -> Assembly:
         """Of the same sets as `_sets`."""
-        if self._like:
-            return self._like._assembly
+        return self._like._assembly if self._like else Assembly(self.layout, self._unknowns())
+
+    def _unknowns(self) -> list[Index]:
+        """On which the factors of each set depend."""
         problem, layout = self.problem, self.layout
         sets = [layout.odometry_unknowns(problem.odometry)]
         if len(problem.closures):
@@ -50,17 +52,16 @@ class Equations:
             sets.append(ends.reshape(-1, 6))
         ranges = problem.ranges
         if not len(ranges.carried.rows):
-            return Assembly(layout, [*sets, layout.range_unknowns(ranges)])
+            return [*sets, layout.range_unknowns(ranges)]
         plain = layout.range_unknowns(ranges.chosen(~ranges.is_carried))
-        return Assembly(layout, [*sets, plain, layout.carried_unknowns(ranges)])
+        return [*sets, plain, layout.carried_unknowns(ranges)]
 
     @cached_property
     def _turning(self) -> Assembly:
         """Of ways from each pose to the next in time."""
         if self._like:
             return self._like._turning
-        poses = self.layout.poses
-        return Assembly(self.layout, [np.hstack([poses[:-1], poses[1:]])])
+        return Assembly(self.layout, [self.layout.ways()])
 
     @property
     def _has_antennas(self) -> bool:
@@ -130,6 +131,17 @@ class Equations:
         pulls = gradient[self.layout.poses]
         turning = curvature.of_turning(point.poses, pulls, self.problem.gauge)
         system.add(self._turning.matrix([turning]))
+
+    def factors_curved_leanly(self, point: Point) -> LeanSystem:
+        """Half the second derivative of what the factors alone cost, in the same coordinates."""
+        ranges = linearised.ranges_at(self.problem, point, WHOLE, self._has_antennas)
+        sets = self._sets(point, ranges)
+        bends = curvature.of_factors(self.problem, point, self._has_antennas)
+        whole = [curvature.both(*each) for each in zip(sets, bends, strict=True)]
+        pulls = np.append(self._assembly.gradient(sets), 0.0)[self.layout.poses]
+        turning = curvature.of_turning(point.poses, pulls, self.problem.gauge)
+        assembly = Assembly(self.layout, [*self._unknowns(), self.layout.ways()])
+        return assembly.lean_matrix([*whole, turning])
 
     def claimed(self, point: Point, claims: Array) -> System:
         """What is known at the solution: a system whose inverse is the covariance to be claimed.

@@ -21,7 +21,6 @@ class Point:
             ranges of a pair scatter, outliers left out.
         steps: how many were made to get here.
         converged: is this the solution?
-        is_turning: did the team turn as a whole on the way here?
     """
 
     poses: Array
@@ -31,7 +30,6 @@ class Point:
     threshold: Array
     steps: int = 0
     converged: bool = False
-    is_turning: bool = False
 
     @staticmethod
     def of(

@@ -30,7 +30,6 @@ class Solution:
         is_as_modelled: is it the one that is configured?
         contradicted: (pairs,) whose ranges of late do not fit.
         blocked: (pairs,) between which sight was blocked.
-        is_turning: see `Point`.
     """
 
     poses: Array
@@ -52,4 +51,3 @@ class Solution:
     blocked: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     doubted: Doubted = field(default_factory=lambda: Doubted.none(0))
     freed: tuple[Freed, ...] = ()
-    is_turning: bool = False

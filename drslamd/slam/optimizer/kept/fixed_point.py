@@ -5,8 +5,8 @@ of the last steps makes that faster: the combination of them whose next step wou
 measured by M (Walker and Ni, SIAM J. Numer. Anal. 49, 2011). Since M F = -g, products by M cost
 nothing: (F_i, F_j)_M = -F_i' g_j.
 
-The end is where the gradient is zero, whatever M is. Where the team turns, x are steps of a
-`TurningChart`, in which M stays right.
+The end is where the gradient is zero, whatever M is. x are steps of a `TurningChart` from where M
+was made, in which M stays right however the team has been turned as a whole since.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from dataclasses import replace
 import numpy as np
 
 from drslamd.slam import headway
-from drslamd.slam.optimizer.banded.newton_descent import TURNS
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.banded.turning.chart import AROUND, TurningChart
@@ -42,30 +41,25 @@ def approach(
         tolerance: m and rad of the last step, see `newton_descent.TOLERANCE`.
     """
     problem, layout = equations.problem, equations.layout
-    chart = TurningChart(start.poses, problem.gauge, AROUND * len(problem.priors.scale))
-    is_turning = False
-    point, at = start, layout.vector(np.zeros_like(start.poses), start.calibration)
+    chart = TurningChart(matrix.poses, problem.gauge, AROUND * len(problem.priors.scale))
+    point, at = start, layout.vector(chart.step(start.poses), start.calibration)
     places: list[Array] = []
     steps: list[Array] = []
     gradients: list[Array] = []
     for count in range(most):
         headway.mark()
         gradient = exact_gradient(equations, point)
-        if is_turning:
-            gradient[layout.poses] = chart.pulled(gradient[layout.poses], at[layout.poses])
+        gradient[layout.poses] = chart.pulled(gradient[layout.poses], at[layout.poses])
         step = matrix.solved(-gradient)
         size = float(np.abs(step[layout.poses]).max())
-        if not count:
-            is_turning = size > TURNS * chart.own_size(step[layout.poses])
-        if not (chart.own_size(step[layout.poses]) if is_turning else size) < FARTHEST:
+        if not count and not chart.own_size(step[layout.poses]) < FARTHEST:
             return None
         places, steps, gradients = (
             [*kept[-DEPTH:], new]
             for kept, new in ((places, at), (steps, step), (gradients, gradient))
         )
         at = at + step if size < tolerance else _mixed(places, steps, gradients)
-        moved, calibration = at[layout.poses], layout.calibration(at)
-        poses = chart.poses(moved) if is_turning else start.poses + moved
+        poses, calibration = chart.poses(at[layout.poses]), layout.calibration(at)
         point = Point.of(problem, poses, calibration, steps=count + 1)
         if size < tolerance:
             is_lower = equations.cost(point, start.threshold) <= equations.cost(

@@ -46,14 +46,14 @@ class Head:
     paired: int
     doubted: Doubted
 
+    def is_mounted_as(self, problem: Problem) -> bool:
+        """Are the same mountings unknowns?"""
+        mine, now = self.doubted, problem.doubted
+        return np.array_equal(mine.track, now.track) and np.array_equal(mine.antenna, now.antenna)
+
     def places(self, problem: Problem, pairs: list[Pair]) -> Places | None:
         """Where its unknowns are in a problem; None where it has not all of them, or others."""
-        same = (
-            np.array_equal(self.doubted.track, problem.doubted.track)
-            and np.array_equal(self.doubted.antenna, problem.doubted.antenna)
-            and set(self.pairs) <= set(pairs)
-        )
-        if not same:
+        if not (self.is_mounted_as(problem) and set(self.pairs) <= set(pairs)):
             return None
         keys = keys_of(problem)
         order = np.argsort(keys)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from drslamd.slam import se2
 from drslamd.slam.lapack.routines import cholesky_solved, inverse_triangular
 from drslamd.slam.optimizer.banded.claims import UNKNOWN, bias_sigmas
 from drslamd.slam.optimizer.banded.layout import NOWHERE
@@ -15,12 +16,13 @@ from drslamd.slam.optimizer.sensor_priors import Calibration
 from drslamd.slam.se2 import Array, Index
 
 
-def kept_covariance(claimed: Current, wanted: Index) -> Array | None:
+def kept_covariance(claimed: Current, point: Point, wanted: Index) -> Array | None:
     """(3 k, 3 k) joint covariance of poses (k,) that are not eliminated; None where it is for
     `claims.covariances` to say.
 
     Args:
         claimed: of a problem whose odometry is believed as far as it should be.
+        point: the solution; the whole team may be turned there beside how it was in `claimed`.
     """
     layout, lower = claimed.layout, claimed.lower
     at = layout.poses[wanted].ravel()
@@ -32,7 +34,14 @@ def kept_covariance(claimed: Current, wanted: Index) -> Array | None:
     squares = np.diag(joint)
     if not (np.isfinite(squares) & (squares > 0) & (squares < UNKNOWN)).all():
         return None
+    axes = np.kron(np.eye(len(wanted)), se2.axes(turn_since(claimed, point, wanted)))
+    joint = axes @ joint @ axes.T
     return np.asarray((joint + joint.T) / 2)
+
+
+def turn_since(made: Current, point: Point, newest: Index) -> float:
+    """By how much a team is turned beside where a matrix was made, at poses (k,)."""
+    return float((point.poses - made.poses)[newest, 2].mean()) if len(newest) else 0.0
 
 
 def kept_spread(

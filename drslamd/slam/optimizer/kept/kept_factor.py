@@ -4,6 +4,10 @@ The head are all poses but those of the newest seconds. Most of its poses are el
 the factors between them at the point of that time; what is left is the rest: the front, which the
 newest seconds hang on, and the border. Each second the tail and the priors are added to the rest
 as they are now, and tails that grew are eliminated in their turn.
+
+All of it stays where it was made: poses that follow are laid over it, beside the newest ones of the
+head as they are beside these now. A matrix whose parts were made of teams that stand turned towards
+each other would hold turns that nothing holds.
 """
 
 from __future__ import annotations
@@ -12,18 +16,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drslamd.slam import se2
 from drslamd.slam.lapack.routines import cholesky_solved
 from drslamd.slam.optimizer.banded.assembly import LeanSystem, System
 from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout, border_poses
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
-from drslamd.slam.optimizer.factor_errors import RangeErrors
+from drslamd.slam.optimizer.factor_errors import RangeErrors, corrected, pose_errors, range_errors
 from drslamd.slam.optimizer.kept.elimination import SINGLE, Elimination, Rest, eliminated
 from drslamd.slam.optimizer.kept.head import Flags, Head, Pair, Places, keys_of, tail_of
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array, Index
 
+NEWEST = 4
+"""Poses of a head, over its robots, that say how it is turned where the tail follows."""
 AT_ONCE = 128
 """Right-hand sides that are solved together: a large team has hundreds."""
 
@@ -40,19 +47,31 @@ class Believed:
     point: Point
     claims: Array | None = None
 
-    def of_factors(self, which: Flags, layout: BandLayout) -> System:
-        """What some factors add.
+    def of_factors(self, which: Flags, layout: BandLayout, poses: Array) -> System:
+        """What some factors add where the poses are these (k, 3).
 
         Args:
             which: (all,) of odometry, closures and ranges, in this order.
         """
         equations, point, claims = self._chosen(which, layout)
-        return equations.factors_weighed(point, claims)
+        some, calibration = equations.problem, self.point.calibration
+        sight = range_errors(poses, some.ranges, calibration, some.model)
+        link = pose_errors(poses, some.odometry, corrected(some.odometry, calibration))
+        return equations.factors_weighed(
+            replace(point, poses=poses, link=link, sight=sight), claims
+        )
 
-    def of_head(self, which: Flags, layout: BandLayout) -> LeanSystem:
-        """The same of the many of a head, with the priors that never change."""
+    def of_head(self, which: Flags, layout: BandLayout, is_curved: bool) -> LeanSystem:
+        """The same of the many of a head, with the priors that never change.
+
+        Args:
+            is_curved: the whole second derivative instead?
+        """
         equations, point, claims = self._chosen(which, layout)
-        system = equations.factors_weighed_leanly(point, claims)
+        if is_curved:
+            system = equations.factors_curved_leanly(point)
+        else:
+            system = equations.factors_weighed_leanly(point, claims)
         equations.add_gaussian_priors(system)
         return system
 
@@ -88,31 +107,48 @@ class KeptFactor:
     Attributes:
         blocks: what was eliminated, in this order; none where solutions are not wanted.
         rest: of the front and the border.
+        origin: (h + d, 3) poses of the head, then of `Head.far`, where all of that was made.
     """
 
     head: Head
     blocks: tuple[Elimination, ...]
     rest: Rest
+    origin: Array
+
+    def laid_over(self, poses: Array, places: Places) -> Array:
+        """(k, 3) poses of a problem: those of the head where the factor was made, the tail beside
+        them as it is beside the newest of them in `poses` (k, 3)."""
+        out: Array = poses.copy()
+        out[np.concatenate([places.inside, places.far])] = self.origin
+        newest = np.sort(places.inside)[-NEWEST * len(places.flat.scale) :]
+        turn = float(se2.wrap(out[newest, 2] - poses[newest, 2]).mean())
+        last, tail = newest[-1], places.tail
+        moved = (poses[tail, :2] - poses[last, :2]) @ [1, 1j] * np.exp(1j * turn)
+        out[tail, 0], out[tail, 1] = out[last, 0] + moved.real, out[last, 1] + moved.imag
+        out[tail, 2] += turn
+        return out
 
     def on_top(self, believed: Believed, places: Places) -> Current | None:
-        """With the tail of a problem, at its point; None where that is not positive definite."""
+        """With the tail of a problem, laid over it; None where that is not positive definite."""
         problem = believed.problem
+        poses = self.laid_over(believed.point.poses, places)
         layout, numbers = places.dense(places.tail)
         i, j = problem.ends
         is_tail = np.zeros(len(problem.n), dtype=bool)
         is_tail[places.tail] = True
-        system = believed.of_factors(is_tail[i] | is_tail[j], layout)
+        system = believed.of_factors(is_tail[i] | is_tail[j], layout, poses)
         believed.add_priors(system, layout)
         _add(system.corner, self.rest, 3 * len(places.tail))
         try:
             lower = np.linalg.cholesky(system.corner)
         except np.linalg.LinAlgError:
             return None
-        return Current(self, places, layout, numbers, lower)
+        return Current(self, places, poses, layout, numbers, lower)
 
     def grown(self, believed: Believed, places: Places) -> KeptFactor | None:
-        """With all but the newest poses of the tail in the head as well, at that point."""
+        """With all but the newest poses of the tail in the head as well, laid over it."""
         problem = believed.problem
+        poses = self.laid_over(believed.point.poses, places)
         more = places.tail[~tail_of(problem)[places.tail]]
         layout, numbers = places.dense(more)
         is_head = np.zeros(len(problem.n), dtype=bool)
@@ -121,7 +157,7 @@ class KeptFactor:
         is_more[more] = True
         i, j = problem.ends
         which = is_head[i] & is_head[j] & (is_more[i] | is_more[j])
-        system = believed.of_factors(which, layout)
+        system = believed.of_factors(which, layout, poses)
         _add(system.corner, self.rest, 3 * len(more))
         apart = np.concatenate([places.front, more])
         needed = _needed(problem, is_head)[apart]
@@ -140,7 +176,8 @@ class KeptFactor:
             keys=np.concatenate([self.head.keys, keys_of(problem)[more]]),
             front=numbers[needed],
         )
-        return KeptFactor(head, (*self.blocks, block) if self.blocks else (), rest)
+        origin = poses[np.concatenate([places.inside, more, places.far])]
+        return KeptFactor(head, (*self.blocks, block) if self.blocks else (), rest, origin)
 
 
 def _add(corner: Array, rest: Rest, tail: int) -> None:
@@ -180,7 +217,7 @@ def _needed(problem: Problem, is_head: Flags) -> Flags:
 
 
 def build(
-    believed: Believed, pairs: list[Pair], tail: Flags, with_blocks: bool
+    believed: Believed, pairs: list[Pair], tail: Flags, with_blocks: bool, is_curved: bool = False
 ) -> KeptFactor | None:
     """Eliminate the head at the point where it is; None where that is not positive definite.
 
@@ -206,7 +243,7 @@ def build(
     place[far] = len(inside) + np.arange(len(far))
     poses = np.where(place[:, None] == NOWHERE, NOWHERE, 3 * place[:, None] + np.arange(3))
     layout = BandLayout.placed(problem, poses, 3 * len(inside), 3 * len(far), 3 * reach + 3)
-    system = believed.of_head(which, layout)
+    system = believed.of_head(which, layout, is_curved)
     front = int(np.count_nonzero(needed[inside]))
     parts = eliminated(system, 3 * (len(inside) - front), with_blocks)
     if parts is None:
@@ -221,7 +258,7 @@ def build(
         paired=len(pairs),
         doubted=problem.doubted,
     )
-    return KeptFactor(head, tuple(blocks), rest)
+    return KeptFactor(head, tuple(blocks), rest, believed.point.poses[np.append(inside, far)])
 
 
 @dataclass(frozen=True)
@@ -229,12 +266,14 @@ class Current:
     """A kept factor with the tail of a problem on top.
 
     Attributes:
+        poses: (k, 3) where it was made, however the team has been turned since.
         layout: of front, tail and border; numbers: in `places.flat`.
         lower: (m, m) Cholesky's factor of these.
     """
 
     kept: KeptFactor
     places: Places
+    poses: Array
     layout: BandLayout
     numbers: Index
     lower: Array

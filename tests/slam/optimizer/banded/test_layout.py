@@ -134,3 +134,17 @@ def test_poses_at_the_border_stand_behind_the_band() -> None:
     # those after it move up, and odometry of two robots reaches two poses
     assert layout.poses[10].tolist() == [27, 28, 29]
     assert layout.width == 3 * 2 + 3
+
+
+def test_ways_wider_than_the_band_or_of_poses_that_are_no_unknowns_are_left_out() -> None:
+    """Poses 0 to 4 in time; the third is in the border, the last is none."""
+    problem = team_problem(2, robots=2, count=3)[0]
+    number = np.array([0, 4, 15, 1, 2, NOWHERE])
+    poses = np.where(number[:, None] == NOWHERE, NOWHERE, 3 * number[:, None] + np.arange(3))
+    layout = BandLayout.placed(problem, poses, band=15, outside=33, width=9)
+    which = (layout.ways() != NOWHERE).all(axis=1)
+    # (0 and 4 are three poses too far apart)
+    assert which.tolist() == [False, True, True, True, False]
+    assert (layout.ways()[~which] == NOWHERE).all()
+    wider = replace(layout, width=15)
+    assert (wider.ways()[0] == [0, 1, 2, 12, 13, 14]).all()

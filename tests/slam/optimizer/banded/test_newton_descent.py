@@ -169,13 +169,17 @@ def test_a_team_that_is_hardly_held_turns_to_its_place_in_some_steps(angle: floa
     found = descend(Equations(away), right.calibration, 30, is_near=True)
     assert right.converged
     assert found.converged
-    assert found.is_turning
     assert np.abs(found.poses - right.poses).max() < 1e-6
 
 
-def test_who_knows_where_the_team_is_turned_to_does_not_call_it_turning() -> None:
+def test_who_knows_where_the_team_is_turned_to_needs_no_second_derivative(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     problem, known, _ = driven_on(0.01)
-    assert not descend(Equations(problem), known, MOST, is_near=True).is_turning
+    asked = []
+    monkeypatch.setattr(Equations, "add_curvature", lambda *args: asked.append(args))
+    assert descend(Equations(problem), known, MOST, is_near=True).converged
+    assert not asked
 
 
 @pytest.mark.parametrize("fault", ["no factor", "no better"])

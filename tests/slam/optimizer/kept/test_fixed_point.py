@@ -94,3 +94,23 @@ def test_what_is_far_from_its_neighbours_or_slow_is_not_reached(team: TeamProble
     found = approach(flat, beside, matrix, 1e-6)
     assert found is not None
     assert np.abs(found.poses - right.poses).max() < 1e-6
+
+
+def test_a_matrix_of_how_the_team_stood_leads_on_when_it_has_turned(team: TeamProblem) -> None:
+    """With as many steps, but for two, as one of how it stands; turned about its first pose."""
+    problem, right = team.problem, solution(team)
+    flat = Equations(problem, layout=BandLayout.flat(problem))
+    moved = right.poses + np.random.default_rng(1).normal(0, 0.005, right.poses.shape)
+    start = Point.of(problem, moved, right.calibration)
+    gauge = right.poses[problem.gauge, :2]
+    places = (right.poses[:, :2] - gauge) @ [1, 1j] * np.exp(0.3j)
+    turned = np.column_stack([places.real, places.imag, right.poses[:, 2] + 0.3])
+    turned[:, :2] += gauge
+    before = matrix_at(team, Point.of(problem, turned, right.calibration))
+    assert np.abs(before.poses - right.poses).max() > 1.0
+    by_that = approach(flat, start, before, 1e-7, most=40)
+    by_this = approach(flat, start, matrix_at(team, right), 1e-7, most=40)
+    assert by_that is not None
+    assert by_this is not None
+    assert by_that.steps <= by_this.steps + 2
+    assert np.abs(by_that.poses - by_this.poses).max() < 1e-6

@@ -17,7 +17,13 @@ from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.optimizer.banded import banded_optimizer
 from drslamd.slam.optimizer.banded.banded_solver import SETTLED
 from drslamd.slam.optimizer.banded.pairs import narrowing
-from drslamd.slam.optimizer.kept import kept_solver, quick_check
+from drslamd.slam.optimizer.kept import (
+    kept_claims,
+    kept_factor,
+    kept_solution,
+    kept_solver,
+    quick_check,
+)
 
 NEAR_M, NEAR_SIGMA = 1e-4, 1.03
 """What is feared of odometry may be of some links ago, and goes up and down with each."""
@@ -63,7 +69,7 @@ def driven(
         numbers, graph, group, previous = job.args
         problem = banded_optimizer.build_problem(graph, group, previous, numbers)
         right = banded_optimizer.solved(problem, group, tolerance=SETTLED)
-        yield Second(found, right, not isinstance(found.kept, kept_solver.Kept))
+        yield Second(found, right, not isinstance(found.kept, kept_solution.Kept))
         team.back.on_solution(found)
         for chain, entry in said(second, team.entries()):
             team.back.insert(chain, entry)
@@ -79,7 +85,7 @@ def test_a_team_that_drives_on_is_solved_from_what_was_kept_and_stays_right() ->
     for second in seconds:
         if second.began_anew:
             continue
-        assert isinstance(second.found.kept, kept_solver.Kept)
+        assert isinstance(second.found.kept, kept_solution.Kept)
         then = second.found.kept.checked.links
         now = [len(path.n) - 1 for path in second.found.trajectories.values()]
         assert (now <= quick_check.GROWN * then).all()
@@ -168,21 +174,10 @@ def test_a_small_problem_is_solved_anew(
     assert next(seconds).began_anew is is_anew
 
 
-def test_shares_of_pairs_hold_until_a_tenth_of_the_way_is_new_and_for_the_same_robots() -> None:
-    found = kept_solver.KeptShares((0, 3), 100, np.ones((2, 2)))
-    for robots, links, holds in (
-        ((0, 3), 110, True),
-        ((0, 3), 111, False),
-        ((0, 4), 100, False),
-        ((0, 3, 4), 100, False),
-    ):
-        assert found.hold(kept_solver.KeptShares(robots, links, np.ones((0, 0)))) is holds
-
-
 def test_shares_that_were_kept_are_those_that_are_found_anew() -> None:
     """From the matrix that was kept, and by the solver that keeps nothing."""
     for second in list(driven(MetTeam(3, 40, 10), 4))[2:]:
-        assert isinstance(second.found.kept, kept_solver.Kept)
+        assert isinstance(second.found.kept, kept_solution.Kept)
         found, right = second.found.narrower, second.right.narrower
         for pair in right.keys() | found.keys():
             assert found.get(pair, 1.0) == pytest.approx(right.get(pair, 1.0), rel=0.06)
@@ -194,9 +189,9 @@ def test_shares_are_not_found_each_second(few: int, monkeypatch: pytest.MonkeyPa
     times = []
     seen_noise = narrowing.seen_noise
 
-    def counted(*args: Any) -> narrowing.SeenNoise | None:
+    def counted(*args: Any, **there: Any) -> narrowing.SeenNoise | None:
         times.append(0)
-        return seen_noise(*args)
+        return seen_noise(*args, **there)
 
     team = MetTeam(3, 40, 10)
     for _ in range(4):
@@ -209,20 +204,39 @@ def test_shares_are_not_found_each_second(few: int, monkeypatch: pytest.MonkeyPa
     assert len(times) <= 1
 
 
-@pytest.mark.parametrize(
-    ("is_turning", "more", "is_tried"),
-    [(False, 1, True), (True, 1, False), (True, 0, True)],
-)
-def test_a_team_that_turns_is_not_solved_from_what_is_kept_unless_it_is_large(
-    is_turning: bool, more: int, is_tried: bool, monkeypatch: pytest.MonkeyPatch
+def test_where_the_whole_second_derivative_is_no_valley_the_weights_lead_on(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A matrix is one of how the team stood."""
-    tried = []
-    monkeypatch.setattr(kept_solver, "_solved", lambda *args: tried.append(args))
-    team = replace(a_team_problem(), is_near=True)
-    monkeypatch.setattr(kept_solver, "MANY", len(team.problem.n) + more)
-    last = tuple(int(np.flatnonzero(team.problem.robot == robot)[-1]) for robot in range(3))
-    kept = replace(kept_solver.KeptShares.of(team, last, np.ones((0, 0))), is_turning=is_turning)
-    _, after = kept_solver.solve(team, last, 1e-6, kept)
-    assert len(tried) == is_tried
-    assert isinstance(after, kept_solver.KeptShares)
+    asked = []
+    build = kept_factor.build
+
+    def without(*args: Any) -> kept_factor.KeptFactor | None:
+        asked.append(args[-1])
+        return None if args[-1] else build(*args)
+
+    monkeypatch.setattr(kept_factor, "build", without)
+    seconds = list(driven(MetTeam(3, 40, 10), 4))
+    assert asked[:2] == [True, False]
+    assert all(second.is_right() for second in seconds)
+    assert not any(second.began_anew for second in seconds[1:])
+
+
+@pytest.mark.parametrize(("more", "is_anew"), [(0.01, False), (-0.01, True)])
+def test_what_is_claimed_is_made_anew_where_the_team_is_turned(
+    more: float, is_anew: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = []
+    build = kept_factor.build
+
+    def counted(*args: Any) -> kept_factor.KeptFactor | None:
+        made.append(args[0].claims is not None)
+        return build(*args)
+
+    turned = kept_solver.TURNED - more
+    monkeypatch.setattr(kept_claims, "turn_since", lambda *_: -turned)
+    seconds = driven(MetTeam(3, 40, 10), 5)
+    for _ in range(4):
+        next(seconds)
+    monkeypatch.setattr(kept_factor, "build", counted)
+    next(seconds)
+    assert (True in made) is is_anew

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from kept_scenes import a_problem, shaken
 
+from drslamd.conventions import GRID_HZ
 from drslamd.slam.optimizer.banded import misfit, mountings
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.common_level import ASKS
@@ -17,6 +18,7 @@ from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.kept import quick_check
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.optimizer.sensor_priors import Calibration
+from drslamd.slam.se2 import Index
 
 
 def with_errors(problem: Problem, point: Point, sigmas: dict[int, float]) -> Point:
@@ -28,6 +30,11 @@ def with_errors(problem: Problem, point: Point, sigmas: dict[int, float]) -> Poi
     for back, size in sigmas.items():
         error[mine[back]] = size * ranges.sigma[mine[back]]
     return replace(point, sight=point.sight._replace(error=error))
+
+
+def newest_of(problem: Problem) -> Index:
+    """The last keyframe of each of three robots."""
+    return np.array([problem.n[problem.robot == robot].max() for robot in range(3)])
 
 
 CASES = [
@@ -106,7 +113,8 @@ def test_robots_that_are_worse_only_together_are_looked_at_closer(
     links = np.bincount(robot, minlength=3).astype(float)
     s = np.bincount(robot, squares, 3)
     # each has a third of what makes both sides alike, and nobody stands out
-    checked = quick_check.Freedom(s * ((s.sum() + 1) / (ASKS + off) - 1) / s.sum(), links)
+    share = ((s.sum() + 1) / (ASKS + off) - 1) / s.sum()
+    checked = quick_check.Freedom(s * share, links, newest_of(problem))
     found = quick_check.misfit_as_modelled(problem, point, checked, left)
     assert (found is not None) is is_modelled
 
@@ -117,7 +125,7 @@ def test_what_could_be_checked_grows_with_the_way() -> None:
     point = shaken(problem)
     squares, robot = misfit.squares_of(problem, point), problem.odometry.robot
     links = np.bincount(robot, minlength=3).astype(float)
-    then = quick_check.Freedom(np.array([7.0, 20.0, 0.0]), links / [1, 2, 1])
+    then = quick_check.Freedom(np.array([7.0, 20.0, 0.0]), links / [1, 2, 1], newest_of(problem))
     s = [squares[robot == k].sum() for k in range(3)]
     expected = [(s[0] + 1) / (7 + 1), (s[1] + 1) / (40 + 1), s[2] + 1]
     ratio, pooled = then.ratio(problem, point)
@@ -125,11 +133,19 @@ def test_what_could_be_checked_grows_with_the_way() -> None:
     assert pooled == pytest.approx((sum(s) + 1) / (7 + 40 + 1))
 
 
-@pytest.mark.parametrize(("times", "is_fresh"), [(1.02, True), (1.04, False)])
-def test_what_could_be_checked_is_fresh_until_one_robot_has_three_in_a_hundred_more_links(
+@pytest.mark.parametrize(("times", "is_fresh"), [(1.04, True), (1.06, False)])
+def test_what_could_be_checked_is_fresh_until_one_robot_has_five_in_a_hundred_more_links(
     times: float, is_fresh: bool
 ) -> None:
     problem = a_problem()
     links = np.bincount(problem.odometry.robot, minlength=3).astype(float)
-    then = quick_check.Freedom(np.ones(3), links / [1.0, times, 1.0])
+    then = quick_check.Freedom(np.ones(3), links / [1.0, times, 1.0], newest_of(problem))
     assert then.is_fresh(problem) is is_fresh
+
+
+@pytest.mark.parametrize(("later_s", "is_fresh"), [(60, True), (61, False)])
+def test_what_could_be_checked_is_fresh_for_a_minute(later_s: int, is_fresh: bool) -> None:
+    problem = a_problem()
+    links = np.bincount(problem.odometry.robot, minlength=3).astype(float)
+    newest = newest_of(problem) - np.array([0, later_s * GRID_HZ, 0])
+    assert quick_check.Freedom(np.ones(3), links, newest).is_fresh(problem) is is_fresh

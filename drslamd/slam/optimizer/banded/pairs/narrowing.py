@@ -66,7 +66,12 @@ def may_narrow(problem: Problem, poses: int) -> bool:
 
 
 def seen_noise(
-    equations: Equations, point: Point, factor: Solver, ratio: Array, biases: Array
+    equations: Equations,
+    point: Point,
+    factor: Solver,
+    ratio: Array,
+    biases: Array,
+    made_at: Point | None = None,
 ) -> SeenNoise | None:
     """None where the matrix gives no solution.
 
@@ -74,8 +79,9 @@ def seen_noise(
         factor: see `expected_squares`.
         ratio: (robots,) s / g of odometry, see `misfit`.
         biases: (pairs,) how wrong they may be, m.
+        made_at: the point of the factor, if that is another one.
     """
-    expected = expected_squares(equations, point, factor)
+    expected = expected_squares(equations, made_at or point, factor)
     if expected is None:
         return None
     problem, calibration = equations.problem, point.calibration

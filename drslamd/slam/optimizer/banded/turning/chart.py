@@ -17,6 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
+from drslamd.slam import se2
 from drslamd.slam.se2 import Array, Index
 
 AROUND = 4
@@ -53,6 +54,20 @@ class TurningChart:
         out[:, 1] += before.imag
         return np.asarray(out)
 
+    def step(self, poses: Array) -> Array:
+        """(k, 3) the step that leads to poses (k, 3), the inverse of `poses`."""
+        out = poses - self.origin
+        out[:, 2] = se2.wrap(out[:, 2])
+        turn = self._turn(out[:, 2])
+        back = complex_of(np.cos(turn), -np.sin(turn))
+        moved = back * np.diff(complex_of(poses[:, 0], poses[:, 1]))
+        moved -= self.way - complex_of(0.0, turn) * self.way
+        place = np.zeros(len(out), dtype=complex)
+        np.cumsum(moved, out=place[1:])
+        place += complex(*out[self.gauge, :2]) - place[self.gauge]
+        out[:, 0], out[:, 1] = place.real, place.imag
+        return np.asarray(out)
+
     def pulled(self, gradient: Array, step: Array) -> Array:
         """(k, 3) derivative of a cost by the step (k, 3), of that by the poses after it (k, 3)."""
         turn, moved = self._taken_apart(step)
@@ -87,11 +102,14 @@ class TurningChart:
 
     def _taken_apart(self, step: Array) -> tuple[Array, Array]:
         """(k - 1,) phi, and how each place moves beside the one before, x + iy."""
+        return self._turn(step[:, 2]), np.diff(complex_of(step[:, 0], step[:, 1]))
+
+    def _turn(self, headings: Array) -> Array:
+        """(k - 1,) phi of steps of headings (k,)."""
         begin, end = self._window
-        sums = np.zeros(len(step) + 1)
-        np.cumsum(step[:, 2], out=sums[1:])
-        turn = (sums[end] - sums[begin]) / (end - begin)
-        return turn, np.diff(complex_of(step[:, 0], step[:, 1]))
+        sums = np.zeros(len(headings) + 1)
+        np.cumsum(headings, out=sums[1:])
+        return np.asarray((sums[end] - sums[begin]) / (end - begin))
 
     def _shared(self, levers: Array) -> Array:
         """(k,) pulls by v_theta, of those by phi (k - 1,)."""

@@ -50,6 +50,15 @@ def of_turning(poses: Array, pulls: Array, gauge: int) -> Linearised:
     return of_ways(poses, each, each + 1, -beyond(pulls[:, :2] @ [1, 1j], gauge), columns=6)
 
 
+def both(one: Linearised, other: Linearised) -> Linearised:
+    """Of the same factors, the sum of both."""
+    d, e = one.jacobian.shape[1], other.jacobian.shape[1]
+    form = np.zeros((len(one.pull), d + e, d + e))
+    form[:, :d, :d], form[:, d:, d:] = one.information, other.information
+    rows = np.concatenate([one.jacobian, other.jacobian], axis=1)
+    return Linearised(rows, form, np.concatenate([one.pull, other.pull], axis=1))
+
+
 def of_ways(poses: Array, i: Index, j: Index, force: Array, columns: int) -> Linearised:
     """Of ways R_i' (p_j - p_i) that are pulled at.
 

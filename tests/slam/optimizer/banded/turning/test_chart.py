@@ -51,6 +51,17 @@ def test_the_gauge_goes_where_it_is_told() -> None:
 
 @pytest.mark.parametrize("around", [0, 2, 20])
 @pytest.mark.parametrize("gauge", [0, 4, COUNT - 1])
+def test_a_step_is_known_by_where_it_leads(gauge: int, around: int) -> None:
+    one, step = chart(gauge, around), some_step(0.4)
+    there = one.poses(step)
+    assert one.step(there) == pytest.approx(step, abs=1e-12)
+    # as it is published, with headings that are wrapped
+    there[:, 2] += 2 * np.pi * np.arange(COUNT)
+    assert one.step(there) == pytest.approx(step, abs=1e-12)
+
+
+@pytest.mark.parametrize("around", [0, 2, 20])
+@pytest.mark.parametrize("gauge", [0, 4, COUNT - 1])
 def test_a_gradient_is_that_of_finite_differences(gauge: int, around: int) -> None:
     one, step, weights = chart(gauge, around), some_step(0.3), some_step(1.0, seed=3)
 

@@ -10,6 +10,7 @@ from dense_problems import matrix_of
 from slam_problems import mismounted, no_ranges, team_problem
 from slam_scenes import Array
 
+from drslamd.slam.optimizer.banded.assembly import System
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.banded.turning.chart import TurningChart
@@ -66,6 +67,21 @@ def by_differences(equations: Equations, point: Point) -> Array:
 
     units = STEP * np.eye(layout.band + layout.border)
     return np.stack([(gradient(e) - gradient(-e)) / (2 * STEP) for e in units])
+
+
+@pytest.mark.parametrize("name", list(PROBLEMS))
+def test_what_factors_alone_curve_is_the_second_derivative_but_for_priors(name: str) -> None:
+    equations = Equations(PROBLEMS[name])
+    point = Point.of(equations.problem, *beside(equations.problem))
+    expected, gradient = equations.at(point, WHOLE)
+    equations.add_curvature(expected, point, gradient)
+    found = equations.factors_curved_leanly(point)
+    n = equations.layout.band
+    whole = System(found.columns(0, n), found.border.rows(0, n), found.corner)
+    equations.add_heavy_priors(whole, point.calibration, WHOLE)
+    equations.add_gaussian_priors(whole)
+    scale = np.abs(matrix_of(expected)).max()
+    assert np.allclose(matrix_of(whole), matrix_of(expected), rtol=1e-9, atol=1e-12 * scale)
 
 
 @pytest.mark.parametrize("name", list(PROBLEMS))
