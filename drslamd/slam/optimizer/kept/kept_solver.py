@@ -38,9 +38,10 @@ from drslamd.slam.se2 import Array, Index
 FEW = 400
 """Poses: a smaller problem is solved anew in the time of what is done beside a kept factor."""
 
-MANY, PATIENT = 5000, 36
-"""Poses: of a larger problem a new factor takes as long as a hundred steps, and memory. So there is
-one for all that it is needed for, and so many steps may be made by it."""
+MANY, PATIENT = 100, 36
+"""Pairs that have met, as of fifteen robots: each is a column of the border, so a new factor takes
+as long as a hundred steps, and memory. So there is one for all that it is needed for, and so many
+steps may be made by it."""
 
 
 TURNED = 0.05
@@ -75,7 +76,7 @@ def _solved(
 ) -> tuple[Solution, Kept] | None:
     problem, pairs = team.problem, team.pairs
     start = Point.of(problem, problem.initial.copy(), team.start)
-    is_large = len(problem.n) >= MANY
+    is_large = problem.pairs >= MANY
     before = kept.downwards if kept else None
     current = _matrix(before, Believed(problem, start), pairs, is_curved=not is_large)
     if current is None:
@@ -130,7 +131,7 @@ class Reached:
         large. The one that leads to the solution knows how heavy tails bend, so it is another;
         only of a large team, of which a factor takes long to make, it is the same."""
         problem, point = self.team.problem, self.point
-        if len(problem.n) >= MANY:
+        if problem.pairs >= MANY:
             return self.current, Point.of(problem, self.current.poses, point.calibration)
         found = _matrix(None, Believed(problem, point), self.team.pairs)
         return None if found is None else (found, point)

@@ -156,7 +156,7 @@ def test_steps_of_a_large_problem_are_cheaper_than_a_matrix(
     said = []
     monkeypatch.setattr(kept_solver, "approach", lambda *args: said.append(args[-1]))
     team = replace(a_team_problem(), is_near=True)
-    monkeypatch.setattr(kept_solver, "MANY", len(team.problem.n) + more)
+    monkeypatch.setattr(kept_solver, "MANY", team.problem.pairs + more)
     kept_solver.solve(team, (), 1e-6)
     assert said == [steps]
 

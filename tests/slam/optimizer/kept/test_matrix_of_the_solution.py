@@ -76,7 +76,7 @@ def test_a_team_that_began_turned_away_knows_of_mountings_what_its_own_matrix_sa
     """A large team by the matrix of where it began, asked there; else by one of the solution."""
     team, off = turned()
     assert off > 0.1
-    monkeypatch.setattr(kept_solver, "MANY", len(team.problem.n) + more)
+    monkeypatch.setattr(kept_solver, "MANY", team.problem.pairs + more)
     assert is_near(kept_of(team), solved()[1], 0.03)
 
 
@@ -86,7 +86,7 @@ def test_asked_elsewhere_differences_of_large_numbers_come_out_wrong(
     team, _ = turned()
     point, right = solved()
     variances = mountings.variances
-    monkeypatch.setattr(kept_solver, "MANY", len(team.problem.n))
+    monkeypatch.setattr(kept_solver, "MANY", team.problem.pairs)
     monkeypatch.setattr(
         mountings, "variances", lambda equations, _, matrix: variances(equations, point, matrix)
     )
