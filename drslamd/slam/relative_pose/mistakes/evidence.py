@@ -27,7 +27,8 @@ fifteen teams all are confirmed after 12 to 44 s (median 20 s), and of forty wit
 backwards or count wrongly none is."""
 WRONG, CLEAR = 60.0, 30.0
 """By how much chi-squared must fall, over that of a degree of freedom, for the configuration to be
-wrong, and by how much the next kind must be worse, for wheels that run backwards to be named. Of
+wrong (so much as well, of as many windows as are ever asked, for it not to be believed), and by how
+much the next kind must be worse, for wheels that run backwards to be named. Of
 twenty-one such robots all are, after 20 to 48 s, and in eighty pairs without such wheels none."""
 BETTER, UNLIKE = 100.0, 40.0
 """Likewise for a track or a scale to begin with, and by how much all that is no track or scale of
@@ -45,21 +46,24 @@ SURE_FIT = 0.45
 """As `FITS`, of such a window: one with a burst of wrong ranges had 11 for the mirror image."""
 
 
-def is_as_configured(chi2: Array, freedom: float, is_mirror_told: bool) -> bool:
+def is_as_configured(costs: Array, freedom: float, is_mirror_told: bool) -> bool:
     """Do windows exclude that wheels run backwards, and is no other mistake better?
 
     Where nothing fits, as when sight is blocked, a track, a scale or a curve is better by chance:
-    none of them counts that does not explain what is left.
+    they do not count where what is left of each window is explained by none of them. Of a mistake
+    that is there each short window has an idea of its own.
 
     Args:
-        chi2: (cases,) of up to three windows; freedom: degrees of it.
+        costs: (windows, cases) chi-squared of up to three windows; freedom: degrees of all.
     """
+    chi2 = costs.sum(axis=0)
     worse = chi2 - chi2[0]
     # (short ways hardly tell a slight curve from none)
     least = [INDIFFERENT if is_curve(case) else 0.0 for case in CASES]
     backwards = least_of_backwards(worse, is_mirror_told) / max(chi2[0] / freedom, 1.0)
     others = np.delete(np.arange(len(CASES)), BACKWARDS)
-    explains = chi2[others].min() <= max(FITS * freedom, MUCH * chi2[0])
+    explained = costs[:, others].min(axis=1).sum()
+    explains = explained <= max(FITS * freedom, MUCH * chi2[0])
     is_none_better = bool((worse >= least).all())
     return bool(backwards >= EXCLUDED and (is_none_better or not explains))
 

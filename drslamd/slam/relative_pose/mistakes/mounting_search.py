@@ -21,7 +21,7 @@ from drslamd.conventions import SECOND_US
 from drslamd.slam.relative_pose.estimate import PairNoise, Verdict
 from drslamd.slam.relative_pose.mistakes import what_if
 from drslamd.slam.relative_pose.mistakes.evidence import (
-    BETTER,
+    WRONG,
     EXCLUDED,
     FITS,
     INDIFFERENT,
@@ -219,8 +219,8 @@ class MountingSearch:
             self.is_confirmed = self.is_provisional = False
             return True
         newest = list(self._answers)[-FEWEST_ASKED:]
-        chi2, degrees = np.sum([n.costs for n in newest], axis=0), sum(n.freedom for n in newest)
-        self._confirm(is_as_configured(chi2, degrees, is_mirror_told))
+        together = np.array([n.costs for n in newest])
+        self._confirm(is_as_configured(together, sum(n.freedom for n in newest), is_mirror_told))
         asked = len(self._answers)
         if asked < FEWEST_ASKED:
             return False
@@ -228,7 +228,7 @@ class MountingSearch:
         total = worth * np.mean([answer.costs for answer in self._answers], axis=0)
         freedom = worth * float(np.mean([answer.freedom for answer in self._answers]))
         if asked == MOST_ASKED:
-            is_other = total.min() <= min(total[0] - BETTER, FITS * freedom)
+            is_other = total.min() <= min(total[0] - WRONG, FITS * freedom)
             is_backwards = least_of_backwards(total - total[0], True) < INDIFFERENT
             self._confirm(not (is_other or is_backwards))
         case, is_clear = winner(total, freedom)

@@ -133,7 +133,7 @@ def test_a_pair_is_not_confirmed_where_a_curve_is_better_by_more_than_chance(
     by: float, confirms: bool
 ) -> None:
     chi2 = costs({AS_IT_IS: FIT, Case(a=CURVES[2]): FIT + by})
-    assert is_as_configured(chi2, FREEDOM, True) is confirms
+    assert is_as_configured(chi2[None], FREEDOM, True) is confirms
 
 
 def test_what_is_configured_wins_nothing() -> None:
@@ -170,7 +170,8 @@ def test_windows_must_exclude_wheels_that_run_backwards_and_find_no_other_mistak
     case: Case, by: float, is_told: bool, confirms: bool
 ) -> None:
     """A robot that hardly drove is the same in a mirror, and is not asked about that."""
-    assert is_as_configured(costs({AS_IT_IS: FIT, case: FIT + by}), FREEDOM, is_told) is confirms
+    known = costs({AS_IT_IS: FIT, case: FIT + by})
+    assert is_as_configured(known[None], FREEDOM, is_told) is confirms
 
 
 @pytest.mark.parametrize(
@@ -190,7 +191,20 @@ def test_where_nothing_fits_only_what_explains_it_speaks_against_the_configurati
     case: Case, level: float, left: float, confirms: bool
 ) -> None:
     chi2 = level * FREEDOM
-    assert is_as_configured(costs({AS_IT_IS: chi2, case: left * chi2}), FREEDOM, True) is confirms
+    known = costs({AS_IT_IS: chi2, case: left * chi2})
+    assert is_as_configured(known[None], FREEDOM, True) is confirms
+
+
+@pytest.mark.parametrize(("left", "confirms"), [(MUCH + LITTLE, True), (MUCH - LITTLE, False)])
+def test_each_window_may_have_another_idea_of_what_is_wrong(left: float, confirms: bool) -> None:
+    """Of three short windows none fits, and one mistake explains each; none explains all."""
+    chi2 = 2.0 * FREEDOM / 3
+    cases = (TRACK, SCALE, Case(a=SCALES[3]))
+    elsewhere = {AS_IT_IS: chi2} | dict.fromkeys(cases, 0.9 * chi2)
+    windows = np.array([costs({**elsewhere, case: left * chi2}) for case in cases])
+    together = windows.sum(axis=0)
+    assert together.min() > MUCH * together[0]
+    assert is_as_configured(windows, FREEDOM, True) is confirms
 
 
 @pytest.mark.parametrize("level", [0.5, 1.0, 3.0])
@@ -200,7 +214,7 @@ def test_windows_that_fit_badly_must_exclude_backwards_by_multiples_of_how_badly
     chi2, unit = level * FREEDOM, max(level, 1.0)
     for by, confirms in ((EXCLUDED + LITTLE, True), (EXCLUDED - LITTLE, False)):
         known = costs({AS_IT_IS: chi2, LEFT: chi2 + by * unit})
-        assert is_as_configured(known, FREEDOM, True) is confirms
+        assert is_as_configured(known[None], FREEDOM, True) is confirms
 
 
 # another track or scale

@@ -117,10 +117,10 @@ def test_who_is_the_same_in_a_mirror_for_long_is_believed_as_configured(
 @pytest.mark.parametrize(
     ("by", "fit", "confirms"),
     [
-        (BETTER + LITTLE, GOOD, False),
-        (BETTER - LITTLE, GOOD, True),
+        (WRONG + LITTLE, GOOD, False),
+        (WRONG - LITTLE, GOOD, True),
         # where nothing fits, as when sight is blocked, another track is better by chance
-        (BETTER + LITTLE, 2 * FITS * 30, True),
+        (WRONG + LITTLE, 2 * FITS * 30, True),
     ],
 )
 def test_nor_is_that_believed_while_something_else_explains_what_it_does_not(
