@@ -224,7 +224,7 @@ def _why_not_localised(robot: Stages, where: Whereabouts, utime: int) -> str | N
     if not peers:
         network = robot.network
         if network is not None and network.up and utime - network.utime <= PATIENCE_US:
-            return "not localised: the network has just been joined; others speak every few seconds"
+            return "not localised: the network has just been joined; others speak every second"
         return (
             "not localised: no other robot is heard; is drslamd running on them, in this network, "
             "with the same gossip.group and port?"

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import Enum
-from typing import Protocol, Union, runtime_checkable
+from typing import Final, Protocol, Union, runtime_checkable
 
-from drslamd.conventions import MILLISECOND_US
+from drslamd.conventions import MILLISECOND_US, SECOND_US
 from drslamd.events import CanFrame
 from drslamd.sensors.device_clock import DeviceClock
 from drslamd.sensors.samples import WheelSample
@@ -50,11 +50,16 @@ def tallied(tally: Tally[WheelRefusal], outcome: Outcome) -> list[WheelSample]:
     return outcome
 
 
+MOST_WAITED_US: Final = SECOND_US
+"""Between the first message of a base and the second; what was said before is of another time."""
+
+
 class BaseTime:
     """Stamps on the clock of the host for a base that says its own time, in ms that wrap.
 
-    The first message waits until the second one shows that its time goes on. It is not lost: the
-    odometry, and so the frame of this robot, begins where the base said its first word.
+    The first message waits until the second one shows that its time goes on. It is not lost, unless
+    the second comes late: the odometry, and so the frame of this robot, begins where the base said
+    its first word. It counts as accepted.
     """
 
     def __init__(self, bits: int) -> None:
@@ -76,8 +81,9 @@ class BaseTime:
             is_first = waited is None and self._clock.offset_us is None
             return [] if is_first else WheelRefusal.TIME
         first = self._clock.first_us
-        before = [] if waited is None or first is None else waited(first)
-        return [*before, *samples(measured)]
+        if waited is None or first is None or measured - first > MOST_WAITED_US:
+            return samples(measured)
+        return [*waited(first), *samples(measured)]
 
 
 class WheelDriver(Protocol):

@@ -182,7 +182,8 @@ class TeamEstimate:
         return None if at is None else np.asarray(self.joint[at, at])
 
     def told(self, robot: int) -> Array | None:
-        """The same as sure as it was seen to be, see `narrower`."""
+        """The same as sure as it was seen to be, see `narrower`; asked by the robot itself, which
+        knows how far later solutions moved its pose (`revisions`)."""
         known = self.covariance(robot)
         return None if known is None else self.narrower.get((robot,), 1.0) * known
 

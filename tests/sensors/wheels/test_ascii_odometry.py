@@ -35,6 +35,17 @@ def test_the_first_line_waits_for_the_second() -> None:
     assert samples == [WheelCounts(T0, 10, -20, 32), WheelCounts(T0 + 20 * MS, 15, -25, 32)]
 
 
+@pytest.mark.parametrize(("after_ms", "count"), [(1_000, 2), (1_001, 1), (600_000, 1)])
+def test_a_first_line_that_is_old_is_not_where_the_odometry_begins(
+    after_ms: int, count: int
+) -> None:
+    driver = AsciiDriver()
+    driver.feed(ascii_line(1000, 10, -20), T0)
+    samples = driver.feed(ascii_line(1000 + after_ms, 15, -25), T0 + after_ms * MS)
+    assert len(samples) == count
+    assert samples[-1] == WheelCounts(T0 + after_ms * MS, 15, -25, 32)
+
+
 def test_the_line_in_the_documentation_is_read() -> None:
     driver = AsciiDriver()
     driver.feed(ascii_line(123_436, 1500, -40), T0)

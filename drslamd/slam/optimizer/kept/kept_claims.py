@@ -41,7 +41,8 @@ def kept_covariance(claimed: Current, point: Point, wanted: Index) -> Array | No
 
 def turn_since(made: Current, point: Point, newest: Index) -> float:
     """By how much a team is turned beside where a matrix was made, at poses (k,)."""
-    return float((point.poses - made.poses)[newest, 2].mean()) if len(newest) else 0.0
+    turns = se2.wrap((point.poses - made.poses)[newest, 2])
+    return float(turns.mean()) if len(newest) else 0.0
 
 
 def kept_spread(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drslamd.conventions import GRID_HZ
 from drslamd.slam.calibration.range_scatter import LEAST_SCATTER
 from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem
 from drslamd.slam.optimizer.banded.odometry_levels import raised
@@ -22,7 +23,9 @@ less, and half of it for pairs in the mean. A sigma goes with the fourth root, s
 at most; what is feared of a whole robot is a guess that scatters by some percent itself."""
 
 GROWN = 1.1
-"""Times as many links as when shares of pairs were found."""
+"""Times as many links as when shares were found ..."""
+MINUTE = 60 * GRID_HZ
+"""... and samples since then, at most: thinning takes away links, and rooms become worse ones."""
 
 
 @dataclass(frozen=True)
@@ -62,23 +65,25 @@ class Sureness:
 
 @dataclass(frozen=True)
 class KeptShares:
-    """What is left of the covariances of pairs (`banded.pairs.narrowing`), some seconds ago. It
-    moves slowly, and to find it takes longer than a second that is kept.
+    """What is left of the covariances of poses and pairs (`banded.pairs.narrowing`), some seconds
+    ago. It moves slowly, and to find it takes longer than a second that is kept.
 
     Attributes:
-        robots: of whose last poses; links: of odometry, so many.
+        robots: of whose last poses; links: of odometry, so many; newest: keyframe of all.
         left: (k, k), or of none.
     """
 
     robots: tuple[int, ...]
     links: int
+    newest: int
     left: Array
 
     @staticmethod
     def of(team: TeamProblem, last: tuple[int, ...], left: Array) -> KeptShares:
         """Of the poses `last`, one of each robot."""
         robots = tuple(team.problem.robot[list(last)].tolist())
-        return KeptShares(robots, len(team.problem.odometry), left)
+        newest = int(team.problem.n.max(initial=0))
+        return KeptShares(robots, len(team.problem.odometry), newest, left)
 
     @staticmethod
     def none(team: TeamProblem, last: tuple[int, ...]) -> KeptShares:
@@ -87,7 +92,8 @@ class KeptShares:
 
     def hold(self, now: KeptShares) -> bool:
         """Are they those of the same robots, which have not driven much further since?"""
-        return self.robots == now.robots and now.links <= GROWN * self.links
+        is_near = now.links <= GROWN * self.links and now.newest - self.newest <= MINUTE
+        return self.robots == now.robots and is_near
 
 
 @dataclass(frozen=True)
@@ -99,7 +105,7 @@ class Kept:
         sure: when that was made.
         variances: of the mountings, see `mountings.variances`; checked: of odometry. Both are made
             anew as the way grows.
-        shares: of pairs, likewise.
+        shares: what is left of what is claimed of poses and pairs.
     """
 
     downwards: KeptFactor

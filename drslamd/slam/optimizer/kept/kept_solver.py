@@ -43,7 +43,6 @@ MANY, PATIENT = 100, 36
 as long as a hundred steps, and memory. So there is one for all that it is needed for, and so many
 steps may be made by it."""
 
-
 TURNED = 0.05
 """rad: by so much of a turn sigmas of places, which lie along it, are 2 % off."""
 

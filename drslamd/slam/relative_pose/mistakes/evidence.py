@@ -49,9 +49,9 @@ SURE_FIT = 0.45
 def is_as_configured(costs: Array, freedom: float, is_mirror_told: bool) -> bool:
     """Do windows exclude that wheels run backwards, and is no other mistake better?
 
-    Where nothing fits, as when sight is blocked, a track, a scale or a curve is better by chance:
-    they do not count where what is left of each window is explained by none of them. Of a mistake
-    that is there each short window has an idea of its own.
+    Where nothing fits, as when sight is blocked, a track, a scale or a curve is better by chance.
+    So they count only where the windows, each under the one that explains it best, the configured
+    one among them, fit: of a mistake that is there each short window has an idea of its own.
 
     Args:
         costs: (windows, cases) chi-squared of up to three windows; freedom: degrees of all.

@@ -21,10 +21,10 @@ from drslamd.conventions import SECOND_US
 from drslamd.slam.relative_pose.estimate import PairNoise, Verdict
 from drslamd.slam.relative_pose.mistakes import what_if
 from drslamd.slam.relative_pose.mistakes.evidence import (
-    WRONG,
     EXCLUDED,
     FITS,
     INDIFFERENT,
+    WRONG,
     against_backwards,
     against_configured,
     is_as_configured,

@@ -30,12 +30,15 @@ def test_what_is_claimed_holds_until_what_is_feared_has_moved(
     assert now.has_moved(before) is has_moved
 
 
-def test_shares_of_pairs_hold_until_a_tenth_of_the_way_is_new_and_for_the_same_robots() -> None:
-    found = KeptShares((0, 3), 100, np.ones((2, 2)))
-    for robots, links, holds in (
-        ((0, 3), 110, True),
-        ((0, 3), 111, False),
-        ((0, 4), 100, False),
-        ((0, 3, 4), 100, False),
+def test_shares_hold_for_a_minute_until_a_tenth_of_the_way_is_new_and_for_the_same_robots() -> None:
+    """Thinning takes away links, and a room may become a worse one."""
+    found = KeptShares((0, 3), 100, 7_000, np.ones((2, 2)))
+    for robots, links, newest, holds in (
+        ((0, 3), 110, 7_010, True),
+        ((0, 3), 111, 7_010, False),
+        ((0, 3), 100, 7_600, True),
+        ((0, 3), 100, 7_601, False),
+        ((0, 4), 100, 7_010, False),
+        ((0, 3, 4), 100, 7_010, False),
     ):
-        assert found.hold(KeptShares(robots, links, np.ones((0, 0)))) is holds
+        assert found.hold(KeptShares(robots, links, newest, np.ones((0, 0)))) is holds

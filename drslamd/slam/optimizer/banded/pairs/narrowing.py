@@ -134,8 +134,11 @@ def shares(poses: Array, claimed: Array, seen: Array) -> Array:
 
 
 def _left(wide: Array, narrow: Array) -> Array:
-    """(m,) of covariances (m, 3, 3)."""
-    left = np.einsum("kii->k", np.linalg.solve(wide, narrow)) / 3
+    """(m,) of covariances (m, 3, 3); all of those that rounding has left none."""
+    is_sound = np.linalg.eigvalsh(wide)[:, 0] > 0
+    left = np.ones(len(wide))
+    solved = np.linalg.solve(wide[is_sound], narrow[is_sound])
+    left[is_sound] = np.einsum("kii->k", solved) / 3
     return np.asarray(np.clip(left, LEAST_SHARE, 1.0))
 
 

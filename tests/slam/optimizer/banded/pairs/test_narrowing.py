@@ -119,6 +119,12 @@ def test_each_pose_alone_is_narrowed_by_the_mean_of_its_directions() -> None:
     assert found.diagonal() == pytest.approx([0.5, LEAST_SHARE])
 
 
+@pytest.mark.parametrize("wrong", [0.0, -1e-3])
+def test_nothing_is_narrowed_by_what_rounding_has_left_no_covariance(wrong: float) -> None:
+    claimed = np.diag([wrong, 1.0, 1.0, 1.0, 1.0, 1.0])
+    assert shares(np.zeros((2, 3)), claimed, 0.5 * np.eye(6)).diagonal().tolist() == [1.0, 0.5]
+
+
 def test_poses_are_named_by_their_robot_and_pairs_by_both() -> None:
     left = np.array([[0.3, 0.5, 0.6], [0.5, 1.0, 0.7], [0.6, 0.7, 0.4]])
     assert narrower([5, 9, 2], left) == {
