@@ -52,7 +52,7 @@ def approach(
         gradient[layout.poses] = chart.pulled(gradient[layout.poses], at[layout.poses])
         step = matrix.solved(-gradient)
         size = float(np.abs(step[layout.poses]).max())
-        if not chart.own_size(step[layout.poses]) < FARTHEST:
+        if not (np.isfinite(size) and chart.own_size(step[layout.poses]) < FARTHEST):
             return None
         places, steps, gradients = (
             [*kept[-DEPTH:], new]

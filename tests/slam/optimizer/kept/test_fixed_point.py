@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.kept.fixed_point import approach
 from drslamd.slam.optimizer.kept.head import tail_of
 from drslamd.slam.optimizer.kept.kept_factor import Believed, Current, build
+from drslamd.slam.se2 import Array
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +79,29 @@ def test_mixing_saves_steps(team: TeamProblem, monkeypatch: pytest.MonkeyPatch) 
     plain = approach(flat, start, matrix, 1e-8, most=60)
     assert mixed is not None
     assert plain is None or mixed.steps < plain.steps
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, 1.0])
+def test_a_later_step_that_leads_astray_ends_it_without_an_answer(
+    team: TeamProblem, wrong: float
+) -> None:
+    """One pose a metre away from those beside it, or nowhere."""
+    right = solution(team)
+    flat = Equations(team.problem, layout=BandLayout.flat(team.problem))
+    near = Point.of(team.problem, right.poses + 0.001, right.calibration)
+    matrix, asked = matrix_at(team, right), 0
+
+    def solved(pulled: Array) -> Array:
+        nonlocal asked
+        asked += 1
+        step = np.array(matrix.solved(pulled))
+        if asked == 2:
+            step[flat.layout.poses[3]] += wrong
+        return step
+
+    astray = cast(Current, SimpleNamespace(poses=matrix.poses, solved=solved))
+    assert approach(flat, near, astray, 1e-12, most=4) is None
+    assert asked == 2
 
 
 def test_what_is_far_from_its_neighbours_or_slow_is_not_reached(team: TeamProblem) -> None:
