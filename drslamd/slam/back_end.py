@@ -32,9 +32,6 @@ AT_ONCE = 30
 """Work (`Thinning.steps`) on the view of the graph in one go, about 5 ms: all of a small team. Of
 fifty robots there are a thousand pairs, and nobody would read sensors for a fifth of a second."""
 
-PATIENCE = 3
-"""Solutions in a row that did not converge: the first ones of a large team may need as many."""
-
 
 class _Known(NamedTuple):
     """What a job knows: log entries that are held, robots that live, moves of the neighbours."""
@@ -79,8 +76,6 @@ class BackEnd:
         self.looked_at = self.graph.view
         self._digested: tuple[GraphView, set[int], int] | None = None
         """What was digested last, and what came of it."""
-        self._not_converged = 0
-        """Solutions in a row."""
 
     def insert(self, origin: Chain, entry: GraphEntry) -> None:
         self.graph.insert(origin, entry)
@@ -149,7 +144,7 @@ class BackEnd:
             self._known = now
             return None
         same = self.exchange.held(group.frame.chain)
-        job = self._optimizer.job(graph, group, self._beginning(), same)
+        job = self._optimizer.job(graph, group, self.estimate or self.onlooked, same)
         if job is None:
             self.exchange.wait(utime)
             return None
@@ -214,16 +209,11 @@ class BackEnd:
         robots = lifted_neighbours.robots(self.graph, self._own) & talking
         return [self.graph.chains[robot].chain for robot in robots]
 
-    def _beginning(self) -> TeamEstimate | None:
-        """From where to solve: the last solution; nothing where it leads nowhere again and again,
-        so that who began in a wrong valley begins anew as a newcomer does."""
-        leads_nowhere = self._not_converged and self._not_converged % PATIENCE == 0
-        solved = self.estimate or self.onlooked
-        return None if leads_nowhere and not self._takes_turns else solved
-
     def on_solution(self, result: TeamEstimate, utime: int = 0) -> list[PublicPoses]:
         """Module 3 has answered; what must be said of it."""
-        self._not_converged = 0 if result.converged else self._not_converged + 1
+        before = self.estimate or self.onlooked
+        in_vain = 0 if result.converged else 1 + (before.in_vain if before else 0)
+        result = replace(result, in_vain=in_vain)
         own = result.trajectories.get(self._own.robot)
         if self._is_beside:
             self.estimate, self.onlooked = None, result

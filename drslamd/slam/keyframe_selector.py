@@ -15,6 +15,7 @@ import numpy as np
 
 from drslamd.slam.graph.measurements import Keyframe
 from drslamd.slam.graph.thinning.time_cells import RECENT_S
+from drslamd.slam.odometry import jumps
 from drslamd.slam.odometry.track import RESOLUTION, Track
 
 KEYFRAME_M = 0.05
@@ -26,6 +27,8 @@ FINER = 5
 """Samples between finer keyframes."""
 DRIVEN = 2 * 10
 """So long before a keyframe its robot may have begun to drive, in samples; before that it stood."""
+MARKS = 4
+"""Keyframes beside one jump."""
 AT_ONCE = 30
 """Of so many keyframes those before them are said at once, the newest first."""
 
@@ -36,6 +39,8 @@ class KeyframeSelector:
     def __init__(self) -> None:
         self._coarse: deque[tuple[int, Keyframe]] = deque(maxlen=RECENT_S)
         """Keyframes with no finer ones before, and the one before each; older ones are thinned."""
+        self._beside: deque[int] = deque(maxlen=MARKS)
+        """Keyframes beside jumps."""
         self._segment = 0
         self._segment_start: int | None = None
         self._last: Keyframe | None = None
@@ -77,7 +82,19 @@ class KeyframeSelector:
         """
         found = self.next(track, is_doubted)
         finer = self.finer(track) if is_odd else []
-        return [*finer, *([found] if found else [])]
+        return [*finer, *self._beside_jumps(track), *([found] if found else [])]
+
+    def _beside_jumps(self, track: Track) -> list[Keyframe]:
+        """Those beside the last jump of our wheels, as far as they were not made yet."""
+        jump = jumps.feared(track)
+        out = []
+        for n in jump.beside(track) if jump else ():
+            is_new = n not in self._beside and (self._last is None or n != self._last.n)
+            if is_new and track.covers(n, track.end - 1):
+                x, y, theta = (int(v) for v in track.steps(n, 1)[0])
+                out.append(Keyframe(n, self._segment, x, y, theta))
+                self._beside.append(n)
+        return out
 
     def finer(self, track: Track) -> list[Keyframe]:
         """Some that lie between those that were made, and were not made yet."""

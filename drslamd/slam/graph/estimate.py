@@ -58,6 +58,10 @@ LEAST_SCALE = 0.01
 """Floors and loads change wheels by so much, whatever was learned."""
 
 
+PATIENCE = 3
+"""Solutions in a row that did not converge: the first ones of a large team may need as many."""
+
+
 class Learned(NamedTuple):
     """A constant of a sensor, and its sigma, all that is known counted (infinite: nothing is)."""
 
@@ -123,6 +127,7 @@ class TeamEstimate:
         mirrored: robots whose odometry is the mirror image of their way (`mirror_images`), and what
             is the variance of the heading of its end.
         is_as_modelled: was it explained with odometry as it is configured, and sight that was free?
+        in_vain: how many solutions in a row did not converge, this one the last.
         kept: what the solver keeps of it for the next one.
     """
 
@@ -159,7 +164,13 @@ class TeamEstimate:
     points: frozenset[int] = frozenset()
     mirrored: dict[int, float] = field(default_factory=dict)
     is_as_modelled: bool = True
+    in_vain: int = 0
     kept: object = field(default=None, repr=False, compare=False)
+
+    @property
+    def leads_nowhere(self) -> bool:
+        """Should one begin anew as well, as a newcomer does?"""
+        return self.in_vain > 0 and self.in_vain % PATIENCE == 0
 
     @property
     def is_final(self) -> bool:

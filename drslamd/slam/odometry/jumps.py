@@ -19,6 +19,8 @@ from drslamd.slam.se2 import Array
 JUMP_MPS = 0.35
 """Within two tenths of a second: 1.7 m/s^2 is what robots are driven with, a wheel that sticks at
 walking pace makes twice that."""
+AT_ONCE = 2
+"""Samples."""
 STILL_MPS, STILL_RADPS = 0.05, 0.1
 """Wheels that stand; once they turn again they count again."""
 FEARED = 10 * GRID_HZ
@@ -33,13 +35,20 @@ class Jump(NamedTuple):
     """The last one.
 
     Attributes:
-        n: sample of the track at which it began.
+        n: sample of the track at which it began; until: at which it was over, or the last one.
         way: (2,) by how much farther the wheels went since than at the speed before, m along the
             axes of odometry.
     """
 
     n: int
     way: Array
+    until: int
+
+    def beside(self, track: Track) -> list[int]:
+        """Samples between which wheels changed their speed at once: two of its beginning, and two
+        of its end."""
+        ends = [n for n in (self.n, self.until) if n + AT_ONCE < track.end]
+        return [n + after for n in ends for after in (0, AT_ONCE)]
 
 
 def feared(track: Track) -> Jump | None:
@@ -57,11 +66,11 @@ def feared(track: Track) -> Jump | None:
         return None
     turning = np.abs(np.diff(poses[:, 2])) * GRID_HZ
     is_still = (np.abs(speed) < STILL_MPS) & (turning < STILL_RADPS)
-    over, begun = _over(jumps, speed, is_still)
+    over, begun, end = _over(jumps, speed, is_still)
     if len(speed) - begun > FEARED:
         return None
     way = (over[begun:, None] * axis[begun:]).sum(axis=0) / GRID_HZ
-    return Jump(first + begun, way)
+    return Jump(first + begun, way, first + end)
 
 
 def _jumps(speed: Array) -> list[int]:
@@ -76,8 +85,9 @@ def _jumps(speed: Array) -> list[int]:
     ]
 
 
-def _over(jumps: list[int], speed: Array, is_still: NDArray[np.bool_]) -> tuple[Array, int]:
-    """(k,) m/s that wheels go faster than before the last jump that counts, and when it began."""
+def _over(jumps: list[int], speed: Array, is_still: NDArray[np.bool_]) -> tuple[Array, int, int]:
+    """(k,) m/s that wheels go faster than before the last jump that counts, and the steps before
+    which it began and ended."""
     over, begun, end = np.zeros(len(speed)), jumps[0], 0
     by = [float(speed[min(at + 1, len(speed) - 1)] - speed[at - 1]) for at in jumps]
     for k, at in enumerate(jumps):
@@ -89,7 +99,7 @@ def _over(jumps: list[int], speed: Array, is_still: NDArray[np.bool_]) -> tuple[
             ends = after + np.flatnonzero(~is_still[after:])
         else:
             ends = np.array([j for j, b in zip(jumps, by, strict=True) if j > at and b * by[k] < 0])
-        begun, end = at, min([*ends[:1].tolist(), at + FEARED])
+        begun, end = at, min([*ends[:1].tolist(), at + FEARED, len(speed)])
         over[:] = 0.0
         over[at:end] = by[k]
-    return over, begun
+    return over, begun, end

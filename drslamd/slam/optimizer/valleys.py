@@ -2,7 +2,8 @@
 
 Whose heading is wrong by half a turn drives as it did if its way counts backwards: ranges tell one
 from the other no better than the prior of the scale does. Two groups that only a standing point or
-a few ranges join may be put together so.
+a few ranges join may be put together so. Where a valley leads nowhere again and again, another is
+looked for as well.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ def other_starts(
     Args:
         found: a solution; previous: what it began with.
     """
-    if not found.is_explained and previous is not None:
+    if previous is not None and previous.leads_nowhere and not found.converged:
+        yield None
+    elif not found.is_explained and previous is not None:
         second = int(found.trajectories[found.frame.robot].n[-1]) // GRID_HZ
         period = 1 + sum(len(path.n) for path in found.trajectories.values()) // POSES
         if previous.is_explained or second % period == 0:

@@ -112,7 +112,7 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
     common = _in_common(equations, nominal, check, most, tolerance)
     if common is not None and not check.scores.ask():
         return _commonly(equations, common)
-    if common is None and not fits:
+    if common is None and (not fits or lapse_search.is_asked_for(equations.problem)):
         lapse = _by_lapse(equations, nominal, most, tolerance)
         if lapse is not None:
             return lapse

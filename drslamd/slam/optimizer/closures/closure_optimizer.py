@@ -51,7 +51,11 @@ class ClosureOptimizer:
         chains = [
             graph.view.chains[robot].chain for robot in sorted({s.robot for s in group.members})
         ]
-        is_known = previous and {c.robot for c in chains} <= set(previous.trajectories)
+        is_known = (
+            previous
+            and not previous.leads_nowhere
+            and {c.robot for c in chains} <= set(previous.trajectories)
+        )
         edges, is_closure = closure_edges(graph, places)
         problem = _ClosureProblem(
             places=places,

@@ -24,6 +24,7 @@ ROUND, ROUGH = 8, 1e-3
 """Steps, and m and rad, after which it is seen which are worth more."""
 LITTLE, MOST_POLISHED = 10.0, 3
 """What gains less by then is not gone on with, and so many are."""
+ABRUPT = 15.0
 BEHIND = 10
 """Links by which a stretch may have ended before something did not fit: ranges show it once the
 robot has driven some metres."""
@@ -42,6 +43,7 @@ class Tried:
     equations: Equations
     point: Point
     gain: float
+    is_abrupt: bool
 
 
 def best(equations: Equations, nominal: Point, most: int, tolerance: float) -> Tried | None:
@@ -51,13 +53,7 @@ def best(equations: Equations, nominal: Point, most: int, tolerance: float) -> T
     Args:
         most, tolerance: of that solution, see `descend`.
     """
-    problem = equations.problem
-    taken = [links for freed in problem.freed for links in freed.links.tolist()]
-    rough = [
-        _roughly(equations, nominal, freed)
-        for freed in likely_stretches(problem)
-        if _is_recent(problem, freed) and not np.isin(freed.links[1:-1], taken).any()
-    ]
+    rough = [_roughly(equations, nominal, freed) for freed in _possible(equations.problem)]
     rough.sort(key=lambda one: -one.gain)
     tried = [
         _polished(equations, nominal, one, most, tolerance)
@@ -69,6 +65,21 @@ def best(equations: Equations, nominal: Point, most: int, tolerance: float) -> T
         return None
     others = [one.gain for one in tried if one.robot != found.robot]
     return found if max(others, default=0.0) < found.gain - RIVAL else None
+
+
+def is_asked_for(problem: Problem) -> bool:
+    """Did wheels stand, or go faster, all at once? Then it is asked though all fits."""
+    return any(freed.is_abrupt for freed in _possible(problem))
+
+
+def _possible(problem: Problem) -> list[Freed]:
+    """Recent stretches that are not freed yet."""
+    taken = [links for freed in problem.freed for links in freed.links.tolist()]
+    return [
+        freed
+        for freed in likely_stretches(problem)
+        if _is_recent(problem, freed) and not np.isin(freed.links[1:-1], taken).any()
+    ]
 
 
 def _is_recent(problem: Problem, freed: Freed) -> bool:
@@ -87,7 +98,7 @@ def _roughly(equations: Equations, nominal: Point, freed: Freed) -> Tried:
     wider = Equations(problem, like=equations)
     point = descend(wider, nominal.calibration, ROUND, ROUGH)
     near = Equations(replace(problem, initial=point.poses), like=wider)
-    return Tried(freed.robot, near, point, _gain(equations, nominal, problem, point))
+    return Tried(freed.robot, near, point, _gain(equations, nominal, problem, point) + ABRUPT * freed.is_abrupt, freed.is_abrupt)
 
 
 def _polished(
@@ -95,7 +106,7 @@ def _polished(
 ) -> Tried:
     point = descend(rough.equations, rough.point.calibration, most, tolerance)
     freed, point = settled(rough.equations, point, most, tolerance)
-    return Tried(rough.robot, freed, point, _gain(equations, nominal, freed.problem, point))
+    return Tried(rough.robot, freed, point, _gain(equations, nominal, freed.problem, point) + ABRUPT * rough.is_abrupt, rough.is_abrupt)
 
 
 def _gain(equations: Equations, nominal: Point, freed: Problem, better: Point) -> float:

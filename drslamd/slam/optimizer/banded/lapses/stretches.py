@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.conventions import GRID_HZ
+from drslamd.slam.odometry.jumps import AT_ONCE, JUMP_MPS
 from drslamd.slam.optimizer.problem import Freed, OdometryFactors, Problem
 from drslamd.slam.se2 import Array, Index
 
@@ -26,6 +27,8 @@ LEAST_MPS, MOST_RADPS = 0.2, 0.5
 """A robot whose wheels do not count may drive as fast as it usually does, or so fast, and turn."""
 UNKNOWN_M = 100.0
 """Sigma of a range that says nothing."""
+SHARE = 0.7
+"""Of a jump: links beside it are longer."""
 MOST_TRIED = 4
 """Stretches of each robot, the latest ones."""
 
@@ -56,11 +59,26 @@ def _of_robot(problem: Problem, robot: int, mine: Index) -> list[Freed]:
     ]
     is_fast = speed > FASTER * _usual_speed(speed)
     spun = [(first, last, False) for first, last in _stretches(is_fast, until, APART_S)]
+    jumps = _jumps(speed, seconds)
     # each began and ended somewhere in the links beside
-    return [
-        freed_links(problem, robot, mine[max(first - 1, 0) : last + 2], is_still)
+    spans = [
+        (slice(max(first - 1, 0), last + 2), is_still)
         for first, last, is_still in sorted(stood + spun)[-MOST_TRIED:]
     ]
+    return [
+        replace(
+            freed_links(problem, robot, mine[span], is_still), is_abrupt=bool(jumps[span].any())
+        )
+        for span, is_still in spans
+    ]
+
+
+def _jumps(speed: Array, seconds: Array) -> NDArray[np.bool_]:
+    """(k,) links in which wheels change their speed at once."""
+    out = np.zeros(len(speed), dtype=bool)
+    is_short = seconds[1:-1] <= (AT_ONCE + 0.5) / GRID_HZ
+    out[1:-1] = is_short & (np.abs(speed[2:] - speed[:-2]) > SHARE * JUMP_MPS)
+    return out
 
 
 def _seconds(problem: Problem, links: Index) -> Array:
