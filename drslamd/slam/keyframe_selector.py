@@ -5,11 +5,15 @@ also of the way that it drove before. For module 3 makes other turns of a link t
 link does not say when it was turned within it: where all turns are twice or two thirds of what they
 seem, a second's way ends 9 mm aside, which is more than the noise of odometry. Half a second has an
 eighth of that.
+
+Where its wheels change their speed at once there are two beside that, so that everybody sees it: a
+robot has mass, and may have done something else (`odometry.jumps`).
 """
 
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,8 +31,8 @@ FINER = 5
 """Samples between finer keyframes."""
 DRIVEN = 2 * 10
 """So long before a keyframe its robot may have begun to drive, in samples; before that it stood."""
-MARKS = 4
-"""Keyframes beside one jump."""
+LATELY = 64
+"""Keyframes, of more than the ten seconds for which a jump is feared."""
 AT_ONCE = 30
 """Of so many keyframes those before them are said at once, the newest first."""
 
@@ -39,8 +43,8 @@ class KeyframeSelector:
     def __init__(self) -> None:
         self._coarse: deque[tuple[int, Keyframe]] = deque(maxlen=RECENT_S)
         """Keyframes with no finer ones before, and the one before each; older ones are thinned."""
-        self._beside: deque[int] = deque(maxlen=MARKS)
-        """Keyframes beside jumps."""
+        self._lately: deque[int] = deque(maxlen=LATELY)
+        """Samples that are keyframes."""
         self._segment = 0
         self._segment_start: int | None = None
         self._last: Keyframe | None = None
@@ -61,17 +65,18 @@ class KeyframeSelector:
         # the frame of a segment begins where its odometry does: what is driven until the first look
         # is a link like any other, with its noise and with whatever is learned of the wheels
         n = track.end - 1 if self._last is not None else max(track.n0, track.segment_start)
-        x, y, theta = (int(v) for v in track.steps(n, 1)[0])
+        made = self._of(track, n)
         if self._last is not None:
             last = self._last
-            moved = np.array([x - last.x, y - last.y, theta - last.theta]) * RESOLUTION
+            moved = np.array([made.x - last.x, made.y - last.y, made.theta - last.theta])
+            moved = moved * RESOLUTION
             is_still = np.hypot(moved[0], moved[1]) < KEYFRAME_M and abs(moved[2]) < KEYFRAME_RAD
             if is_still and (n == last.n or not is_doubted):
                 return None
-        made = Keyframe(n, self._segment, x, y, theta)
         if self._last is not None:
             self._coarse.append((self._last.n, made))
         self._last = made
+        self._lately.append(n)
         return made
 
     def made(self, track: Track, is_doubted: bool = False, is_odd: bool = False) -> list[Keyframe]:
@@ -81,20 +86,19 @@ class KeyframeSelector:
             is_doubted: see `next`; is_odd: and finer ones, because turns are not what they seem?
         """
         found = self.next(track, is_doubted)
-        finer = self.finer(track) if is_odd else []
-        return [*finer, *self._beside_jumps(track), *([found] if found else [])]
+        between = [*(self.finer(track) if is_odd else []), *self._beside_jumps(track)]
+        self._lately.extend(made.n for made in between)
+        return [*between, *([found] if found else [])]
 
     def _beside_jumps(self, track: Track) -> list[Keyframe]:
-        """Those beside the last jump of our wheels, as far as they were not made yet."""
+        """Those beside the last jump of our wheels."""
         jump = jumps.feared(track)
-        out = []
-        for n in jump.beside(track) if jump else ():
-            is_new = n not in self._beside and (self._last is None or n != self._last.n)
-            if is_new and track.covers(n, track.end - 1):
-                x, y, theta = (int(v) for v in track.steps(n, 1)[0])
-                out.append(Keyframe(n, self._segment, x, y, theta))
-                self._beside.append(n)
-        return out
+        beside = jump.beside(track) if jump else []
+        return [self._of(track, n) for n in beside if n not in self._lately]
+
+    def _of(self, track: Track, n: int) -> Keyframe:
+        x, y, theta = (int(v) for v in track.steps(n, 1)[0])
+        return Keyframe(n, self._segment, x, y, theta)
 
     def finer(self, track: Track) -> list[Keyframe]:
         """Some that lie between those that were made, and were not made yet."""
@@ -102,7 +106,6 @@ class KeyframeSelector:
         for _ in range(min(AT_ONCE, len(self._coarse))):
             before, made = self._coarse.pop()
             for n in range(made.n - FINER, max(before, made.n - DRIVEN), -FINER):
-                if track.covers(n, made.n):
-                    x, y, theta = (int(v) for v in track.steps(n, 1)[0])
-                    out.append(Keyframe(n, made.segment, x, y, theta))
+                if track.covers(n, made.n) and n not in self._lately:
+                    out.append(replace(self._of(track, n), segment=made.segment))
         return out

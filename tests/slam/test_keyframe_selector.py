@@ -113,12 +113,12 @@ def test_who_turns_otherwise_has_some_between_also_of_the_way_until_then() -> No
     """Two seconds as ever, one after it is known; what was said is not said again."""
     robot = Driven()
     for n in range(101, 131):
-        robot.to(n, 100 * n, 7 * n, n)
+        robot.to(n, 100 * (n - 100) + 5, 7 * (n - 101), n - 97)
         if n in (110, 120):
             assert robot.next() is not None
     found = robot.selector.made(robot.track, is_odd=True)
     assert [k.n for k in found] == [125, 115, 105, 130]
-    assert found[0] == Keyframe(125, 0, 12500, 875, 125)
+    assert found[0] == Keyframe(125, 0, 2505, 168, 28)
     assert robot.selector.made(robot.track, is_odd=True) == []
     robot.to(140, 0, 0, 0)
     assert [k.n for k in robot.selector.made(robot.track)] == [140]
@@ -150,3 +150,35 @@ def test_a_long_way_is_said_piece_by_piece_the_newest_first() -> None:
     first = [k.n for k in robot.selector.finer(robot.track)]
     assert first == [last - 5 - 10 * k for k in range(AT_ONCE)]
     assert [k.n for k in robot.selector.finer(robot.track)] == [145, 135, 125, 115, 105]
+
+
+def stopping(robot: Driven, speed: int) -> None:
+    """It drives on for two seconds, so many steps in each tenth, and stands for two."""
+    for n in range(101, 141):
+        robot.to(n, 5 + speed * min(n - 100, 20), -7, 3)
+        if n % 10 == 0:
+            robot.next()
+
+
+def test_where_wheels_stop_at_once_a_keyframe_lies_on_either_side_and_is_said_once() -> None:
+    """0.6 m/s; sample 100 was the first, so that it begins at that speed."""
+    robot = Driven()
+    stopping(robot, 600)
+    found = robot.selector.made(robot.track)
+    assert found == [Keyframe(n, 0, 5 + 600 * min(n - 100, 20), -7, 3) for n in (119, 121)]
+    assert robot.selector.made(robot.track) == []
+
+
+def test_what_lies_beside_a_jump_and_is_a_keyframe_already_is_not_said_again() -> None:
+    robot = Driven()
+    for n in range(101, 141):
+        robot.to(n, 5 + 600 * min(n - 100, 20), -7, 3)
+        if n in (110, 119, 121):
+            assert robot.next() is not None
+    assert robot.selector.made(robot.track) == []
+
+
+def test_a_robot_that_stops_as_robots_do_makes_no_more_keyframes() -> None:
+    robot = Driven()
+    stopping(robot, 300)
+    assert robot.selector.made(robot.track) == []

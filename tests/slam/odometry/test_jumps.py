@@ -103,3 +103,26 @@ def test_what_was_before_a_hole_is_another_story() -> None:
     for k in range(10):
         track.append(track.end + 5 * (k == 0), last)
     assert feared(track) is None
+
+
+def test_samples_beside_a_jump_have_its_whole_change_between_them() -> None:
+    """Wheels stop between samples 100 and 101, and go on between 150 and 151."""
+    stood = [*steady(0.5, 10), *steady(0.0, 5)]
+    track = driven(*stood)
+    jump = feared(track)
+    assert jump is not None
+    begin = [n - FIRST for n in jump.beside(track)]
+    assert begin == [99, 101]
+    track = driven(*stood, *steady(0.5, 2))
+    jump = feared(track)
+    assert jump is not None
+    assert [n - FIRST for n in jump.beside(track)] == [*begin, 150, 152]
+
+
+@pytest.mark.parametrize(("more", "count"), [(0, 2), (1, 4)])
+def test_the_end_of_a_jump_is_marked_once_it_is_over(more: int, count: int) -> None:
+    stood = [*steady(0.5, 10), *steady(0.0, 5)]
+    track = driven(*stood, *[0.5] * more, 0.5)
+    jump = feared(track)
+    assert jump is not None
+    assert len(jump.beside(track)) == count

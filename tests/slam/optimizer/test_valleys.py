@@ -82,6 +82,42 @@ def test_what_nothing_explains_is_begun_at_the_closures_once_more(
     assert starts == [0.0]
 
 
+@pytest.mark.parametrize(
+    ("in_vain", "converged", "starts"),
+    [(2, False, []), (3, False, [None]), (3, True, []), (4, False, []), (6, False, [None])],
+)
+def test_where_a_valley_leads_nowhere_again_and_again_another_is_looked_for_as_well(
+    in_vain: int, converged: bool, starts: list[None], right: TeamEstimate
+) -> None:
+    found, before = replace(right, converged=converged), replace(right, in_vain=in_vain)
+    assert list(other_starts(found, before)) == starts
+
+
+def test_a_valley_that_leads_nowhere_is_stayed_in_where_no_other_costs_less(
+    team: SmallTeam, right: TeamEstimate
+) -> None:
+    for cost, is_left in ((right.cost - 1.0, False), (right.cost + 1.0, True)):
+
+        def solve(
+            problem: TeamProblem,
+            last: tuple[int, ...],
+            tolerance: float,
+            kept: object,
+            cost: float = cost,
+        ) -> tuple[Solution, object]:
+            """Whoever begins with the last solution's scale comes to no end, at that cost."""
+            solution, kept = banded_optimizer.anew(problem, last, tolerance, kept)
+            if problem.start.scale[1] != 0.25:
+                return solution, kept
+            return replace(solution, cost=cost, converged=False), kept
+
+        numbers = replace(BANDED, solve=solve)
+        astray = {**right.scale, 1: Learned(0.25, 0.1)}
+        before = replace(right, scale=astray, in_vain=3, converged=False, kept=None)
+        found = numbers.job(team.graph, group_of(team.graph), before, {})()
+        assert (found.cost != cost) is is_left
+
+
 def test_where_that_is_not_explained_either_the_lower_cost_counts(right: TeamEstimate) -> None:
     known, unknown = replace(right, cost=9.0), replace(right, cost=5.0, is_explained=False)
     assert is_better(known, unknown)

@@ -16,6 +16,7 @@ import numpy as np
 from drslamd.slam import se2
 from drslamd.slam.optimizer.banded import banded_solver, claims, mountings
 from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem
+from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.misfit import lately_wrong
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.pairs import narrowing
@@ -57,7 +58,8 @@ def solve(
         tolerance: see `newton_descent.TOLERANCE`.
         kept: what came of the solution before.
     """
-    if team.is_near and len(team.problem.n) >= FEW:
+    is_kept = len(team.problem.n) >= FEW and not lapse_search.is_asked_for(team.problem)
+    if team.is_near and is_kept:
         for before in (kept, None) if isinstance(kept, Kept) else (None,):
             found = _solved(team, last, tolerance, before)
             if found is not None:

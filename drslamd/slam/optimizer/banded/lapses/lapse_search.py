@@ -3,7 +3,8 @@
 Two robots alone only know of each other how far they are apart: what one of them may have done in a
 stretch explains much of what the other did in another one. So only what came to an end not long
 before all still was as modelled is looked at, and where a stretch of another robot explains nearly
-as much nobody can say who it was.
+as much nobody can say who it was. But a robot has mass: wheels that stopped or went faster all at
+once say more than those that did so as robots do.
 """
 
 from __future__ import annotations
@@ -14,7 +15,12 @@ import numpy as np
 
 from drslamd.slam.optimizer.banded.lapses.known_lapses import GAIN, settled
 from drslamd.slam.optimizer.banded.lapses.placements import RIVAL
-from drslamd.slam.optimizer.banded.lapses.stretches import likely_stretches, span, with_freed
+from drslamd.slam.optimizer.banded.lapses.stretches import (
+    has_short_links,
+    likely_stretches,
+    span,
+    with_freed,
+)
 from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
@@ -25,6 +31,11 @@ ROUND, ROUGH = 8, 1e-3
 LITTLE, MOST_POLISHED = 10.0, 3
 """What gains less by then is not gone on with, and so many are."""
 ABRUPT = 15.0
+"""Of cost, for a stretch in which wheels changed their speed at once. Of the drives of robots that
+speed up as motors do none has that, of counters that stick or spin for some seconds most have."""
+MOST_PAIRS = 45
+"""That have met, ten robots: a stretch takes some solutions, and larger teams ask only once
+something does not fit."""
 BEHIND = 10
 """Links by which a stretch may have ended before something did not fit: ranges show it once the
 robot has driven some metres."""
@@ -37,13 +48,19 @@ class Tried:
     Attributes:
         robot: whose it is, as the problem numbers them.
         gain: by how much the cost fell.
+        is_abrupt: see `Freed`.
     """
 
     robot: int
     equations: Equations
     point: Point
     gain: float
-    is_abrupt: bool
+    is_abrupt: bool = False
+
+    @property
+    def worth(self) -> float:
+        """What speaks for it."""
+        return self.gain + (ABRUPT if self.is_abrupt else 0.0)
 
 
 def best(equations: Equations, nominal: Point, most: int, tolerance: float) -> Tried | None:
@@ -54,21 +71,23 @@ def best(equations: Equations, nominal: Point, most: int, tolerance: float) -> T
         most, tolerance: of that solution, see `descend`.
     """
     rough = [_roughly(equations, nominal, freed) for freed in _possible(equations.problem)]
-    rough.sort(key=lambda one: -one.gain)
+    rough.sort(key=lambda one: -one.worth)
     tried = [
         _polished(equations, nominal, one, most, tolerance)
         for one in rough[:MOST_POLISHED]
-        if one.gain >= LITTLE
+        if one.worth >= LITTLE
     ]
-    found = max(tried, key=lambda one: one.gain, default=None)
-    if found is None or found.gain < GAIN:
+    found = max(tried, key=lambda one: one.worth, default=None)
+    if found is None or found.worth < GAIN:
         return None
-    others = [one.gain for one in tried if one.robot != found.robot]
-    return found if max(others, default=0.0) < found.gain - RIVAL else None
+    others = [one.worth for one in tried if one.robot != found.robot]
+    return found if max(others, default=0.0) < found.worth - RIVAL else None
 
 
 def is_asked_for(problem: Problem) -> bool:
-    """Did wheels stand, or go faster, all at once? Then it is asked though all fits."""
+    """Did wheels stop, or go faster, all at once of late? Then it is asked though all fits."""
+    if problem.pairs > MOST_PAIRS or not has_short_links(problem):
+        return False
     return any(freed.is_abrupt for freed in _possible(problem))
 
 
@@ -98,7 +117,9 @@ def _roughly(equations: Equations, nominal: Point, freed: Freed) -> Tried:
     wider = Equations(problem, like=equations)
     point = descend(wider, nominal.calibration, ROUND, ROUGH)
     near = Equations(replace(problem, initial=point.poses), like=wider)
-    return Tried(freed.robot, near, point, _gain(equations, nominal, problem, point) + ABRUPT * freed.is_abrupt, freed.is_abrupt)
+    return Tried(
+        freed.robot, near, point, _gain(equations, nominal, problem, point), freed.is_abrupt
+    )
 
 
 def _polished(
@@ -106,7 +127,9 @@ def _polished(
 ) -> Tried:
     point = descend(rough.equations, rough.point.calibration, most, tolerance)
     freed, point = settled(rough.equations, point, most, tolerance)
-    return Tried(rough.robot, freed, point, _gain(equations, nominal, freed.problem, point) + ABRUPT * rough.is_abrupt, rough.is_abrupt)
+    return Tried(
+        rough.robot, freed, point, _gain(equations, nominal, freed.problem, point), rough.is_abrupt
+    )
 
 
 def _gain(equations: Equations, nominal: Point, freed: Problem, better: Point) -> float:

@@ -27,8 +27,10 @@ LEAST_MPS, MOST_RADPS = 0.2, 0.5
 """A robot whose wheels do not count may drive as fast as it usually does, or so fast, and turn."""
 UNKNOWN_M = 100.0
 """Sigma of a range that says nothing."""
+SHORT_S = (AT_ONCE + 0.5) / GRID_HZ
+"""A link that is made because wheels changed their speed at once, ..."""
 SHARE = 0.7
-"""Of a jump: links beside it are longer."""
+"""... if those beside it show that, which are longer, by so much of a jump."""
 MOST_TRIED = 4
 """Stretches of each robot, the latest ones."""
 
@@ -73,10 +75,16 @@ def _of_robot(problem: Problem, robot: int, mine: Index) -> list[Freed]:
     ]
 
 
+def has_short_links(problem: Problem) -> bool:
+    """May there be a jump of wheels?"""
+    odometry = problem.odometry
+    return bool((problem.n[odometry.j] - problem.n[odometry.i] <= SHORT_S * GRID_HZ).any())
+
+
 def _jumps(speed: Array, seconds: Array) -> NDArray[np.bool_]:
     """(k,) links in which wheels change their speed at once."""
     out = np.zeros(len(speed), dtype=bool)
-    is_short = seconds[1:-1] <= (AT_ONCE + 0.5) / GRID_HZ
+    is_short = seconds[1:-1] <= SHORT_S
     out[1:-1] = is_short & (np.abs(speed[2:] - speed[:-2]) > SHARE * JUMP_MPS)
     return out
 

@@ -12,7 +12,13 @@ from slam_problems import links_of, mismeasured, slipping, stuck
 from drslamd.slam.graph.estimate import Lapse
 from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.lapses.known_lapses import GAIN, lapse_of
-from drslamd.slam.optimizer.banded.lapses.lapse_search import BEHIND, Tried, best
+from drslamd.slam.optimizer.banded.lapses.lapse_search import (
+    ABRUPT,
+    BEHIND,
+    Tried,
+    best,
+    is_asked_for,
+)
 from drslamd.slam.optimizer.banded.lapses.placements import RIVAL
 from drslamd.slam.optimizer.banded.lapses.stretches import likely_stretches
 from drslamd.slam.optimizer.banded.newton_descent import TOLERANCE
@@ -124,3 +130,69 @@ def test_a_stretch_behind_which_all_was_as_modelled_for_long_is_no_reason(
     problem = slipping(a_team(7)[0], 1, *FAULT)
     fitted = np.array([1e9, FROM_TO[1] + 10 * links, 1e9])
     assert (tried(replace(problem, fitted=fitted)) is not None) is is_tried
+
+
+def given_stretches(monkeypatch: pytest.MonkeyPatch, *abrupt: bool) -> Problem:
+    """Robots 0, 1 and so on have one each, of which some are abrupt."""
+    problem = slipping(a_team(7)[0], 1, *FAULT)
+    (freed,) = likely_stretches(problem)
+    each = [replace(freed, robot=robot, is_abrupt=a) for robot, a in enumerate(abrupt)]
+    monkeypatch.setattr(lapse_search, "likely_stretches", lambda _: each)
+    return problem
+
+
+@pytest.mark.parametrize(("less", "named"), [(-1.0, None), (1.0, 1)])
+def test_an_abrupt_stretch_is_preferred_to_one_that_explains_a_little_more(
+    less: float, named: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = given_stretches(monkeypatch, False, True)
+    polished = lapse_search._polished
+
+    def gaining(*args: object) -> Tried:
+        answer = polished(*args)  # type: ignore[arg-type]
+        return replace(answer, gain=100.0 if answer.robot else 100.0 + ABRUPT - RIVAL - less)
+
+    monkeypatch.setattr(lapse_search, "_polished", gaining)
+    answer = tried(problem)
+    assert (answer.robot if answer else None) == named
+
+
+@pytest.mark.parametrize("more", [-1.0, 1.0])
+@pytest.mark.parametrize("is_abrupt", [False, True])
+def test_an_abrupt_stretch_need_not_explain_as_much(
+    is_abrupt: bool, more: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = given_stretches(monkeypatch, is_abrupt)
+    gain = GAIN + more - ABRUPT * is_abrupt
+    polished = lapse_search._polished
+    monkeypatch.setattr(
+        lapse_search,
+        "_polished",
+        lambda *args: replace(polished(*args), gain=gain),
+    )
+    assert (tried(problem) is not None) is (more > 0)
+
+
+@pytest.mark.parametrize(
+    ("abrupt", "samples", "pairs", "is_asked"),
+    [(1, 2, 45, 1), (0, 2, 45, 0), (1, 3, 45, 0), (1, 2, 46, 0)],
+)
+def test_a_small_team_asks_for_abrupt_stretches_though_all_fits(
+    abrupt: int, samples: int, pairs: int, is_asked: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = given_stretches(monkeypatch, bool(abrupt))
+    n = problem.n.copy()
+    (link,) = links_of(problem, 1, 20, 21)
+    n[problem.odometry.j[link]] = n[problem.odometry.i[link]] + samples
+    assert is_asked_for(replace(problem, n=n, pairs=pairs)) is bool(is_asked)
+
+
+def test_an_abrupt_stretch_that_is_freed_or_long_ago_is_not_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(lapse_search, "has_short_links", lambda _: True)
+    problem = given_stretches(monkeypatch, False, True)
+    assert is_asked_for(problem)
+    freed = lapse_search.likely_stretches(problem)[1]
+    assert not is_asked_for(replace(problem, freed=(freed,)))
+    assert not is_asked_for(replace(problem, fitted=problem.n.max() + np.zeros(3)))

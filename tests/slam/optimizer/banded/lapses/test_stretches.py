@@ -10,13 +10,16 @@ import pytest
 from lapse_scenes import COUNT, ROBOTS, STEP_M, a_team, driven
 from slam_problems import links_of
 
+from drslamd.slam.odometry.jumps import JUMP_MPS
 from drslamd.slam.optimizer.banded.lapses.stretches import (
     APART_S,
     FASTER,
     LEAST_MPS,
     MOST_RADPS,
     MOST_TRIED,
+    SHARE,
     UNKNOWN_M,
+    has_short_links,
     likely_stretches,
     under,
     with_freed,
@@ -92,6 +95,32 @@ def test_of_many_stretches_the_latest_are_looked_at() -> None:
     ways = dict.fromkeys(range(1, 41, 8), 0.8)
     assert [first for first, _, _ in found(driven(ways))] == [8, 16, 24, 32]
     assert MOST_TRIED == 4
+
+
+@pytest.mark.parametrize(
+    ("samples", "speed_mps", "is_abrupt"),
+    [(2, 0.26, True), (2, 0.23, False), (3, 0.26, False), (2, -0.26, True)],
+)
+@pytest.mark.parametrize("is_end", [False, True])
+def test_a_stretch_is_abrupt_where_a_short_link_leads_to_another_speed(
+    samples: int, speed_mps: float, is_abrupt: bool, is_end: bool
+) -> None:
+    """Robot 1 stands in seconds 10 to 12 but for the first or the last samples of that, before or
+    behind which it drives at some speed."""
+    problem = driven(dict.fromkeys((10, 11, 12), 0.0))
+    n = problem.n.copy()
+    short, beside = (12, 13) if is_end else (10, 9)
+    (end,) = problem.odometry.j[links_of(problem, 1, short, short + 1)]
+    n[np.flatnonzero((problem.robot == 1) & (n >= n[end]))] -= 10 - samples
+    measured = problem.odometry.measured.copy()
+    measured[links_of(problem, 1, beside, beside + 1)] = [speed_mps, 0.0, 0.0]
+    odometry = replace(problem.odometry, measured=measured)
+    assert has_short_links(replace(problem, n=n)) is (samples == 2)
+    assert not has_short_links(problem)
+    (freed,) = likely_stretches(replace(problem, odometry=odometry, n=n))
+    assert freed.stands
+    assert freed.is_abrupt is is_abrupt
+    assert pytest.approx(0.245) == SHARE * JUMP_MPS
 
 
 def test_where_wheels_stand_a_robot_may_have_gone_anywhere_at_its_speed() -> None:
