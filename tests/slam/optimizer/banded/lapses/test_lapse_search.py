@@ -193,6 +193,6 @@ def test_an_abrupt_stretch_that_is_freed_or_long_ago_is_not_asked_for(
     monkeypatch.setattr(lapse_search, "has_short_links", lambda _: True)
     problem = given_stretches(monkeypatch, False, True)
     assert is_asked_for(problem)
-    freed = lapse_search.likely_stretches(problem)[1]
+    freed = lapse_search._possible(problem)[0]
     assert not is_asked_for(replace(problem, freed=(freed,)))
     assert not is_asked_for(replace(problem, fitted=problem.n.max() + np.zeros(3)))
