@@ -213,7 +213,7 @@ class BackEnd:
         """Module 3 has answered; what must be said of it."""
         before = self.estimate or self.onlooked
         in_vain = 0 if result.converged else 1 + (before.in_vain if before else 0)
-        result = replace(result, in_vain=in_vain)
+        result = replace(result, in_vain=in_vain) if in_vain else result
         own = result.trajectories.get(self._own.robot)
         if self._is_beside:
             self.estimate, self.onlooked = None, result

@@ -95,10 +95,11 @@ def test_who_is_contradicted_by_all_its_partners_names_them() -> None:
     assert (where.doubt.reason, where.doubt.peers) == (Reason.RANGES, (4,))
 
 
-@pytest.mark.parametrize(("level", "count"), [(1.0, 2), (MUCH_WORSE, 3)])
+@pytest.mark.parametrize(("level", "count"), [(1.0, 4), (MUCH_WORSE, 5)])
 def test_in_doubt_a_robot_that_seems_to_stand_makes_a_keyframe_a_second(
     level: float, count: int
 ) -> None:
+    """Two lie beside the moment in which it stopped, all at once."""
     scene = localised(level)
     scene.tick()
     for _ in range(2):

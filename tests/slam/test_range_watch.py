@@ -481,7 +481,7 @@ def jumped(
     scene: Scene, monkeypatch: pytest.MonkeyPatch, way: tuple[float, float] | None, n: int = 110
 ) -> float:
     """What is feared if our wheels went farther by such a way, along the axes of odometry."""
-    jump = None if way is None else Jump(n, np.array(way))
+    jump = None if way is None else Jump(n, np.array(way), n)
     monkeypatch.setattr(jumps, "feared", lambda track: jump)
     scene.look(solved())
     return scene.watch.gap_m
