@@ -27,9 +27,9 @@ fifteen teams all are confirmed after 12 to 44 s (median 20 s), and of forty wit
 backwards or count wrongly none is."""
 WRONG, CLEAR = 60.0, 30.0
 """By how much chi-squared must fall, over that of a degree of freedom, for the configuration to be
-wrong (so much as well, of as many windows as are ever asked, for it not to be believed), and by how
-much the next kind must be worse, for wheels that run backwards to be named. Of
-twenty-one such robots all are, after 20 to 48 s, and in eighty pairs without such wheels none."""
+wrong, and by how much the next kind must be worse, for wheels that run backwards to be named (so
+much as well, of as many windows as are ever asked, for it not to be believed). Of twenty-one such
+robots all are, after 20 to 48 s, and in eighty pairs without such wheels none."""
 BETTER, UNLIKE = 100.0, 40.0
 """Likewise for a track or a scale to begin with, and by how much all that is no track or scale of
 the same robot must be worse. Of eighteen robots that count wrongly all begin near the truth after

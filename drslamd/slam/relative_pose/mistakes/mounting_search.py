@@ -21,10 +21,10 @@ from drslamd.conventions import SECOND_US
 from drslamd.slam.relative_pose.estimate import PairNoise, Verdict
 from drslamd.slam.relative_pose.mistakes import what_if
 from drslamd.slam.relative_pose.mistakes.evidence import (
+    CLEAR,
     EXCLUDED,
     FITS,
     INDIFFERENT,
-    WRONG,
     against_backwards,
     against_configured,
     is_as_configured,
@@ -109,6 +109,8 @@ class MountingSearch:
         self._unlike: deque[float] = deque(maxlen=2)
         """Evidence of windows of late against a track and a scale as configured."""
         self._watched = 0
+        self._is_compared = False
+        """Were windows with the repair asked whether it is the best of its like?"""
 
     def on_verdict(self, verdict: Verdict) -> None:
         """Module 1 has answered, with what is known of the mountings."""
@@ -158,7 +160,8 @@ class MountingSearch:
         is_late = self._asked_at is None or utime - self._asked_at >= APART_US
         is_doubtful = self.poor >= MANY or awaits or self.is_provisional
         is_open = self.found is None and not self._is_final and is_doubtful
-        is_vague = self.found is not None and is_learned(self.found) and self.poor >= MANY
+        is_doubtful = self.poor >= MANY or not self._is_compared
+        is_vague = self.found is not None and is_learned(self.found) and is_doubtful
         return is_late and (is_open or is_vague)
 
     def _is_quickly_due(self, utime: int, awaits: bool) -> bool:
@@ -228,14 +231,14 @@ class MountingSearch:
         total = worth * np.mean([answer.costs for answer in self._answers], axis=0)
         freedom = worth * float(np.mean([answer.freedom for answer in self._answers]))
         if asked == MOST_ASKED:
-            is_other = total.min() <= min(total[0] - WRONG, FITS * freedom)
+            is_other = total.min() <= min(total[0] - CLEAR, FITS * freedom)
             is_backwards = least_of_backwards(total - total[0], True) < INDIFFERENT
             self._confirm(not (is_other or is_backwards))
         case, is_clear = winner(total, freedom)
         # whatever happens to a mounting that was right is something else
         if case is None or self._is_final:
             return False
-        self.found, self.is_clear = case, is_clear
+        self.found, self.is_clear, self._is_compared = case, is_clear, False
         self.is_confirmed, self.is_provisional = is_corrected(case), False
         # windows with the repair speak for themselves
         self._fits.clear()
@@ -257,7 +260,8 @@ class MountingSearch:
         self._worst = min(self._worst, found)
 
     def _refine(self, found: Case) -> bool:
-        """Windows with the repair disagree: is it a little more, or less?"""
+        """Is it a little more, or less, or another mistake of the same robots? The first windows
+        with the repair are asked, whose factors are coarse, and those that disagree."""
         total = np.sum([answer.costs for answer in self._answers], axis=0)
         if len(self._answers) < FEWEST_ASKED:
             return False
@@ -267,6 +271,10 @@ class MountingSearch:
             # not even what is allowed for explains it: it was something else
             self.found, self.is_clear, self.is_confirmed = None, False, False
             return True
+        is_better = self.poor >= MANY or total.min() <= total[0] - EXCLUDED
+        self._is_compared = True
+        if not is_better:
+            return False
         self.found = what_if.variants(found)[int(np.argmin(total))]
         self.is_clear = self.is_clear and self.found.kind == found.kind
         return self.found != found

@@ -27,6 +27,7 @@ from drslamd.slam.odometry.mounting import CURVES
 from drslamd.slam.relative_pose.estimate import Verdict
 from drslamd.slam.relative_pose.mistakes.evidence import (
     BETTER,
+    CLEAR,
     EXCLUDED,
     FITS,
     INDIFFERENT,
@@ -117,10 +118,10 @@ def test_who_is_the_same_in_a_mirror_for_long_is_believed_as_configured(
 @pytest.mark.parametrize(
     ("by", "fit", "confirms"),
     [
-        (WRONG + LITTLE, GOOD, False),
-        (WRONG - LITTLE, GOOD, True),
+        (CLEAR + LITTLE, GOOD, False),
+        (CLEAR - LITTLE, GOOD, True),
         # where nothing fits, as when sight is blocked, another track is better by chance
-        (WRONG + LITTLE, 2 * FITS * 30, True),
+        (CLEAR + LITTLE, 2 * FITS * 30, True),
     ],
 )
 def test_nor_is_that_believed_while_something_else_explains_what_it_does_not(
@@ -212,6 +213,29 @@ def test_a_mistake_is_refined_by_as_many_windows_as_found_it() -> None:
     assert not changed
     assert search.found == better
     assert search.is_confirmed
+
+
+@pytest.mark.parametrize(
+    ("better_by", "poor", "is_left"),
+    [
+        (EXCLUDED - LITTLE, 0, False),
+        (EXCLUDED + LITTLE, 0, True),
+        (LITTLE, MANY - 1, False),
+        (LITTLE, MANY, True),
+    ],
+)
+def test_the_first_windows_with_a_repair_must_clearly_prefer_another_unless_they_disagree(
+    better_by: float, poor: int, is_left: bool
+) -> None:
+    """Factors are coarse, and counts may be taken for a track though every window fits."""
+    search, better = begun(), variants(TRACK)[-1]
+    for _ in range(poor):
+        search.on_verdict(Verdict.POOR_FIT)
+    costs = of_variants(TRACK, better)
+    costs[0] = GOOD + better_by / FEWEST_ASKED
+    changed = [search.on_costs(costs, 33, True) for _ in range(FEWEST_ASKED)]
+    assert changed == [False, False, is_left]
+    assert search.found == (better if is_left else TRACK)
 
 
 @pytest.mark.parametrize("place", [3, -1])
@@ -542,13 +566,16 @@ def test_chance_spares_cases_only_once_a_window_has_confirmed_the_pair(
     ("found", "poor", "is_due"),
     [(TRACK, MANY, True), (TRACK, MANY - 1, False), (LEFT, MANY, False)],
 )
-def test_what_was_found_is_asked_about_again_only_where_it_can_be_refined_and_does_not_fit(
+def test_what_was_compared_is_asked_about_again_only_where_it_can_be_refined_and_does_not_fit(
     found: Case, poor: int, is_due: bool
 ) -> None:
     search = MountingSearch()
     for _ in range(FEWEST_ASKED):
         ask(search, {found: GOOD})
     assert search.found == found
+    for _ in range(FEWEST_ASKED if found == TRACK else 0):
+        assert search.is_due(0, False)
+        assert not search.on_costs(of_variants(found, found), 33, True)
     for _ in range(poor):
         search.on_verdict(Verdict.POOR_FIT)
     assert search.is_due(0, False) is is_due
