@@ -245,7 +245,7 @@ class RangeWatch:
         by_pose = np.concatenate([-u @ a.by_pose, u @ b.by_pose])
         bias = estimate.bias_m.get((min(pair), max(pair)), Learned())
         strong = estimate.near_bias_m.value * float(
-            self._model.near_range_shape(np.array(measured))
+            self._model.near_range_shape(np.array(distance))
         )
         variance = by_pose @ joint @ by_pose + u @ (a.added + b.added) @ u
         variance += self._sigma_m**2 + float(self._model.near_range_sigma(measured)) ** 2

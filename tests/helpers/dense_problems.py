@@ -86,8 +86,9 @@ def range_residuals(problem: Problem, x: Array) -> list[float]:
     for end, (k, q) in enumerate(zip((r.i, r.j), points, strict=True)):
         beside = rotated(c.antenna[r.robots[:, end]], r.turned[:, end])
         ends.append(poses[k, :2] + rotated(q + beside, poses[k, 2]))
-    near = c.near_bias[0] * np.exp(-r.measured / LINKTRACK.near_reach_m)
-    seen = np.hypot(*(ends[1] - ends[0]).T) + c.bias[r.pair] + near
+    distance = np.hypot(*(ends[1] - ends[0]).T)
+    near = c.near_bias[0] * np.exp(-distance / LINKTRACK.near_reach_m)
+    seen = distance + c.bias[r.pair] + near
     return [float(v) for v in (seen - r.measured) / r.sigma]
 
 

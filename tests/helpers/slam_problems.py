@@ -117,14 +117,8 @@ def team_problem(
             i, j = robots * k + a, robots * k + b
             ends = [product(truth[i], (*q[a], 0)), product(truth[j], (*q[b], 0))]
             distance = math.hypot(*(ends[1] - ends[0])[:2])
-            measured_m = distance + biases[number]
-            # the term is of what is measured, itself included
-            for _ in range(30):
-                measured_m = (
-                    distance
-                    + biases[number]
-                    + near_bias * math.exp(-measured_m / LINKTRACK.near_reach_m)
-                )
+            near = near_bias * math.exp(-distance / LINKTRACK.near_reach_m)
+            measured_m = distance + biases[number] + near
             rows.append((i, j, *q[a], *q[b], measured_m, number))
     table = np.reshape(rows, (-1, 8))
     ranges = RangeFactors(

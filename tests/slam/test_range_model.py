@@ -26,6 +26,17 @@ def test_the_near_range_bias_fades_by_a_factor_of_e_every_three_metres() -> None
     assert wider.near_range_shape(np.array([6.0])).tolist() == pytest.approx([1 / math.e])
 
 
+@pytest.mark.parametrize("near_bias", [-0.3, 0.0, 0.3])
+def test_what_a_near_range_bias_adds_to_a_range_is_that_at_its_distance(near_bias: float) -> None:
+    distances = np.array([0.3, 1.0, 3.0, 8.0])
+    near = near_bias * np.exp(-distances / 3)
+    found = LINKTRACK.near_range_bias(distances + near, near_bias)
+    assert found == pytest.approx(near, abs=3e-4)
+    # what the range itself would say is off by up to two centimetres
+    by_range = near_bias * np.exp(-(distances + near) / 3)
+    assert not near_bias or np.abs(by_range - near).max() > 0.015
+
+
 def test_ranges_share_a_bias_and_a_slow_part() -> None:
     t = np.array([-9.0, -8.0, -3.0, 0.0])
     rng, count = np.random.default_rng(13), 200_000

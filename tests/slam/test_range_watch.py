@@ -116,7 +116,7 @@ def measured(from_above: float, sigmas: float, sigma: float, near_bias: float = 
     seen = from_above
     for _ in range(50):
         width = math.hypot(sigma, float(LINKTRACK.near_range_sigma(seen)))
-        seen = from_above + near_bias * math.exp(-seen / 3.0) + sigmas * width
+        seen = from_above + near_bias * math.exp(-from_above / 3.0) + sigmas * width
     return math.hypot(seen, MODELS[1].antenna_z_m - MODELS[0].antenna_z_m)
 
 

@@ -5,7 +5,7 @@ driving do. Module 3 carries the bias of each pair, the near-range bias of the t
 each robot's odometry as unknowns. Here a window is rid of what is known of them, and its noise says
 what is still unknown:
 
-    r' = r - bias - near_bias exp(-r / L)     p' = (1 - scale) p
+    r' = r - bias - near_bias exp(-r' / L)     p' = (1 - scale) p
     theta' = (1 + turn) theta - yaw |p|
     sigma'^2 = sigma_measured^2 + least^2
 
@@ -156,10 +156,10 @@ def calibrated_window(
 ) -> tuple[Window, PairNoise]:
     """The window without its known errors, and the noise that is left."""
     model = noise.model
-    near = known.near_bias.value * model.near_range_shape(window.ranges)
+    plain = window.ranges - known.bias.value
     better = replace(
         window,
-        ranges=window.ranges - known.bias.value - near,
+        ranges=plain - model.near_range_bias(plain, known.near_bias.value),
         a_poses=known.a.path(window.a_poses, window.before),
         b_poses=known.b.path(window.b_poses, window.before),
         a_antenna=window.a_antenna + known.a.antenna,

@@ -2,7 +2,7 @@
 
 odometry   e = [R_i' (p_j - p_i), theta_j - theta_i] - measured, corrected by scale and yaw rate
 closure    the same, without correction
-range      e = |p_j + R_j q_j - p_i - R_i q_i| + bias + near_bias exp(-r / L) - r
+range      e = d + bias + near_bias exp(-d / L) - r,   d = |p_j + R_j q_j - p_i - R_i q_i|
 """
 
 from __future__ import annotations
@@ -63,12 +63,21 @@ class RangeErrors(NamedTuple):
         error: (m,) predicted minus measured, m.
         direction: (m,) unit line of sight from i to j in w.
         arm_i, arm_j: (m,) from the poses to the antennas in w.
+        shape: (m,) how the error grows with the near-range bias (`RangeModel.near_range_shape`).
+        slope: (m,) and with the distance, a little less or more than one by that bias.
     """
 
     error: Array
     direction: Array
     arm_i: Array
     arm_j: Array
+    shape: Array
+    slope: Array
+
+    @property
+    def along(self) -> Array:
+        """(m,) how the error grows with what moves end j, x + iy in w."""
+        return self.slope * self.direction
 
 
 def range_errors(
@@ -82,6 +91,8 @@ def range_errors(
     place = poses[:, 0] + 1j * poses[:, 1]
     sight = place[ranges.j] + arm_j - place[ranges.i] - arm_i
     error, direction = range_model.residuals(sight, ranges.measured)  # eq. (1)
+    shape = model.near_range_shape(error + ranges.measured)
+    near = calibration.near_bias * shape
     error += calibration.bias[ranges.pair]
-    error += calibration.near_bias * ranges.near_range_shape(model)
-    return RangeErrors(error, direction, arm_i, arm_j)
+    error += near
+    return RangeErrors(error, direction, arm_i, arm_j, shape, 1 - near / model.near_reach_m)

@@ -172,18 +172,6 @@ class RangeFactors:
             carried=self.carried.chosen(which),
         )
 
-    def near_range_shape(self, model: RangeModel) -> Array:
-        """(m,) of `RangeModel.near_range_shape`."""
-        known = self._shape
-        if not known or known[0][0] is not model:
-            known[:] = [(model, model.near_range_shape(self.measured))]
-        return known[0][1]
-
-    @cached_property
-    def _shape(self) -> list[tuple[RangeModel, Array]]:
-        """Of the model that was asked for last, which never changes."""
-        return []
-
     @property
     def is_carried(self) -> NDArray[np.bool_]:
         """(m,)"""

@@ -119,7 +119,7 @@ def _of_beacon(
     x, y = estimate.antenna_m.get(peer, (Learned(), Learned()))
     pair = (min(own.robot, peer), max(own.robot, peer))
     bias = estimate.bias_m.get(pair, Learned())
-    near = estimate.near_bias_m.value * model.near_range_shape(flat)
+    near = model.near_range_bias(flat - bias.value, estimate.near_bias_m.value)
     scatter = max(estimate.scatter.get(pair, 1.0), LEAST_SCATTER)
     doubt = float(np.median(seen.doubt_m))
     return Sightings(

@@ -134,13 +134,16 @@ def test_an_error_of_a_range_is_predicted_minus_measured_with_its_biases(
     known = replace(
         Calibration.zero(3, 3), bias=bias, near_bias=np.array([-0.25]), team_bias=np.array([0.7])
     )
-    error, sight, arm_i, arm_j = range_errors(poses, r, known, model)
+    error, sight, arm_i, arm_j, shape, slope = range_errors(poses, r, known, model)
     for m in range(len(r)):
         i, j = (product(poses[k], (*q, 0.0)) for k, q in ((r.i[m], r.q_i[m]), (r.j[m], r.q_j[m])))
         apart = (j - i)[:2]
-        near = -0.25 * math.exp(-r.measured[m] / model.near_reach_m)
-        expected = math.hypot(*apart) + bias[r.pair[m]] + near - r.measured[m]
-        assert error[m] == pytest.approx(expected)
+        distance = math.hypot(*apart)
+        near = -0.25 * math.exp(-distance / model.near_reach_m)
+        assert error[m] == pytest.approx(distance + bias[r.pair[m]] + near - r.measured[m])
+        assert shape[m] == pytest.approx(math.exp(-distance / model.near_reach_m))
+        farther = -0.25 * math.exp(-(distance + 1e-6) / model.near_reach_m)
+        assert slope[m] == pytest.approx(1 + (farther - near) / 1e-6)
         assert sight[m] == pytest.approx(complex(*apart) / math.hypot(*apart))
         assert arm_i[m] == pytest.approx(complex(*(i - poses[r.i[m]])[:2]))
         assert arm_j[m] == pytest.approx(complex(*(j - poses[r.j[m]])[:2]))

@@ -90,13 +90,14 @@ def weighed_ranges(
 
 def _range_jacobian(problem: Problem, point: Point, antennas: bool) -> Array:
     """(m, 1, 12) derivatives of errors."""
-    factors, (_, u, arm_i, arm_j) = problem.ranges, point.sight
+    factors, sight = problem.ranges, point.sight
+    u, arm_i, arm_j = sight.along, sight.arm_i, sight.arm_j
     jacobian = np.ones((12, 1, len(factors)))
     jacobian[0, 0], jacobian[1, 0] = -u.real, -u.imag
     jacobian[2, 0] = u.real * arm_i.imag - u.imag * arm_i.real
     jacobian[3, 0], jacobian[4, 0] = u.real, u.imag
     jacobian[5, 0] = u.imag * arm_j.real - u.real * arm_j.imag
-    jacobian[7, 0] = factors.near_range_shape(problem.model)
+    jacobian[7, 0] = sight.shape
     if not antennas:
         jacobian[8:] = 0.0
         return np.asarray(jacobian.transpose(2, 1, 0))
@@ -116,7 +117,7 @@ def carried_part(problem: Problem, point: Point, ranges: Linearised) -> Linearis
     factors = problem.ranges.carried
     plain = ranges.chosen(problem.ranges.is_carried)
     ends = np.stack([problem.ranges.i, problem.ranges.j], axis=-1)[factors.rows]
-    sight = point.sight.direction[factors.rows, None]
+    sight = point.sight.along[factors.rows, None]
     seen = sight * np.exp(-1j * point.poses[ends, 2]) * [1, -1]
     by = factors.moves[..., 0] * seen.real[..., None] + factors.moves[..., 1] * seen.imag[..., None]
     jacobian = np.concatenate([plain.jacobian, by.reshape(-1, 1, 4)], axis=2)

@@ -25,7 +25,7 @@ def exact_gradient(equations: Equations, point: Point) -> Array:
     turn = np.exp(1j * point.poses[:, 2])
     gradient[layout.poses] = _of_poses(problem, point, turn, pull, of_ranges)
     gradient[layout.bias] = np.bincount(ranges.pair, of_ranges, problem.pairs)
-    gradient[layout.near_bias] = of_ranges @ ranges.near_range_shape(problem.model)
+    gradient[layout.near_bias] = of_ranges @ point.sight.shape
     scale, yaw = _of_odometry(problem, point, turn, of_links, of_ranges)
     gradient[layout.scale], gradient[layout.yaw] = scale, yaw
     doubted = problem.doubted
@@ -43,7 +43,7 @@ def mounting_pulls(problem: Problem, point: Point) -> Array:
     pull = odometry.weighed(point.link)
     of_turn = np.einsum("mk,mk->m", pull, by_turn(odometry, point.calibration))
     turn = -np.bincount(odometry.robot, of_turn, robots)
-    seen = _range_pull(problem, point) * point.sight.direction
+    seen = _range_pull(problem, point) * point.sight.along
     antenna = np.zeros(robots, dtype=complex)
     for end, (pose, sign) in enumerate(((ranges.i, -1), (ranges.j, 1))):
         heading = point.poses[pose, 2] + ranges.turned[:, end]
@@ -70,8 +70,8 @@ def _of_poses(problem: Problem, point: Point, turn: Array, pull: Array, of_range
     place = point.poses[:, 0] + 1j * point.poses[:, 1]
     turned = turn[one] * (pull[:, 0] + 1j * pull[:, 1])
     lever = _across(place[other] - place[one], turned)
-    _, direction, arm_i, arm_j = point.sight
-    seen = of_ranges * direction
+    arm_i, arm_j = point.sight.arm_i, point.sight.arm_j
+    seen = of_ranges * point.sight.along
     at = np.concatenate([turned, seen])
     turn_i = np.concatenate([lever + pull[:, 2], _across(arm_i, seen)])
     turn_j = np.concatenate([pull[:, 2], _across(arm_j, seen)])
@@ -97,7 +97,7 @@ def _of_odometry(
     yaw = np.bincount(odometry.robot, np.einsum("mk,mk->m", pull, odometry.by_yaw), robots)
     carried, ranges = problem.ranges.carried, problem.ranges
     if len(carried.rows):
-        seen = of_ranges[carried.rows] * point.sight.direction[carried.rows]
+        seen = of_ranges[carried.rows] * point.sight.along[carried.rows]
         for end, (pose, sign) in enumerate(((ranges.i, 1), (ranges.j, -1))):
             here = sign * seen * np.conj(turn[pose[carried.rows]])
             robot = ranges.carriers[end]

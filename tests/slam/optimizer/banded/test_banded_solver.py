@@ -340,6 +340,8 @@ def test_a_bias_that_only_near_ranges_have_is_found_and_told_from_that_of_the_pa
         link_sigma=(0.004, 0.004, 0.002),
     )
     problem = held_at(problem, truth)
+    # a prior of 0.1 m would draw it a quarter of the way to nothing
+    problem = replace(problem, priors=replace(problem.priors, near_bias=0.5))
     solution = solve(problem)
     assert solution.calibration.near_bias == pytest.approx([-0.25], abs=0.05)
     assert solution.calibration.bias == pytest.approx([0.25, -0.2, 0.4], abs=0.03)

@@ -192,8 +192,9 @@ def test_scatter_is_that_of_the_errors_over_what_is_configured() -> None:
             np.exp(1j * point.poses[k, 2]) * complex(*q[m])
             for k, q in ((2 * m, problem.ranges.q_i), (2 * m + 1, problem.ranges.q_j))
         ]
-        seen = abs(complex(*apart[:2]) + ends[1] - ends[0]) + point.calibration.bias[0]
-        near = point.calibration.near_bias[0] * math.exp(-problem.ranges.measured[m] / 3)
+        distance = abs(complex(*apart[:2]) + ends[1] - ends[0])
+        seen = distance + point.calibration.bias[0]
+        near = point.calibration.near_bias[0] * math.exp(-distance / 3)
         errors.append(min(abs(seen + near - problem.ranges.measured[m]), 2.5 * 0.05))
     expected = math.sqrt((20 + np.sum(np.square(errors)) / 0.1**2) / 60)
     assert claims.scatter_of(problem, point) == pytest.approx([expected], rel=1e-6)

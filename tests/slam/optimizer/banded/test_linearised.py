@@ -144,8 +144,26 @@ def test_ranges_that_were_carried_are_differentiated_by_the_wheels_of_both_robot
 
 def test_the_near_range_bias_is_that_of_the_model_of_the_problem() -> None:
     other = replace(PROBLEM, model=replace(LINKTRACK, near_reach_m=1.0))
-    found = linearised.ranges_at(other, HERE).jacobian[:, 0, 7]
-    assert found == pytest.approx(np.exp(-PROBLEM.ranges.measured))
+    found = linearised.ranges_at(other, point_at(other, POSES, KNOWN, np.full(3, 2.0)))
+    plain = replace(KNOWN, bias=np.zeros(3), near_bias=np.zeros(1))
+    distances = of_ranges(PROBLEM, POSES, plain) + PROBLEM.ranges.measured
+    assert found.jacobian[:, 0, 7] == pytest.approx(np.exp(-distances))
+    assert np.ptp(distances) > 1
+
+
+@pytest.mark.parametrize("near_bias", [0.0, -0.2])
+def test_noise_of_ranges_does_not_pull_at_the_near_range_bias(near_bias: float) -> None:
+    """Ranges that are too long and as many that are as much too short say nothing of it."""
+    known = replace(KNOWN, near_bias=np.array([near_bias]))
+    right = PROBLEM.ranges.measured + of_ranges(PROBLEM, POSES, known)
+    pull = np.zeros(len(right))
+    for off in (0.2, -0.2):
+        ranges = replace(PROBLEM.ranges, measured=right + off)
+        problem = replace(PROBLEM, ranges=ranges)
+        found = linearised.ranges_at(problem, point_at(problem, POSES, known, np.full(3, 2.0)))
+        assert (np.abs(found.pull[:, 0] * found.jacobian[:, 0, 7]) > 1e-3).all()
+        pull += found.pull[:, 0] * found.jacobian[:, 0, 7]
+    assert pull == pytest.approx(0.0, abs=1e-9)
 
 
 def a_range(sigmas: float, is_blocked: bool = False) -> linearised.Linearised:

@@ -78,44 +78,64 @@ def of_ways(poses: Array, i: Index, j: Index, force: Array, columns: int) -> Lin
 
 def _of_ranges(problem: Problem, point: Point, antennas: bool) -> list[Linearised]:
     """Of those that odometry has not carried, and of those that it has."""
-    ranges, sight, calibration = problem.ranges, point.sight, point.calibration
-    pull = linearised.ranges_at(problem, point, antennas=antennas).pull[:, 0]
-    near = calibration.near_bias * ranges.near_range_shape(problem.model)
-    length = sight.error + ranges.measured - calibration.bias[ranges.pair] - near
-    form = np.zeros((len(ranges), 5, 5))
-    form[:, 0, 0] = pull / np.maximum(length, SHORT_M)
-    form[:, 1, 1] = pull * (np.conj(sight.direction) * sight.arm_i).real
-    form[:, 2, 2] = -pull * (np.conj(sight.direction) * sight.arm_j).real
-    for turn, arm in ((1, 3), (2, 4)):
-        form[:, turn, arm] = form[:, arm, turn] = pull
-    # what moves the ends across the line of sight, and not along it
-    side = replace(point, sight=sight._replace(direction=1j * sight.direction))
-    across = linearised.ranges_at(problem, side, antennas=antennas)
-    across.jacobian[:, :, 6:8] = 0.0
+    ranges, sight = problem.ranges, point.sight
+    form = _form(problem, point, linearised.ranges_at(problem, point, antennas=antennas).pull[:, 0])
+    moved = []
+    for direction in (1j * sight.direction, sight.direction):
+        plain = replace(
+            point, sight=sight._replace(direction=direction, slope=np.ones(len(ranges)))
+        )
+        ends = linearised.ranges_at(problem, plain, antennas=antennas)
+        ends.jacobian[:, :, 6:8] = 0.0
+        moved.append((plain, ends))
+    (_, across), (_, along) = moved
     if not len(ranges.carried.rows):
-        return [_with_turns(across.jacobian, form)]
+        return [_with_turns(across.jacobian, along.jacobian, form)]
     is_carried = ranges.is_carried
-    carried = linearised.carried_part(problem, side, across).jacobian
+    carried = (linearised.carried_part(problem, *each).jacobian for each in moved)
     return [
-        _with_turns(across.jacobian[~is_carried], form[~is_carried]),
-        _with_turns(carried, form[is_carried]),
+        _with_turns(across.jacobian[~is_carried], along.jacobian[~is_carried], form[~is_carried]),
+        _with_turns(*carried, form[is_carried]),
     ]
 
 
-def _with_turns(across: Array, form: Array) -> Linearised:
+def _form(problem: Problem, point: Point, pull: Array) -> Array:
+    """(m, 7, 7) see `_with_turns`.
+
+    Args:
+        pull: (m,) half the derivative of the cost by errors.
+    """
+    ranges, sight, calibration = problem.ranges, point.sight, point.calibration
+    near, reach = calibration.near_bias * sight.shape, problem.model.near_reach_m
+    length = sight.error + ranges.measured - calibration.bias[ranges.pair] - near
+    form = np.zeros((len(ranges), 7, 7))
+    straight = pull * sight.slope
+    form[:, 0, 0] = straight / np.maximum(length, SHORT_M)
+    form[:, 1, 1] = straight * (np.conj(sight.direction) * sight.arm_i).real
+    form[:, 2, 2] = -straight * (np.conj(sight.direction) * sight.arm_j).real
+    for turn, arm in ((1, 3), (2, 4)):
+        form[:, turn, arm] = form[:, arm, turn] = straight
+    # the near-range bias fades with the distance
+    form[:, 5, 5] = pull * near / reach**2
+    form[:, 5, 6] = form[:, 6, 5] = -pull * sight.shape / reach
+    return form
+
+
+def _with_turns(across: Array, along: Array, form: Array) -> Linearised:
     """
     Args:
-        across: (m, 1, c) how ends move across the line of sight.
-        form: (m, 5, 5) of that, of both headings, and of what moves the arms at both ends.
+        across, along: (m, 1, c) how ends move across the line of sight, and along it.
+        form: (m, 7, 7) of across, of both headings, of what moves the arms at both ends, of along
+            and of the near-range bias.
     """
     count, _, columns = across.shape
-    rows = np.zeros((count, 5, columns))
-    rows[:, 0] = across[:, 0]
-    rows[:, 1, 2] = rows[:, 2, 5] = 1
+    rows = np.zeros((count, 7, columns))
+    rows[:, 0], rows[:, 5] = across[:, 0], along[:, 0]
+    rows[:, 1, 2] = rows[:, 2, 5] = rows[:, 6, 7] = 1
     for row, constants in ((3, CONSTANTS_I), (4, CONSTANTS_J)):
         there = [column for column in constants if column < columns]
         rows[:, row, there] = -across[:, 0, there]
-    return Linearised(rows, form, np.zeros((count, 5)))
+    return Linearised(rows, form, np.zeros((count, 7)))
 
 
 def _turned(heading: Array, pull: Array) -> Array:
