@@ -78,25 +78,24 @@ def of_ways(poses: Array, i: Index, j: Index, force: Array, columns: int) -> Lin
 
 def _of_ranges(problem: Problem, point: Point, antennas: bool) -> list[Linearised]:
     """Of those that odometry has not carried, and of those that it has."""
-    ranges, sight = problem.ranges, point.sight
     form = _form(problem, point, linearised.ranges_at(problem, point, antennas=antennas).pull[:, 0])
-    moved = []
-    for direction in (1j * sight.direction, sight.direction):
-        plain = replace(
-            point, sight=sight._replace(direction=direction, slope=np.ones(len(ranges)))
-        )
-        ends = linearised.ranges_at(problem, plain, antennas=antennas)
-        ends.jacobian[:, :, 6:8] = 0.0
-        moved.append((plain, ends))
-    (_, across), (_, along) = moved
+    across, along = (_moved(problem, point, turned, antennas) for turned in (1j, 1.0))
+    is_carried = problem.ranges.is_carried
+    forms = [form[~is_carried], form[is_carried]] if is_carried.any() else [form]
+    return [_with_turns(*each) for each in zip(across, along, forms, strict=True)]
+
+
+def _moved(problem: Problem, point: Point, turned: complex, antennas: bool) -> list[Array]:
+    """(m, 1, c) of the same sets, how ends move along lines of sight that are turned like this."""
+    ranges, sight = problem.ranges, point.sight
+    sight = sight._replace(direction=turned * sight.direction, slope=np.ones(len(ranges)))
+    plain = replace(point, sight=sight)
+    ends = linearised.ranges_at(problem, plain, antennas=antennas)
+    ends.jacobian[:, :, 6:8] = 0.0
     if not len(ranges.carried.rows):
-        return [_with_turns(across.jacobian, along.jacobian, form)]
-    is_carried = ranges.is_carried
-    carried = (linearised.carried_part(problem, *each).jacobian for each in moved)
-    return [
-        _with_turns(across.jacobian[~is_carried], along.jacobian[~is_carried], form[~is_carried]),
-        _with_turns(*carried, form[is_carried]),
-    ]
+        return [ends.jacobian]
+    carried = linearised.carried_part(problem, plain, ends).jacobian
+    return [ends.jacobian[~ranges.is_carried], carried]
 
 
 def _form(problem: Problem, point: Point, pull: Array) -> Array:
