@@ -34,6 +34,8 @@ from drslamd.slam.relative_pose.mistakes.evidence import (
 from drslamd.slam.relative_pose.mistakes.what_if import (
     BACKWARDS,
     CASES,
+    LEARNABLE,
+    NEARBY,
     OUTPOSTS,
     Case,
     is_corrected,
@@ -201,6 +203,8 @@ class MountingSearch:
         drove less, m."""
         if self._is_quick and not self.is_provisional:
             return partial(_asked_quickly, question, noise, delta, self._enough)
+        if self._is_quick:
+            return partial(_watched, question, noise, delta)
         chance = BY_CHANCE if self.is_provisional else 0.0
         return partial(question.answer, self.cases, noise, delta, self.asked_first, chance)
 
@@ -294,4 +298,11 @@ def _asked_quickly(
         ask(what_if.BESIDE)
         if SLIGHTLY <= costs.min() - costs[0] < 0:
             ask(what_if.BEYOND)
+    return costs, question.way_m
+
+
+def _watched(question: what_if.Question, noise: PairNoise, delta: float) -> tuple[Array, float]:
+    """Of the cases those that `against_configured` looks at, and nothing else does then."""
+    costs, cases = np.full(len(CASES), np.inf), [CASES[place] for place in LEARNABLE]
+    costs[list(LEARNABLE)] = question.costs(cases, noise, delta, NEARBY, BY_CHANCE)
     return costs, question.way_m

@@ -100,6 +100,8 @@ def is_like(one: Case, other: Case) -> bool:
 
 LEARNABLE = tuple(place for place, case in enumerate(CASES) if is_learned(case))
 """Places of the configuration, and of other tracks and scales."""
+NEARBY = tuple(at for at, place in enumerate(LEARNABLE) if place in OUTPOSTS)
+"""Places in `LEARNABLE` of those that are `OUTPOSTS`."""
 BACKWARDS = tuple(
     place for place, case in enumerate(CASES) if place and not (is_learned(case) or is_curve(case))
 )

@@ -59,6 +59,7 @@ from drslamd.slam.relative_pose.mistakes.what_if import (
     MIRROR,
     OUTPOSTS,
     Case,
+    is_learned,
     variants,
 )
 from drslamd.slam.relative_pose.range_fit import POOR_FIT
@@ -487,15 +488,23 @@ def test_windows_of_that_time_are_asked_about_tracks_and_no_longer_about_backwar
 
 
 def test_a_pair_that_one_window_confirmed_is_watched_for_a_while() -> None:
-    """Each second, and all that may win is asked; after that every few seconds are enough."""
-    search, utime = sure(watched=0), APART_US
+    """Each second, by tracks and scales alone; every few seconds by all that may win."""
+    search, utime, whole_at = sure(watched=0), APART_US, APART_US
     assert not search.is_due(utime + QUICKLY_US - 1, False)
     for watched in range(WATCHED):
         utime += QUICKLY_US
         assert search.is_due(utime, False), watched
         search.begin(utime, False)
-        told: Any = search.question(cast(Any, Asked({})), cast(Any, None), 0.1)()
-        assert told == (OUTPOSTS, BY_CHANCE)
+        question = Asked({})
+        told: Any = search.question(cast(Any, question), cast(Any, None), 0.1)()
+        if utime - whole_at >= APART_US:
+            assert told == (OUTPOSTS, BY_CHANCE)
+            whole_at = utime
+        else:
+            assert np.isfinite(told[0]).tolist() == [is_learned(case) for case in CASES]
+            assert question.first == {
+                CASES[place] for place in OUTPOSTS if is_learned(CASES[place])
+            }
         search.on_costs(unlike(0.0), FREE + 3, True)
     assert search.is_provisional
     assert not search.is_due(utime + QUICKLY_US, False)
@@ -517,9 +526,14 @@ class Asked:
 
     def __init__(self, known: dict[Case, float]) -> None:
         self.known, self.asked = known, list[Case]()
+        self.first: set[Case] = set()
 
-    def costs(self, cases: Any, noise: Any, delta: float) -> Array:
+    def costs(
+        self, cases: Any, noise: Any, delta: float, first: Any = (), chance: float = 0.0
+    ) -> Array:
         self.asked += cases
+        assert chance == (BY_CHANCE if first else 0.0)
+        self.first = {cases[at] for at in first}
         return np.array([self.known.get(case, FAR) for case in cases])
 
     def answer(self, cases: Any, noise: Any, delta: float, first: Any, chance: float) -> Any:
