@@ -12,8 +12,6 @@ from collections.abc import Callable, Coroutine
 from functools import partial
 from typing import Any
 
-import structlog
-
 from drslamd import report
 from drslamd.config import Config
 from drslamd.conventions import MILLISECOND_US, SECOND_US
@@ -36,6 +34,7 @@ from drslamd.gossip.envelopes.opening import is_news_of_a_member
 from drslamd.gossip.seal import team_key
 from drslamd.host.ending import stops
 from drslamd.io.clock import Clock, MonotonicClock, cpu_s
+from drslamd.io.logs import get_logger
 from drslamd.io.near_socket import NearSocket
 from drslamd.io.pace import Pace
 from drslamd.io.serial_port import SerialPort
@@ -66,7 +65,7 @@ RESTARTS_APART_US = 30 * SECOND_US
 """Between two restarts in one process, twice as long after each: a robot that is lied to about its
 own past still has a present."""
 
-log = structlog.get_logger()
+log = get_logger()
 
 
 class Daemon:

@@ -56,10 +56,8 @@ def _heed_signals() -> None:
 
 def _serve(config: Config) -> NoReturn:
     """Until it is stopped; the process ends here."""
-    import structlog
-
     from drslamd.daemon import Daemon
-    from drslamd.io.logs import set_up
+    from drslamd.io.logs import get_logger, set_up
 
     set_up(config.daemon)
 
@@ -67,7 +65,7 @@ def _serve(config: Config) -> NoReturn:
     try:
         asyncio.new_event_loop().run_until_complete(daemon.run())
     except Exception:
-        structlog.get_logger().exception("daemon.bug", remedy="please report this")
+        get_logger().exception("daemon.bug", remedy="please report this")
         code = BUG
     sys.stdout.flush()
     sys.stderr.flush()

@@ -14,7 +14,7 @@ from contextlib import suppress
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
-import structlog
+from drslamd.io.logs import get_logger
 
 MAX_FILE_BYTES = 64 << 20
 """Three quarters of an hour of a busy robot."""
@@ -112,7 +112,7 @@ class LogFiles:
     def _stop(self, why: str) -> None:
         self.fault = why
         self.close()
-        structlog.get_logger().warning("recording.fault", what=why)
+        get_logger().warning("recording.fault", what=why)
 
     def _make_room(self) -> None:
         """Delete our oldest files until another one fits into the quota."""
