@@ -33,6 +33,12 @@ class Modules:
         self._neighbours = neighbours
         self._is_awaited = False
 
+    @property
+    def pauses(self) -> tuple[Callable[[int], list[Effect]], ...]:
+        """After which sensors are read before anything else is begun (`Timers`): what comes each
+        second takes a small team 8 ms in one go, of which these parts take about a third each."""
+        return self.consistency, self.optimize
+
     def on_odometry(self, robot: int, utime: int) -> list[Effect]:
         """A peer said where its wheels went: the next window of a pair that nobody knows of."""
         pair = self._front.pairs.get(robot)

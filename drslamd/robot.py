@@ -118,7 +118,7 @@ class Robot:
         self.neighbourhood = Neighbourhood(self.own, self.team.living, self.front.ranged)
         self.neighbours = self.neighbourhood.at
         self.modules = Modules(self.front, self.back, self.team, self.jobs, self.neighbours)
-        self.timers = Timers(self._periods())
+        self.timers = Timers(self._periods(), {self._extend_log, *self.modules.pauses})
         self.memory = Memory(self.own, self.team.seal, self.calibration, place)
         self._speaking = {self._repeat, self._send_status, self._send_odometry, self._extend_log}
         self._handlers: dict[type[Any], Callable[[Any], list[Effect]]] = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
 from drslamd.conventions import MILLISECOND_US, SECOND_US
@@ -39,12 +39,15 @@ class Timers:
         next: when the next one is due, us.
     """
 
-    def __init__(self, periods: Mapping[Action, int]) -> None:
+    def __init__(self, periods: Mapping[Action, int], pauses: Collection[Action] = ()) -> None:
         """
         Args:
             periods: us, in the order in which actions of one moment are taken.
+            pauses: after one of these the others of that moment wait until the robot is woken
+                again, which it wants to be at once: so sensors are read in between.
         """
         self._rounds = [_Round(action, period) for action, period in periods.items()]
+        self._pauses = frozenset(pauses)
         self.next = 0
         self._hurried: Action | None = None
 
@@ -53,15 +56,19 @@ class Timers:
         self._hurried, self.next = action, min(self.next, utime)
 
     def take_due(self, utime: int) -> list[Action]:
-        """The actions whose time has come; each is then due again after its period."""
+        """The actions whose time has come, up to a pause; each is then due again after its
+        period."""
         taken: list[Action] = []
         hurried, self._hurried = self._hurried, None
         for each in self._rounds:
+            if taken and taken[-1] in self._pauses:
+                break
             due = utime if each.due is None else each.due
             if utime >= due:
                 # after a stall the timer starts afresh instead of catching up in a burst
                 due = (utime if utime - due > each.period else due) + each.period
                 taken.append(each.action)
             each.due = due
-        self.next = min(each.due for each in self._rounds if each.due is not None)
+        dues = [utime if each.due is None else each.due for each in self._rounds]
+        self.next = max(utime, min(dues))
         return taken if hurried is None or hurried in taken else [*taken, hurried]

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from daemon_scenes import Stepped, configured, heard_by, until, with_worker
+from robot_scenes import ticked
 
 from drslamd.conventions import MILLISECOND_US, SECOND_US
 from drslamd.daemon import Daemon
@@ -87,6 +88,7 @@ def test_how_late_the_loop_was_is_in_the_status(
     daemon: Daemon, clock: Stepped, late_ms: int
 ) -> None:
     async def one_tick() -> None:
+        ticked(daemon.robot, clock.utime)
         daemon.robot.timers.next = clock.utime + 10 * MILLISECOND_US
         daemon._wake()
         clock.utime += (10 + late_ms) * MILLISECOND_US

@@ -92,3 +92,29 @@ def test_an_action_that_is_due_and_hurried_is_taken_once_and_what_is_overdue_sta
     assert timers.next == T0 + 100
     assert timers.take_due(T0 + 130) == [often]
     assert timers.next == T0 + 200
+
+
+def test_after_a_pause_the_others_of_that_moment_wait_until_the_robot_is_woken_again() -> None:
+    timers = Timers({often: 100, seldom: 100}, {often})
+    assert timers.take_due(T0) == [often]
+    assert timers.next == T0
+    assert timers.take_due(T0 + 3) == [seldom]
+    assert timers.next == T0 + 100
+    # their rhythm is their own, and the robot is never wanted before now
+    assert timers.take_due(T0 + 105) == [often]
+    assert timers.next == T0 + 105
+    assert timers.take_due(T0 + 106) == [seldom]
+    assert timers.next == T0 + 200
+
+
+def test_a_pause_with_nothing_behind_it_is_none() -> None:
+    timers = Timers({often: 50, seldom: 250}, {seldom})
+    assert timers.take_due(T0) == [often, seldom]
+    assert timers.next == T0 + 50
+
+
+def test_what_is_hurried_goes_on_before_what_waits_for_the_end_of_a_pause() -> None:
+    timers = Timers({often: 100, seldom: 100}, {often})
+    timers.hurry(seldom, T0)
+    assert timers.take_due(T0) == [often, seldom]
+    assert timers.take_due(T0) == [seldom]

@@ -24,6 +24,14 @@ from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 T0 = 100 * SECOND_US
 
 
+def ticked(robot: Robot, utime: int) -> list[Effect]:
+    """It is woken, and again as long as it wants to be at once."""
+    effects = robot.handle(Tick(utime))
+    while robot.next_tick <= utime:
+        effects += robot.handle(Tick(utime))
+    return effects
+
+
 class RobotScene:
     """A robot with epoch 1, at `utime` on its clock, which all clocks agree with.
 
@@ -52,7 +60,7 @@ class RobotScene:
     def tick(self, seconds: float = 0.0) -> list[Effect]:
         """The robot is woken, so much later."""
         self.later(seconds)
-        return self.robot.handle(Tick(self.utime))
+        return ticked(self.robot, self.utime)
 
     # peers
 

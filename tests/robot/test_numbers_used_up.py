@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from borders import spoken
 from message_builders import an_entry
+from robot_scenes import ticked
 from teams import VirtualTeam
 
 from drslamd.conventions import SECOND_US
-from drslamd.events import Effect, Restart, Send, Tick
+from drslamd.events import Effect, Restart, Send
 from drslamd.gossip import messages
 from drslamd.gossip.message_types import Heard, OdometryBatch, Pose
 from drslamd.gossip.peer import Peer
@@ -44,7 +45,7 @@ def robot(pair: VirtualTeam) -> Robot:
 
 def later(robot: Robot, utime: int, seconds: int = 1) -> list[Effect]:
     """What it does at its next ticks."""
-    return [e for k in range(1, seconds + 1) for e in robot.handle(Tick(utime + k * SECOND_US))]
+    return [e for k in range(1, seconds + 1) for e in ticked(robot, utime + k * SECOND_US)]
 
 
 def restarts(effects: list[Effect]) -> list[int]:

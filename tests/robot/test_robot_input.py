@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from robot_scenes import ticked
 from teams import VirtualTeam
 
 from drslamd import report
@@ -89,7 +90,7 @@ def test_a_long_stall_is_followed_by_one_round_of_timers_not_by_a_burst(
 ) -> None:
     robot = pair.member(0).robot
     utime = robot.next_tick + 30 * SECOND_US
-    first = robot.handle(Tick(utime))
+    first = ticked(robot, utime)
     again = robot.handle(Tick(utime + 1))
     assert len(first) < 20
     assert not again
@@ -100,12 +101,12 @@ def test_port_and_network_states_are_reported_with_their_detail(pair: VirtualTea
     utime = pair.member(0).clock.local(pair.simulator.now)
     robot.handle(PortState(utime, "uwb", PortCondition.DENIED, "/dev/uwb: Permission denied"))
     robot.handle(NetworkState(utime, False, "no such interface: wlan7"))
-    robot.handle(Tick(utime + 2 * SECOND_US))
+    ticked(robot, utime + 2 * SECOND_US)
     sentences = "\n".join(robot.health.sentences().values())
     assert "no permission: /dev/uwb" in sentences
     assert "wlan7" in sentences
     robot.handle(NetworkState(utime, True, ""))
-    robot.handle(Tick(utime + 4 * SECOND_US))
+    ticked(robot, utime + 4 * SECOND_US)
     assert "wlan7" not in "\n".join(robot.health.sentences().values())
 
 
@@ -117,7 +118,7 @@ def test_a_condition_is_noted_when_it_begins_once_a_minute_and_when_it_ends(
     utime = pair.member(0).clock.local(pair.simulator.now)
     effects = {0: robot.handle(NetworkState(utime, False, "cable"))}
     for second in range(1, 125):
-        effects[second] = robot.handle(Tick(utime + second * SECOND_US))
+        effects[second] = ticked(robot, utime + second * SECOND_US)
     effects[125] = robot.handle(NetworkState(utime + 125 * SECOND_US, True))
     noted = [(s, getattr(e, "event", "")) for s, said in effects.items() for e in said]
     faults = [(s, name) for s, name in noted if name in ("network.fault", "network.well")]

@@ -14,7 +14,7 @@ from robot_scenes import RobotScene, sends, solves
 from slam_scenes import NOISE, closure
 
 from drslamd.conventions import GRID_US, Chain, Segment
-from drslamd.events import Effect, JobDone, Solve
+from drslamd.events import Effect, JobDone, Solve, Tick
 from drslamd.gossip import messages
 from drslamd.jobs import CONSISTENCY, OPTIMIZER, RELATIVE_POSE, RELOCATION, Job
 from drslamd.slam.calibration.window_calibration import PairCalibration
@@ -277,11 +277,13 @@ def test_while_the_graph_takes_more_than_one_look_the_robot_is_woken_at_once(
         entry = GraphEntry(0, keyframes=frames, closures=closures)
         scene.robot.back.insert(Chain(robot, 1), entry)
     monkeypatch.setattr("drslamd.slam.back_end.AT_ONCE", 1)
-    effects, woken = scene.tick(), 0
+    effects, woken = scene.robot.handle(Tick(scene.utime)), 0
     while not solves(effects, OPTIMIZER):
         assert scene.robot.next_tick == scene.utime
-        effects, woken = scene.tick(0.001), woken + 1
-    assert woken > 2
+        scene.later(0.001)
+        effects, woken = scene.robot.handle(Tick(scene.utime)), woken + 1
+    assert woken > 2 + len(scene.robot.modules.pauses)
+    scene.tick(0.001)
     assert scene.robot.next_tick > scene.utime + 50_000
 
 
