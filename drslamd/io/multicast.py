@@ -81,7 +81,7 @@ class Multicast:
         """That were heard since the group was joined; no computer has many."""
         self._is_news = is_news
         self._shares: Shares[str] = Shares(SHARE, SHARE_AT_ONCE, ADDRESSES)
-        self._callers, self._told_switches = Callers(), 0.0
+        self._callers, self._told_switches, self._said_where = Callers(), 0.0, 0.0
         self.dropped = self.reads = self.flooded = 0
 
     async def run(self) -> None:
@@ -209,6 +209,10 @@ class Multicast:
     def _heard_ourselves(self) -> None:
         self._unheard_since = None
         self._backoff.reset()
+        now, is_up = asyncio.get_running_loop().time(), self._last_state and self._last_state[0]
+        if is_up and now - self._said_where < LOOK_S:
+            return
+        self._said_where = now
         address = own_address(self._section)
         at = self._where if address == self._where else f"{self._where} ({address})"
         self._state(True, f"{self._section.group}:{self._section.port} on {at}")

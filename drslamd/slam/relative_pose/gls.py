@@ -162,5 +162,6 @@ class _Refinement:
 def _factors(covariance: Array) -> tuple[list[Array], NDArray[np.bool_]]:
     """Cholesky factors, ones where there are none, and which of them there are."""
     factors, sound = small_cholesky(covariance)
-    factors[~sound] = np.eye(factors.shape[1])
+    if not sound.all():
+        factors[~sound] = np.eye(factors.shape[1])
     return list(factors), sound

@@ -15,5 +15,7 @@ MOST = 2.0**62
 
 def as_digested(values: Array) -> bytes:
     """What two arrays share whose values are nearly the same."""
-    steps = np.nan_to_num(np.rint(values / RESOLUTION))
-    return bytes(np.clip(steps, -MOST, MOST).astype(np.int64).tobytes())
+    steps = np.rint(values / RESOLUTION)
+    np.copyto(steps, 0.0, where=steps != steps)  # (what is no number; ten a second are digested)
+    np.maximum(np.minimum(steps, MOST, out=steps), -MOST, out=steps)
+    return steps.astype(np.int64).tobytes()
