@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from drslamd import __version__
+from drslamd import __version__, no_openssl  # noqa: F401  (before all that use it)
 from drslamd.cli import (
     check,
     doctor,

@@ -8,26 +8,11 @@ what it never prints: its lines are plain.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 from drslamd.config import DaemonSection
+from drslamd.host.loading import without
 
-
-@contextmanager
-def _without(package: str) -> Iterator[None]:
-    """As if a package were not installed, unless it is in use already."""
-    if package in sys.modules:
-        yield
-        return
-    sys.modules[package] = None  # type: ignore[assignment]  # which is how Python says so
-    try:
-        yield
-    finally:
-        del sys.modules[package]
-
-
-with _without("rich"):
+with without("rich"):
     import structlog
 
 _LEVELS = {"debug": 10, "info": 20, "warning": 30, "error": 40}

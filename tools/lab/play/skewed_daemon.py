@@ -5,11 +5,11 @@ usage: python -m lab.play.skewed_daemon CONFIG OFFSET_US PPM
 
 from __future__ import annotations
 
-import asyncio
 import sys
 import time
 from pathlib import Path
 
+from drslamd import no_openssl  # (first, as the command does)
 from drslamd.config import parse
 from drslamd.daemon import Daemon
 from drslamd.io.logs import set_up
@@ -33,4 +33,4 @@ async def main(path: str, offset_us: str, ppm: str) -> None:
 
 
 if __name__ == "__main__":
-    asyncio.run(main(*sys.argv[1:4]))
+    no_openssl.asyncio.run(main(*sys.argv[1:4]))
