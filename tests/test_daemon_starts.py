@@ -185,6 +185,12 @@ def test_starts_after_each_power_up_of_a_computer_without_clock_and_disk_differ(
     assert len(epochs) == 10
 
 
+def woken(daemon: Daemon, clock: Stepped) -> None:
+    """It is woken as often as its robot wants to be at this moment."""
+    while daemon.robot.next_tick <= clock.utime:
+        daemon.handle(Tick(clock.utime))
+
+
 def test_that_nothing_can_be_kept_is_said_until_it_can(
     tmp_path: Path, read_only: Path, clock: Stepped
 ) -> None:
@@ -192,7 +198,7 @@ def test_that_nothing_can_be_kept_is_said_until_it_can(
 
     async def scene() -> None:
         daemon.handle(SaveDone(clock.utime, daemon._store.fault))
-        daemon.handle(Tick(clock.utime))
+        woken(daemon, clock)
         (sentence,) = (p for p in daemon._picture()["problems"] if str(read_only) in p)
         assert "cannot write" in sentence
         assert "name another in daemon.state_dir" in sentence
@@ -200,7 +206,7 @@ def test_that_nothing_can_be_kept_is_said_until_it_can(
         daemon._perform(Save(daemon.robot.memory.state()))
         await until(lambda: not daemon.robot.memory.fault)
         clock.utime += 2 * SECOND_US
-        daemon.handle(Tick(clock.utime))
+        woken(daemon, clock)
         assert not [p for p in daemon._picture()["problems"] if str(read_only) in p]
 
     with_worker(daemon, scene)

@@ -40,7 +40,7 @@ RINGS = {
         "reports",
         "report",
     ],
-    "shell": ["host", "no_openssl", "io", "export"],
+    "shell": ["host", "io", "export"],
     "entry": ["parts", "machine", "doctor", "daemon", "view", "feed", "cli", "__main__"],
 }
 """From the inside out; a module imports only from its own ring and those before it."""

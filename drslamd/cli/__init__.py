@@ -11,24 +11,27 @@ from __future__ import annotations
 import argparse
 import sys
 
-from drslamd import __version__, no_openssl  # noqa: F401  (before all that use it)
-from drslamd.cli import (
-    check,
-    doctor,
-    export,
-    feed,
-    keygen,
-    record,
-    run,
-    status,
-    trajectory,
-    view,
-)
-from drslamd.cli.exit_codes import BAD_CONFIG, BUG, CANNOT_CREATE
-from drslamd.cli.parser import Parser
-from drslamd.cli.setting_up import calibrate, init
-from drslamd.config import ConfigError
-from drslamd.host.ending import in_order
+from drslamd import __version__
+from drslamd.host.loading import without_openssl
+
+with without_openssl():
+    from drslamd.cli import (
+        check,
+        doctor,
+        export,
+        feed,
+        keygen,
+        record,
+        run,
+        status,
+        trajectory,
+        view,
+    )
+    from drslamd.cli.exit_codes import BAD_CONFIG, BUG, CANNOT_CREATE
+    from drslamd.cli.parser import Parser
+    from drslamd.cli.setting_up import calibrate, init
+    from drslamd.config import ConfigError
+    from drslamd.host.ending import in_order
 
 EXAMPLES = """\
 examples:

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
+
+OWN_HASHES = ("_md5", "_sha1", "_sha3", "_blake2")
+"""Python's own, to the same bits as OpenSSL's; it may have been built without some of them."""
+LOOK_FOR_OPENSSL = ("asyncio", "hashlib", "hmac")
 
 
 @contextmanager
@@ -19,3 +25,14 @@ def without(*packages: str) -> Iterator[None]:
     finally:
         for package in hidden:
             del sys.modules[package]
+
+
+@contextmanager
+def without_openssl() -> Iterator[None]:
+    """asyncio and hashlib do without it: of the 80 MB of a daemon it would take 5, and no verb of
+    ours speaks TLS."""
+    hashes = ["_hashlib"] if all(map(find_spec, OWN_HASHES)) else []
+    with without("ssl", *hashes):
+        for name in LOOK_FOR_OPENSSL:
+            importlib.import_module(name)
+        yield

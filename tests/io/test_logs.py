@@ -72,8 +72,6 @@ def test_an_exception_is_shown_where_it_came_from(capsys: pytest.CaptureFixture[
 
 def test_the_log_brings_no_colours_with_it() -> None:
     """Of this host, where pytest brings them."""
-    program = (
-        "import sys, drslamd.io.logs; print('structlog' in sys.modules, 'rich' in sys.modules)"
-    )
+    program = "import sys, drslamd.io.logs; print(*({'structlog', 'rich'} & {*sys.modules}))"
     said = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
     assert said.stdout.split() == [b"structlog"]

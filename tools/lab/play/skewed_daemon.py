@@ -9,11 +9,15 @@ import sys
 import time
 from pathlib import Path
 
-from drslamd import no_openssl  # (first, as the command does)
-from drslamd.config import parse
-from drslamd.daemon import Daemon
-from drslamd.io.logs import set_up
-from lab.play.simulator import Clock
+from drslamd.host.loading import without_openssl
+
+with without_openssl():  # as the command does
+    import asyncio
+
+    from drslamd.config import parse
+    from drslamd.daemon import Daemon
+    from drslamd.io.logs import set_up
+    from lab.play.simulator import Clock
 
 
 class SkewedClock:
@@ -33,4 +37,4 @@ async def main(path: str, offset_us: str, ppm: str) -> None:
 
 
 if __name__ == "__main__":
-    no_openssl.asyncio.run(main(*sys.argv[1:4]))
+    asyncio.run(main(*sys.argv[1:4]))
