@@ -177,7 +177,7 @@ class Surroundings:
                 self._is_lost = True
             self._estimate, self._leg = estimate, leg
         if is_new:
-            known = estimate.covariance(self.own.robot) if estimate is not None else None
+            known = estimate.told(self.own.robot) if estimate is not None else None
             self._known = None if known is None else se2.packed(known)
         if is_new or utime - self._where_at >= SECOND_US:
             self._where, self._where_at = self._standing.whereabouts(utime), utime

@@ -26,7 +26,7 @@ def pose_now(
     Args:
         track, noise: of this robot's odometry.
     """
-    solved, known = estimate.trajectories.get(robot), estimate.covariance(robot)
+    solved, known = estimate.trajectories.get(robot), estimate.told(robot)
     if solved is None or known is None or not len(solved.n):
         return None
     last, now = int(solved.n[-1]), track.end - 1

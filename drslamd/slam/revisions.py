@@ -108,11 +108,11 @@ class Revisions:
         found = {(pair[0], pair[1]): self._boldness(pair) for pair in pairs}
         return {pair: bold for pair, bold in found.items() if bold > 1.0}
 
-    def no_narrower(self, narrower: dict[tuple[int, int], float]) -> dict[tuple[int, int], float]:
-        """By how much variances of pairs a < b may be smaller, and were not moved by more, of those
-        by which they would like to be."""
-        held = {pair: max(share, self._moved(pair)) for pair, share in narrower.items()}
-        return {pair: share for pair, share in held.items() if share < 1.0}
+    def no_narrower(self, narrower: dict[Whose, float]) -> dict[Whose, float]:
+        """By how much variances may be smaller, and were not moved by more, of those by which they
+        would like to be."""
+        held = {whose: max(share, self._moved(whose)) for whose, share in narrower.items()}
+        return {whose: share for whose, share in held.items() if share < 1.0}
 
     def _boldness(self, whose: Whose) -> float:
         return max(1.0, self._moved(whose))

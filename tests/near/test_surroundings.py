@@ -74,7 +74,7 @@ def test_a_jump_beyond_what_was_claimed_counts(
     """The square root of 11.34 is 3.37."""
     estimate = steered.robot.back.estimate
     assert estimate is not None
-    sure = replace(estimate, joint=0.01 * np.eye(9))
+    sure = replace(estimate, joint=0.01 * np.eye(9), narrower={})
     steered.robot.back.estimate = sure
     steered.look()
     paths = dict(sure.trajectories)

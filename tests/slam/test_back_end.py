@@ -444,13 +444,13 @@ def test_without_its_peers_there_is_nothing_beside_it(team: SmallTeam) -> None:
 
 
 @pytest.mark.parametrize("held", [{(0, 1): 0.7}, {}])
-def test_what_pairs_are_narrowed_by_is_held_against_what_solutions_moved(
-    team: SmallTeam, held: dict[tuple[int, int], float], monkeypatch: pytest.MonkeyPatch
+def test_what_claims_are_narrowed_by_is_held_against_what_solutions_moved(
+    team: SmallTeam, held: dict[tuple[int, ...], float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     back, _ = settled(team)
-    asked: list[dict[tuple[int, int], float]] = []
+    asked: list[dict[tuple[int, ...], float]] = []
 
-    def no_narrower(narrower: dict[tuple[int, int], float]) -> dict[tuple[int, int], float]:
+    def no_narrower(narrower: dict[tuple[int, ...], float]) -> dict[tuple[int, ...], float]:
         asked.append(narrower)
         return held
 

@@ -220,5 +220,19 @@ def test_no_pair_is_told_as_surer_than_later_solutions_move_it(
     assert found.get((0, 2)) == (left and pytest.approx(left, rel=1e-3))
 
 
+@pytest.mark.parametrize(
+    ("sigmas", "left"),
+    [(0.0, 0.4), (2.4, 0.4), (2.5, 2.5**2 / 15), (3.8, 3.8**2 / 15), (3.9, None)],
+)
+def test_nor_is_our_own_pose(sigmas: float, left: float | None) -> None:
+    """Five per degree of freedom are allowed, of three."""
+    revisions = Revisions()
+    moved = [*STANDING[:2], (0.0, 4.0 + sigmas * SIGMA)]
+    revisions.on_solution(team(STANDING, [0, 10]), 2)
+    revisions.on_solution(team(moved, [0, 10, 20]), 2)
+    found = revisions.no_narrower({(2,): 0.4})
+    assert found.get((2,)) == (left and pytest.approx(left, rel=1e-3))
+
+
 def test_who_would_be_no_narrower_is_made_so_by_nobody() -> None:
     assert Revisions().no_narrower({}) == {}

@@ -115,8 +115,8 @@ class TeamEstimate:
         left_out: pairs of which there was no room for ranges (`near_pairs`).
         boldness: by how much variances of pairs a < b that were claimed of late were too small
             (`revisions`), where they were.
-        narrower: times `joint`, variances of pairs a < b in each other, where sensors were seen to
-            be better than configured.
+        narrower: times `joint`, variances of poses (a,) in w and of pairs a < b in each other,
+            where sensors were seen to be better than configured.
         is_explained: is the model, with what was learned, one of what was measured?
         converged: is it good enough to be used?
         settled: is it the same from wherever it was begun?
@@ -152,7 +152,7 @@ class TeamEstimate:
     blocked: frozenset[tuple[int, int]] = frozenset()
     left_out: int = 0
     boldness: dict[tuple[int, int], float] = field(default_factory=dict)
-    narrower: dict[tuple[int, int], float] = field(default_factory=dict)
+    narrower: dict[tuple[int, ...], float] = field(default_factory=dict)
     is_explained: bool = True
     cost: float = 0.0
     iterations: int = 0
@@ -191,6 +191,12 @@ class TeamEstimate:
         """(3, 3) of the last pose of a robot; None where nothing is known of it."""
         at = self._rows(robot)
         return None if at is None else np.asarray(self.joint[at, at])
+
+    def told(self, robot: int) -> Array | None:
+        """The same as sure as it was seen to be, see `narrower`; asked by the robot itself, which
+        knows how far later solutions moved its pose (`revisions`)."""
+        known = self.covariance(robot)
+        return None if known is None else self.narrower.get((robot,), 1.0) * known
 
     def joint_of(self, a: int, b: int) -> Array | None:
         """(6, 6) of the last poses of two robots."""

@@ -151,11 +151,20 @@ def test_what_was_learned_of_the_wheels_corrects_odometry() -> None:
     [({}, {}, 1.0), ({}, {(2, 7): 0.4}, 0.4), ({(2, 7): 3.0}, {(2, 7): 0.4}, 3.0)],
 )
 def test_a_pair_that_was_moved_too_far_is_no_narrower_whatever_its_sensors_say(
-    boldness: dict[tuple[int, int], float], narrower: dict[tuple[int, int], float], times: float
+    boldness: dict[tuple[int, int], float], narrower: dict[tuple[int, ...], float], times: float
 ) -> None:
     team = replace(a_team(), boldness=boldness, narrower=narrower)
     assert team.narrow(2, 7) == team.narrow(7, 2) == times
     assert team.narrow(2, 3) == 1.0
+
+
+def test_a_pose_is_told_as_sure_as_it_was_seen_to_be() -> None:
+    team = a_team()
+    known = team.covariance(2)
+    assert known is not None
+    assert replace(team, narrower={(2,): 0.4, (2, 7): 0.1}).told(2) == pytest.approx(0.4 * known)
+    assert team.told(2) == pytest.approx(known)
+    assert team.told(99) is None
 
 
 def test_who_is_out_of_sight_is_named_from_either_side() -> None:

@@ -19,8 +19,8 @@ class Solution:
     Attributes:
         scatter: (pairs,) how many times the configured sigma ranges scatter.
         joint: (3 k, 3 k) covariance of x, y, theta in w of the k poses that were asked for.
-        shares: (k, k) what is left of the covariance of each two of them in each other, with the
-            noise that was seen (`pairs.narrowing`); of none where nothing is known of that.
+        shares: (k, k) what is left of the covariance of each two of them in each other, and of each
+            in w, with the noise that was seen (`pairs.narrowing`); of none where nothing is known.
         spread: sigmas of the calibration; bias_sigmas: (pairs,) how wrong biases may be, m.
         odometry_level: (m,) sigmas of the links of odometry over what was configured, as far as
             it was seen; feared_level: as far as it must be feared; late_level: of the last seconds.

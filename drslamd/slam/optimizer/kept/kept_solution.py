@@ -65,8 +65,8 @@ class Sureness:
 
 @dataclass(frozen=True)
 class KeptShares:
-    """What is left of the covariances of pairs (`banded.pairs.narrowing`), some seconds ago. It
-    moves slowly, and to find it takes longer than a second that is kept.
+    """What is left of the covariances of poses and pairs (`banded.pairs.narrowing`), some seconds
+    ago. It moves slowly, and to find it takes longer than a second that is kept.
 
     Attributes:
         robots: of whose last poses; links: of odometry, so many; newest: keyframe of all.
@@ -105,7 +105,7 @@ class Kept:
         sure: when that was made.
         variances: of the mountings, see `mountings.variances`; checked: of odometry. Both are made
             anew as the way grows.
-        shares: what is left of what is claimed of pairs.
+        shares: what is left of what is claimed of poses and pairs.
     """
 
     downwards: KeptFactor

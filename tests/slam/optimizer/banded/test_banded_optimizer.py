@@ -529,13 +529,13 @@ def test_a_robot_that_waited_while_the_others_drove_costs_little() -> None:
     assert np.hypot(*(estimate.trajectories[2].poses[1] - true)[:2]) < 0.5
 
 
-def test_pairs_that_are_narrower_are_named_by_their_robots_the_lower_first(
+def test_what_is_narrower_is_named_by_its_robots_the_lower_first(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     team = small_team(1, count=12)
     group = group_of(team.graph)
     robots = [data.chain.robot for data in team.graph.view.chains.values()]
-    shares = np.array([[1.0, 0.3, 0.4], [0.3, 1.0, 1.0], [0.4, 1.0, 1.0]])
+    shares = np.array([[1.0, 0.3, 0.4], [0.3, 0.8, 1.0], [0.4, 1.0, 1.0]])
     solve = banded_solver.solve
 
     def sharing(*args: Any, **named: Any) -> Solution:
@@ -543,7 +543,7 @@ def test_pairs_that_are_narrower_are_named_by_their_robots_the_lower_first(
 
     monkeypatch.setattr(banded_solver, "solve", sharing)
     a, b, c = sorted(robots)[:3]
-    assert solved(team.graph, group).narrower == {(a, b): 0.3, (a, c): 0.4}
+    assert solved(team.graph, group).narrower == {(b,): 0.8, (a, b): 0.3, (a, c): 0.4}
 
 
 @pytest.mark.parametrize("robot", [0, 2])

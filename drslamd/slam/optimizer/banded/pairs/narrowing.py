@@ -1,12 +1,12 @@
-"""By how much two robots are surer of each other than what is configured lets them claim.
+"""By how much a robot is surer of its pose, and of another, than what is configured lets it claim.
 
 The noise of a pair's ranges is held at that of the others, and that at what is configured, so much
 as a handful of independent ranges would say; likewise the odometry of each robot (`misfit.DOUBT`).
 Biases are feared to differ from each other as those of the team were seen to, and to be off alike
 as configured; so are scales, since few ranges tell of them. With that noise the same system is
-taken apart once more, and each pair gets one factor, by which its covariance is smaller in the mean
-of all directions. It is never above 1: what is wrong beyond what is configured is for the
-covariances of all.
+taken apart once more, and each pose in w and each pair gets one factor, by which its covariance is
+smaller in the mean of all directions. It is never above 1: what is wrong beyond what is configured
+is for the covariances of all.
 """
 
 from __future__ import annotations
@@ -107,7 +107,8 @@ def held_variances(squares: Array, expected: Array) -> Array:
 
 
 def shares(poses: Array, claimed: Array, seen: Array) -> Array:
-    """(k, k) what is left of the covariance of each two of k poses in each other, 1 at most.
+    """(k, k) what is left of the covariance of each two of k poses in each other, 1 at most; on the
+    diagonal of that of each in w.
 
     Args:
         poses: (k, 3) w_T_k.
@@ -116,15 +117,16 @@ def shares(poses: Array, claimed: Array, seen: Array) -> Array:
     """
     count = len(poses)
     out = np.ones((count, count))
+    at = np.arange(3 * count).reshape(count, 3)
+    alone = at[:, :, None], at[:, None, :]
+    np.fill_diagonal(out, _left(claimed[alone], seen[alone]))
     i, j = np.triu_indices(count, 1)
-    if not len(i):
-        return out
     across = np.zeros((len(i), 3, 6))
     across[:, :, :3], across[:, :, 3:] = -np.eye(3), np.eye(3)
     across[:, 0, 2], across[:, 1, 2] = (poses[j] - poses[i])[:, 1], -(poses[j] - poses[i])[:, 0]
-    at = (3 * np.stack([i, j], axis=1)[:, :, None] + np.arange(3)).reshape(-1, 6)
+    both = np.concatenate([at[i], at[j]], axis=1)
     wide, narrow = (
-        across @ joint[at[:, :, None], at[:, None, :]] @ np.swapaxes(across, 1, 2)
+        across @ joint[both[:, :, None], both[:, None, :]] @ np.swapaxes(across, 1, 2)
         for joint in (claimed, seen)
     )
     out[i, j] = out[j, i] = _left(wide, narrow)
@@ -140,12 +142,14 @@ def _left(wide: Array, narrow: Array) -> Array:
     return np.asarray(np.clip(left, LEAST_SHARE, 1.0))
 
 
-def narrower(robots: list[int], left: Array) -> dict[tuple[int, int], float]:
-    """What is left of the covariances of pairs a < b, where that is not all of it.
+def narrower(robots: list[int], left: Array) -> dict[tuple[int, ...], float]:
+    """What is left of the covariances of poses (a,) in w and of pairs (a, b), a < b, where that is
+    not all of it.
 
     Args:
         left: see `shares`, or of none.
     """
     at = {robot: k for k, robot in enumerate(robots)} if len(left) else {}
-    found = {(a, b): float(left[at[a], at[b]]) for a, b in combinations(sorted(at), 2)}
-    return {pair: share for pair, share in found.items() if share < 1.0}
+    told = [*((a, a) for a in at), *combinations(sorted(at), 2)]
+    found = {(a, b) if a != b else (a,): float(left[at[a], at[b]]) for a, b in told}
+    return {whose: share for whose, share in found.items() if share < 1.0}

@@ -1,4 +1,4 @@
-"""How much surer two robots are of each other than configured."""
+"""How much surer robots are of themselves and of each other than configured."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from drslamd.slam.optimizer.banded.pairs.narrowing import (
     MOST_POSES,
     held_variances,
     may_narrow,
+    narrower,
     seen_noise,
     shares,
 )
@@ -90,7 +91,6 @@ def test_what_is_left_is_the_mean_over_all_directions_of_one_in_the_other() -> N
         right = np.trace(np.linalg.inv(before) @ after) / 3
         assert found[a, b] == found[b, a] == pytest.approx(right, rel=1e-6)
         assert 0.4 < right < 1
-    assert np.diag(found).tolist() == [1.0, 1.0, 1.0]
 
 
 @pytest.mark.parametrize(
@@ -108,12 +108,33 @@ def test_of_one_pose_there_is_no_pair() -> None:
     assert shares(np.zeros((1, 3)), np.eye(3), np.eye(3)).tolist() == [[1.0]]
 
 
-@pytest.mark.parametrize(("wrong", "left"), [(1.0, 0.5), (0.0, 1.0), (-1e-3, 1.0)])
-def test_nothing_is_narrowed_by_what_rounding_has_left_no_covariance(
-    wrong: float, left: float
-) -> None:
-    claimed = np.diag([wrong, 1.0, 1.0, 0.0, 0.0, 0.0])
-    assert shares(np.zeros((2, 3)), claimed, 0.5 * claimed)[0, 1] == pytest.approx(left)
+def test_each_pose_alone_is_narrowed_by_the_mean_of_its_directions() -> None:
+    """Whatever it has to do with the others; never below a fifth."""
+    claimed = wide(4, 2)
+    seen = claimed.copy()
+    root = np.linalg.cholesky(claimed[:3, :3])
+    seen[:3, :3] = root @ np.diag([0.2, 0.5, 0.8]) @ root.T
+    seen[3:, 3:] *= 0.1
+    found = shares(np.zeros((2, 3)), claimed, seen)
+    assert found.diagonal() == pytest.approx([0.5, LEAST_SHARE])
+
+
+@pytest.mark.parametrize("wrong", [0.0, -1e-3])
+def test_nothing_is_narrowed_by_what_rounding_has_left_no_covariance(wrong: float) -> None:
+    claimed = np.diag([wrong, 1.0, 1.0, 1.0, 1.0, 1.0])
+    assert shares(np.zeros((2, 3)), claimed, 0.5 * np.eye(6)).diagonal().tolist() == [1.0, 0.5]
+
+
+def test_poses_are_named_by_their_robot_and_pairs_by_both() -> None:
+    left = np.array([[0.3, 0.5, 0.6], [0.5, 1.0, 0.7], [0.6, 0.7, 0.4]])
+    assert narrower([5, 9, 2], left) == {
+        (5,): 0.3,
+        (2,): 0.4,
+        (5, 9): 0.5,
+        (2, 5): 0.6,
+        (2, 9): 0.7,
+    }
+    assert narrower([5, 9, 2], np.ones((0, 0))) == {}
 
 
 def test_ranges_and_odometry_that_are_better_than_configured_are_seen_to_be() -> None:
@@ -144,11 +165,11 @@ def told(range_error: float, robots: int = 3, count: int = 40, link_error: float
     return solve(problem, marginals=last).shares
 
 
-def test_pairs_are_narrowed_where_sensors_are_better_and_not_where_they_are_as_configured() -> None:
+def test_robots_are_surer_where_sensors_are_better_and_not_where_they_are_as_configured() -> None:
+    """Of each other, and of where they are."""
     better, usual = told(0.01), told(0.065)
-    pairs = np.triu_indices(3, 1)
-    assert (better[pairs] < 0.82).all()
-    assert (usual[pairs] > 0.85).all()
+    assert (better < 0.82).all()
+    assert (usual > 0.85).all()
 
 
 def test_pairs_are_narrower_where_biases_of_a_team_are_alike(
