@@ -48,6 +48,8 @@ class Timers:
         """
         self._rounds = [_Round(action, period) for action, period in periods.items()]
         self._pauses = frozenset(pauses)
+        self._first = 0
+        """Which round is looked at first: the one behind a pause, so that none waits for ever."""
         self.next = 0
         self._hurried: Action | None = None
 
@@ -56,12 +58,14 @@ class Timers:
         self._hurried, self.next = action, min(self.next, utime)
 
     def take_due(self, utime: int) -> list[Action]:
-        """The actions whose time has come, up to a pause; each is then due again after its
-        period."""
+        """The actions whose time has come, up to a pause, behind which the next look begins; each
+        is then due again after its period."""
         taken: list[Action] = []
         hurried, self._hurried = self._hurried, None
-        for each in self._rounds:
+        first, self._first = self._first, 0
+        for place, each in enumerate(self._rounds[first:], first):
             if taken and taken[-1] in self._pauses:
+                self._first = place if self._is_any_due(utime, place) else 0
                 break
             due = utime if each.due is None else each.due
             if utime >= due:
@@ -72,3 +76,6 @@ class Timers:
         dues = [utime if each.due is None else each.due for each in self._rounds]
         self.next = max(utime, min(dues))
         return taken if hurried is None or hurried in taken else [*taken, hurried]
+
+    def _is_any_due(self, utime: int, first: int) -> bool:
+        return any(each.due is None or each.due <= utime for each in self._rounds[first:])

@@ -118,3 +118,10 @@ def test_what_is_hurried_goes_on_before_what_waits_for_the_end_of_a_pause() -> N
     timers.hurry(seldom, T0)
     assert timers.take_due(T0) == [often, seldom]
     assert timers.take_due(T0) == [seldom]
+
+
+def test_a_pause_that_is_due_each_time_keeps_nobody_waiting_for_ever() -> None:
+    """A robot that is woken as rarely as the first action comes round."""
+    timers = Timers({often: 100, seldom: 100}, {often})
+    taken = [timers.take_due(T0 + 100 * k) for k in range(10)]
+    assert taken == [[often], [seldom]] * 5

@@ -9,7 +9,9 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 
 OWN_HASHES = ("_md5", "_sha1", "_sha3", "_blake2")
-"""Python's own, to the same bits as OpenSSL's; it may have been built without some of them."""
+OWN_SHA2 = ("_sha2", "_sha256")
+"""Python's own, to the same bits as OpenSSL's, of which it may have been built without some; the
+second line is one module since 3.12."""
 LOOK_FOR_OPENSSL = ("asyncio", "hashlib", "hmac")
 
 
@@ -24,15 +26,20 @@ def without(*packages: str) -> Iterator[None]:
         yield
     finally:
         for package in hidden:
-            del sys.modules[package]
+            if sys.modules.get(package, package) is None:
+                del sys.modules[package]
 
 
 @contextmanager
 def without_openssl() -> Iterator[None]:
     """asyncio and hashlib do without it: of the 80 MB of a daemon it would take 5, and no verb of
     ours speaks TLS."""
-    hashes = ["_hashlib"] if all(map(find_spec, OWN_HASHES)) else []
+    hashes = ["_hashlib"] if _has_own_hashes() else []
     with without("ssl", *hashes):
         for name in LOOK_FOR_OPENSSL:
             importlib.import_module(name)
         yield
+
+
+def _has_own_hashes() -> bool:
+    return all(map(find_spec, OWN_HASHES)) and any(map(find_spec, OWN_SHA2))

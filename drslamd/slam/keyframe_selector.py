@@ -31,10 +31,10 @@ FINER = 5
 """Samples between finer keyframes."""
 DRIVEN = 2 * 10
 """So long before a keyframe its robot may have begun to drive, in samples; before that it stood."""
-LATELY = 64
-"""Keyframes, of more than the ten seconds for which a jump is feared."""
 AT_ONCE = 30
 """Of so many keyframes those before them are said at once, the newest first."""
+LATELY = 64 + 3 * AT_ONCE
+"""Keyframes, of more than the ten seconds for which a jump is feared, and finer ones before."""
 
 
 class KeyframeSelector:

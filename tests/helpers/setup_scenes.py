@@ -155,7 +155,10 @@ async def _problems_of(daemon: Daemon) -> list[str]:
             assert not task.done(), task
 
     await asyncio.wait_for(until_tried(), PATIENCE_S)
-    daemon.handle(Tick(clock.now() + 1_100_000))
+    utime = clock.now() + 1_100_000
+    daemon.handle(Tick(utime))
+    while robot.next_tick <= utime:
+        daemon.handle(Tick(utime))
     problems = list(robot.health.sentences().values())
     daemon.stop()
     await task

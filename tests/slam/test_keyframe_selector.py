@@ -182,3 +182,15 @@ def test_a_robot_that_stops_as_robots_do_makes_no_more_keyframes() -> None:
     robot = Driven()
     stopping(robot, 300)
     assert robot.selector.made(robot.track) == []
+
+
+def test_a_finer_keyframe_that_lies_beside_a_jump_is_not_said_again() -> None:
+    robot = Driven()
+    stopping(robot, 600)
+    first = robot.selector.made(robot.track)
+    assert [k.n for k in first] == [119, 121]
+    # 115 and 105 lie half way between those of each second; one of 120 lies beside the jump
+    robot.selector._lately.append(115)
+    found = [k.n for k in robot.selector.made(robot.track, is_odd=True)]
+    assert 105 in found
+    assert 115 not in found

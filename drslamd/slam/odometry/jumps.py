@@ -54,23 +54,27 @@ class Jump(NamedTuple):
 def feared(track: Track) -> Jump | None:
     """The jump that must be feared now; None where there is none."""
     count = min(track.end - max(track.n0, track.segment_start), LOOK_BACK)
-    if count < 4:
+    if count < 4 or not _jumps(_speeds(track, min(count, FEARED + 4))[0]):
         return None
     first = track.end - count
-    poses = track.steps(first, count) * RESOLUTION
-    step, heading = np.diff(poses[:, :2], axis=0), poses[:-1, 2]
-    axis = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
-    speed = (step * axis).sum(axis=1) * GRID_HZ
+    speed, axis, turning = _speeds(track, count)
     jumps = _jumps(speed)
     if not jumps or len(jumps) > HABIT:
         return None
-    turning = np.abs(np.diff(poses[:, 2])) * GRID_HZ
     is_still = (np.abs(speed) < STILL_MPS) & (turning < STILL_RADPS)
     over, begun, end = _over(jumps, speed, is_still)
     if len(speed) - begun > FEARED:
         return None
     way = (over[begun:, None] * axis[begun:]).sum(axis=0) / GRID_HZ
     return Jump(first + begun, way, first + end)
+
+
+def _speeds(track: Track, count: int) -> tuple[Array, Array, Array]:
+    """Of the last so many samples: (k,) m/s, the axes (k, 2) along which that is, (k,) rad/s."""
+    poses = track.steps(track.end - count, count) * RESOLUTION
+    step, heading = np.diff(poses[:, :2], axis=0), poses[:-1, 2]
+    axis = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    return (step * axis).sum(axis=1) * GRID_HZ, axis, np.abs(np.diff(poses[:, 2])) * GRID_HZ
 
 
 def _jumps(speed: Array) -> list[int]:

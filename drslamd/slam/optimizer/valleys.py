@@ -22,6 +22,9 @@ twice as many, and so on: a beginning costs some solutions."""
 BACKWARDS = 1.0
 """A scale beyond that: the way is longer the other way round."""
 
+HARDLY_WORSE = 10.0
+"""Of cost: by so little more a solution may fit, for it to be taken because it came to rest."""
+
 
 def other_starts(
     found: TeamEstimate, previous: TeamEstimate | None
@@ -48,6 +51,9 @@ def is_better(other: TeamEstimate, found: TeamEstimate) -> bool:
     """Of two solutions of one graph."""
     if other.is_explained != found.is_explained:
         return other.is_explained
+    if other.converged != found.converged:
+        # (what does not come to rest is no end, and nothing that others would come to)
+        return other.converged and other.cost < found.cost + HARDLY_WORSE
     return other.cost < found.cost
 
 

@@ -222,6 +222,18 @@ def test_what_strong_signals_do_is_taken_out_of_near_ranges_alone() -> None:
     assert added[-1] == pytest.approx(0.0, abs=1e-4)
 
 
+def test_what_strong_signals_do_goes_by_the_distance_without_the_bias() -> None:
+    """A range of 3 m, of which 2 m are bias, is one of a module 1 m away, but for that itself."""
+    window, _ = uncalibrated(5)
+    window = replace(window, ranges=np.full(len(window.ranges), 3.0))
+    known = PairCalibration(bias=Learned(2.0, 0.02), near_bias=Learned(-0.2, 0.02))
+    better, _ = calibrated_window(window, SENSORS, known)
+    distance = 1.0
+    for _ in range(50):
+        distance = 1.0 + 0.2 * math.exp(-distance / 3.0)
+    assert better.ranges == pytest.approx(distance, abs=0.002)
+
+
 def test_a_pair_is_found_whoever_owns_it() -> None:
     estimate = TeamEstimate(
         Segment(0, 1, 0),

@@ -14,7 +14,7 @@ from drslamd.slam.optimizer import valleys
 from drslamd.slam.optimizer.banded import banded_optimizer
 from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem
 from drslamd.slam.optimizer.banded.solution import Solution
-from drslamd.slam.optimizer.valleys import BACKWARDS, POSES, is_better, other_starts
+from drslamd.slam.optimizer.valleys import BACKWARDS, HARDLY_WORSE, POSES, is_better, other_starts
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +125,15 @@ def test_where_that_is_not_explained_either_the_lower_cost_counts(right: TeamEst
     for found in (known, unknown):
         assert is_better(replace(found, cost=found.cost - 0.1), found)
         assert not is_better(replace(found, cost=found.cost), found)
+
+
+@pytest.mark.parametrize(("worse", "is_taken"), [(-0.1, True), (0.1, False)])
+def test_what_comes_to_rest_may_cost_a_little_more(
+    worse: float, is_taken: bool, right: TeamEstimate
+) -> None:
+    restless = replace(right, converged=False)
+    assert is_better(replace(right, cost=right.cost + HARDLY_WORSE + worse), restless) is is_taken
+    assert not is_better(replace(restless, cost=right.cost - 100.0), right)
 
 
 @pytest.mark.parametrize(

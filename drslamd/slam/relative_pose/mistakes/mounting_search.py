@@ -169,7 +169,8 @@ class MountingSearch:
     def _is_quickly_due(self, utime: int, awaits: bool) -> bool:
         last = self._asked_quickly_at
         is_late = last is None or utime - last >= QUICKLY_US
-        is_open = awaits and not self.is_confirmed
+        # what so many windows leave open is asked rarely from then on
+        is_open = awaits and not self.is_confirmed and len(self._answers) < MOST_ASKED
         is_new = self.is_provisional and self._watched < WATCHED
         return is_late and self.found is None and (is_open or is_new)
 

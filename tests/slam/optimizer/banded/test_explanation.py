@@ -103,6 +103,19 @@ def test_where_all_is_as_configured_nothing_changes(seed: int) -> None:
     assert found.feared.max() < 1.7
 
 
+@pytest.mark.parametrize("is_asked", [False, True])
+def test_where_all_fits_stretches_are_asked_for_only_if_wheels_changed_their_speed_at_once(
+    is_asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+    monkeypatch.setattr(lapse_search, "is_asked_for", lambda _: is_asked)
+    monkeypatch.setattr(lapse_search, "best", lambda *args: asked.append(args))
+    problem, _ = a_team(1)
+    point = nominal(problem)
+    assert explained(problem, point).point is point
+    assert len(asked) == int(is_asked)
+
+
 def test_odometry_that_is_somewhat_worse_is_feared_to_be_as_much_worse_as_it_looks() -> None:
     """The poses are those of the nominal solution; only what is claimed of them grows."""
     problem = held_at(*team_problem(3, robots=ROBOTS, count=COUNT, link_error=1.15))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -155,3 +156,12 @@ def test_what_closures_are_worth_shows_in_the_covariances() -> None:
     for robot in (1, 2):
         assert 0.01 < spreads[0][robot] < 0.9 * spreads[1][robot] < 0.9
     assert spreads[0][0] < spreads[1][0] < 1.0
+
+
+@pytest.mark.parametrize(("in_vain", "is_anew"), [(2, False), (3, True)])
+def test_who_came_to_no_end_three_times_begins_anew(in_vain: int, is_anew: bool) -> None:
+    team = Team(1)
+    before = replace(team.solved(), in_vain=in_vain)
+    graph = team.team.graph
+    job: Any = ClosureOptimizer().job(graph, group_of(graph), before, {})
+    assert (job.args[0].start is None) is is_anew

@@ -16,6 +16,7 @@ from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.optimizer.banded import banded_optimizer
 from drslamd.slam.optimizer.banded.banded_solver import SETTLED
+from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.pairs import narrowing
 from drslamd.slam.optimizer.kept import (
     kept_claims,
@@ -172,6 +173,17 @@ def test_a_small_problem_is_solved_anew(
     # each robot makes one more
     monkeypatch.setattr(kept_solver, "FEW", poses + 3 + more)
     assert next(seconds).began_anew is is_anew
+
+
+@pytest.mark.parametrize("is_asked", [False, True])
+def test_where_wheels_changed_their_speed_at_once_a_small_team_is_solved_anew(
+    is_asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seconds = driven(MetTeam(3, 40, 10), 6)
+    *_, before = [next(seconds) for _ in range(5)]
+    assert not before.began_anew
+    monkeypatch.setattr(lapse_search, "is_asked_for", lambda _: is_asked)
+    assert next(seconds).began_anew is is_asked
 
 
 def test_shares_that_were_kept_are_those_that_are_found_anew() -> None:

@@ -88,7 +88,14 @@ def is_asked_for(problem: Problem) -> bool:
     """Did wheels stop, or go faster, all at once of late? Then it is asked though all fits."""
     if problem.pairs > MOST_PAIRS or not has_short_links(problem):
         return False
-    return any(freed.is_abrupt for freed in _possible(problem))
+    return any(f.is_abrupt and _has_moved(problem, f.robot) for f in _possible(problem))
+
+
+def _has_moved(problem: Problem, robot: int) -> bool:
+    """Has it made keyframes since all was as modelled? Of one that parks nothing new is known."""
+    if problem.fitted is None:
+        return True
+    return bool(problem.n[problem.robot == robot].max() > problem.fitted[robot])
 
 
 def _possible(problem: Problem) -> list[Freed]:

@@ -4,8 +4,9 @@ The noise of a pair's ranges is held at that of the others, and that at what is 
 as a handful of independent ranges would say; likewise the odometry of each robot (`misfit.DOUBT`).
 Biases are feared to differ from each other as those of the team were seen to, and to be off alike
 as configured; so are scales, since few ranges tell of them. With that noise the same system is
-taken apart once more, and each pose in w and each pair gets one factor, by which its covariance is
-smaller in the mean of all directions. It is never above 1: what is wrong beyond what is configured
+taken apart once more, and each pair gets one factor, by which its covariance is smaller in the mean
+of all directions, and each pose in w that of the direction that is smaller by least. It is never
+above 1: what is wrong beyond what is configured
 is for the covariances of all.
 """
 
@@ -119,7 +120,7 @@ def shares(poses: Array, claimed: Array, seen: Array) -> Array:
     out = np.ones((count, count))
     at = np.arange(3 * count).reshape(count, 3)
     alone = at[:, :, None], at[:, None, :]
-    np.fill_diagonal(out, _left(claimed[alone], seen[alone]))
+    np.fill_diagonal(out, _left(claimed[alone], seen[alone], is_of_any=True))
     i, j = np.triu_indices(count, 1)
     across = np.zeros((len(i), 3, 6))
     across[:, :, :3], across[:, :, 3:] = -np.eye(3), np.eye(3)
@@ -133,12 +134,21 @@ def shares(poses: Array, claimed: Array, seen: Array) -> Array:
     return out
 
 
-def _left(wide: Array, narrow: Array) -> Array:
-    """(m,) of covariances (m, 3, 3); all of those that rounding has left none."""
+def _left(wide: Array, narrow: Array, is_of_any: bool = False) -> Array:
+    """(m,) of covariances (m, 3, 3), in the mean of all directions; all of those that rounding has
+    left none.
+
+    Args:
+        is_of_any: instead of the direction of which least more is known: how a frame is turned may
+            be as unsure as ever where places in it are surer.
+    """
     is_sound = np.linalg.eigvalsh(wide)[:, 0] > 0
     left = np.ones(len(wide))
     solved = np.linalg.solve(wide[is_sound], narrow[is_sound])
-    left[is_sound] = np.einsum("kii->k", solved) / 3
+    if is_of_any:
+        left[is_sound] = np.linalg.eigvals(solved).real.max(axis=1, initial=LEAST_SHARE)
+    else:
+        left[is_sound] = np.einsum("kii->k", solved) / 3
     return np.asarray(np.clip(left, LEAST_SHARE, 1.0))
 
 

@@ -195,4 +195,18 @@ def test_an_abrupt_stretch_that_is_freed_or_long_ago_is_not_asked_for(
     assert is_asked_for(problem)
     freed = lapse_search._possible(problem)[0]
     assert not is_asked_for(replace(problem, freed=(freed,)))
-    assert not is_asked_for(replace(problem, fitted=problem.n.max() + np.zeros(3)))
+    newest = np.array([problem.n[problem.robot == robot].max() for robot in range(3)])
+    assert not is_asked_for(replace(problem, fitted=newest))
+
+
+@pytest.mark.parametrize(("since", "is_asked"), [(0, False), (10, True)])
+def test_of_a_robot_that_parks_an_abrupt_stretch_is_not_asked_for_again_and_again(
+    since: int, is_asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The last solution had all but so much of its way, and it ends soon behind the stretch."""
+    monkeypatch.setattr(lapse_search, "has_short_links", lambda _: True)
+    monkeypatch.setattr(lapse_search, "BEHIND", 100)
+    problem = given_stretches(monkeypatch, False, True)
+    newest = np.array([problem.n[problem.robot == robot].max() for robot in range(3)])
+    newest[1] -= since
+    assert is_asked_for(replace(problem, fitted=newest)) is is_asked

@@ -47,6 +47,8 @@ def beside(problem: Problem) -> tuple[Array, Calibration]:
     start = Calibration.zero(problem.pairs, robots)
     constants = {"bias": problem.pairs, "scale": robots, "yaw": robots, "near_bias": 1}
     moved = {name: rng.normal(0, 0.01, n) for name, n in constants.items()}
+    # (a small one would curve too little to be missed)
+    moved["near_bias"] -= 0.3
     antenna = rng.uniform(-0.01, 0.01, (robots, 2)) * problem.doubted.antenna[:, None]
     poses = problem.initial + rng.normal(0, 0.1, problem.initial.shape)
     poses[problem.gauge] = problem.initial[problem.gauge]
