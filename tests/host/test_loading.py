@@ -60,4 +60,5 @@ def test_who_brings_what_was_left_out_keeps_it(monkeypatch: pytest.MonkeyPatch) 
                 del sys.modules["nobody_has_this"]
             else:
                 monkeypatch.setitem(sys.modules, "nobody_has_this", there)
-        assert sys.modules.pop("nobody_has_this", None) == there
+        left: object = sys.modules.pop("nobody_has_this", None)
+        assert left == there
