@@ -111,7 +111,7 @@ class Daemon:
         self._watchdog = Watchdog(self._notifier, self._worker, readers, self._is_ticking)
         self._sleep = SleepWatch()
         self._timer: asyncio.TimerHandle | None = None
-        self._due = 0
+        self._due = self._asked = 0
         self._stop = asyncio.Event()
         self._failure: BaseException | None = None
         self._carry_out: dict[type[Any], Callable[[Any], None]] = {
@@ -187,18 +187,19 @@ class Daemon:
 
     def _wake(self) -> None:
         """Tick when the robot wants to be woken."""
-        due = self.robot.next_tick
+        due, now = self.robot.next_tick, self._clock.now()
         if self._timer is not None and self._due == due:
             return
         if self._timer is not None:
             self._timer.cancel()
-        wait_us = max(0, due - self._clock.now())
-        self._due = due
-        self._timer = asyncio.get_running_loop().call_later(wait_us / SECOND_US, self._tick)
+        # (what waits behind a pause was due before anybody could be asked to wake it)
+        self._due, self._asked = due, max(due, now)
+        wait_s = (self._asked - now) / SECOND_US
+        self._timer = asyncio.get_running_loop().call_later(wait_s, self._tick)
 
     def _tick(self) -> None:
         self._timer, now = None, self._clock.now()
-        self._pace.lags.append((now - self._due) / MILLISECOND_US)
+        self._pace.lags.append((now - self._asked) / MILLISECOND_US)
         self.handle(Tick(now))
 
     # effects

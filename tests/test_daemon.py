@@ -98,6 +98,22 @@ def test_how_late_the_loop_was_is_in_the_status(
     assert daemon._picture()["loop_lag_ms"] == {"median": late_ms, "p99": late_ms}
 
 
+def test_what_was_due_before_anybody_was_asked_for_it_is_not_late(
+    daemon: Daemon, clock: Stepped
+) -> None:
+    """It waited behind a pause for what came before it."""
+
+    async def one_tick() -> None:
+        ticked(daemon.robot, clock.utime)
+        clock.utime += 20 * MILLISECOND_US
+        daemon.robot.timers.next = clock.utime - 20 * MILLISECOND_US
+        daemon._wake()
+        await until(lambda: bool(daemon._pace.lags))
+
+    with_worker(daemon, one_tick)
+    assert set(daemon._pace.lags) == {0.0}
+
+
 # computations and restarts
 
 
