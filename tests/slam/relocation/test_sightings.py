@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -52,6 +56,23 @@ def test_a_circle_lies_where_the_peer_was_then(n: tuple[int, ...]) -> None:
     assert seen.range_m == pytest.approx(4.8)
     assert (seen.utime > 10_950_000).all()
     assert (seen.utime <= 11_250_000).all()
+
+
+def test_what_strong_signals_add_goes_by_the_distance() -> None:
+    """Of 1.5 m 1 m is bias and a part of 0.3 m near-range bias."""
+    ranges = RangeBuffer()
+    for k in range(120, 130):
+        ranges.add((k - 10) * 100_000, 1.5)
+    known: dict[str, Any] = {
+        "bias_m": {(0, 4): Learned(1.0, 0.05)},
+        "near_bias_m": Learned(0.3, 0.05),
+    }
+    own, beacon = Own(0, UNTOLD, 0.1, LINKTRACK), Beacon(peer(), ranges)
+    seen = sightings([beacon], replace(solved(100), **known), own, 10_950_000, 11_250_000)
+    distance = 0.5
+    for _ in range(60):
+        distance = 0.5 - 0.3 * math.exp(-distance / LINKTRACK.near_reach_m)
+    assert seen.range_m == pytest.approx(distance, abs=0.003)
 
 
 def test_a_peer_with_a_hole_of_its_own_since_is_none() -> None:

@@ -28,7 +28,7 @@ backwards or count wrongly none is."""
 WRONG, CLEAR = 60.0, 30.0
 """By how much chi-squared must fall, over that of a degree of freedom, for the configuration to be
 wrong, and by how much the next kind must be worse, for wheels that run backwards to be named (so
-much as well, of as many windows as are ever asked, for it not to be believed). Of twenty-one such
+much as well, of the newest `MOST_ASKED` windows, for it not to be believed). Of twenty-one such
 robots all are, after 20 to 48 s, and in eighty pairs without such wheels none."""
 BETTER, UNLIKE = 100.0, 40.0
 """Likewise for a track or a scale to begin with, and by how much all that is no track or scale of

@@ -510,6 +510,21 @@ def test_a_pair_that_one_window_confirmed_is_watched_for_a_while() -> None:
     assert not search.is_due(utime + QUICKLY_US, False)
 
 
+@pytest.mark.parametrize(("asked", "is_due"), [(MOST_ASKED - 1, True), (MOST_ASKED, False)])
+def test_what_so_many_windows_leave_open_is_no_longer_asked_each_second(
+    asked: int, is_due: bool
+) -> None:
+    """A track is better by more than chance, and by less than what names it."""
+    search, last = MountingSearch(), (asked - 1) * APART_US
+    for k in range(asked):
+        search.begin(k * APART_US, True)
+        better = {TRACK: GOOD, AS_IT_IS: GOOD + CLEAR / 5, MIRROR: GOOD + CLEAR / 5}
+        assert not ask(search, better)
+    assert not search.is_confirmed
+    assert search.is_due(last + QUICKLY_US, True) is is_due
+    assert search.is_due(last + APART_US, True)
+
+
 def test_what_several_windows_say_finds_a_mistake_after_that() -> None:
     search = sure()
     for _ in range(FEWEST_ASKED - 1):

@@ -31,8 +31,8 @@ ROUND, ROUGH = 8, 1e-3
 LITTLE, MOST_POLISHED = 10.0, 3
 """What gains less by then is not gone on with, and so many are."""
 ABRUPT = 15.0
-"""Of cost, for a stretch in which wheels changed their speed at once. Of the drives of robots that
-speed up as motors do none has that, of counters that stick or spin for some seconds most have."""
+"""Of cost, for a stretch in which wheels changed their speed at once: of twenty drives in which the
+counters of one robot stuck nineteen have that, and of their healthy robots none."""
 MOST_PAIRS = 45
 """That have met, ten robots: a stretch takes some solutions, and larger teams ask only once
 something does not fit."""
