@@ -208,6 +208,7 @@ def _graph(robot: Robot) -> dict[str, Any]:
                 f"{min(own, peer)}-{max(own, peer)}": round(bias.value, 4)
                 for peer, bias in learned.bias.items()
             },
+            "near_range_bias_m": round(estimate.near_bias_m.value, 4),
             "wheel_scale": {str(own): round(learned.scale.value, 5)},
             "wheel_turn": {str(own): round(learned.turn.value, 5)},
             "antenna_m": {

@@ -302,7 +302,9 @@ def test_of_the_graph_the_group_its_keyframes_and_what_was_learned_are_said() ->
     back = scene.robot.back
     back.looked_at = back.graph.view
     back.group = {Segment(4, 1, 0), Segment(1, 1, 0), Segment(1, 1, 2)}
-    back.estimate = TeamEstimate(Segment(1, 1, 0), {}, iterations=7, converged=False)
+    back.estimate = TeamEstimate(
+        Segment(1, 1, 0), {}, iterations=7, converged=False, near_bias_m=Learned(-0.03456, 0.02)
+    )
     assert section(scene, "graph") == {
         "group": [1, 4],
         "keyframes": {"1": 2, "4": 3},
@@ -311,6 +313,7 @@ def test_of_the_graph_the_group_its_keyframes_and_what_was_learned_are_said() ->
         "iterations": 7,
         "converged": False,
         "range_bias_m": {"1-2": 0.1235},
+        "near_range_bias_m": -0.0346,
         "wheel_scale": {"2": 0.02},
         "wheel_turn": {"2": 0.3},
         "antenna_m": {"2": [0.1235, -0.2]},

@@ -9,6 +9,7 @@ import pytest
 from lab.accuracy import accuracy_rows
 from lab.accuracy.accuracy_rows import Figure
 from lab.recordings.recording import Recording, Trail
+from lab.score.outcome import Outcome
 
 
 @pytest.mark.parametrize(
@@ -57,10 +58,16 @@ def test_odometry_is_broken_for_as_long_as_a_window_remembers_it() -> None:
     assert touched.tolist() == [False, False, True, True, False, False]
 
 
-def test_the_true_bias_is_the_median_of_what_ranges_are_too_long() -> None:
+def test_the_bias_that_is_not_found_is_the_median_of_what_is_left_of_ranges() -> None:
     trails = {0: straight(0, {}), 1: straight(1, {}, y=3.0)}
     errors = (0.1, 0.2, 0.9)
     rows = [[10.0 + k, 0, 1, 3.0 + error] for k, error in enumerate(errors)]
     rows.append([14.0, 1, 0, 9.0])
     recording = Recording("made", trails, np.array(rows))
-    assert accuracy_rows.true_bias(recording, 0, 1) == pytest.approx(0.2)
+    # over 3 m a near-range bias of 0.1 m at range 0 has fallen to 0.1 / e
+    for found, left in (
+        (Outcome(), 0.2),
+        (Outcome(bias_m={"0-1": 0.15}), 0.05),
+        (Outcome(bias_m={"0-1": 0.15}, near_bias_m=0.1), 0.05 - 0.1 / math.e),
+    ):
+        assert accuracy_rows.bias_not_found(recording, 0, 1, found) == pytest.approx(left)

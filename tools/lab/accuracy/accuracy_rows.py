@@ -211,8 +211,7 @@ def _range_only(data: Path, setup: Setup) -> list[Figure]:
 
     name = "range_only_CL, both moving"
     figures = _pair_figures(name, both(windows), both(live), 0.12, 8.0)
-    bias = result.bias_m.get(f"{a}-{b}", 0.0)
-    off = abs(bias - true_bias(recording, a, b))
+    off = abs(bias_not_found(recording, a, b, result))
     there = list(modules(result).values())
     apart = float(np.hypot(*(there[0] - there[1]))) if len(there) == 2 else float("inf")
     return [
@@ -224,11 +223,17 @@ def _range_only(data: Path, setup: Setup) -> list[Figure]:
     ]
 
 
-def true_bias(recording: Recording, a: int, b: int) -> float:
-    """Median of measured minus true distances of a pair."""
+def bias_not_found(recording: Recording, a: int, b: int, found: Outcome) -> float:
+    """Median of what ranges of a pair have too much beyond what was found of it, m.
+
+    What is found of a range is the bias of its pair and the near-range bias over its distance.
+    Where distances vary little the two cannot be told apart, so only their sum is true or not.
+    """
     rows = recording.ranges[(recording.ranges[:, 1] == a) & (recording.ranges[:, 2] == b)]
     ends = relative_errors.true_relative(recording, a, b, rows[:, 0])
-    return float(np.median(rows[:, 3] - np.hypot(ends[:, 0], ends[:, 1])))
+    distances = np.hypot(ends[:, 0], ends[:, 1])
+    near = (found.near_bias_m or 0.0) * DEFAULTS.ranges.near_range_shape(distances)
+    return float(np.median(rows[:, 3] - distances - found.bias_m.get(f"{a}-{b}", 0.0) - near))
 
 
 def _murp(data: Path, setup: Setup) -> list[Figure]:

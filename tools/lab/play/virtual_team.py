@@ -130,6 +130,8 @@ def add_answers(
     out.groups[robot] = status["graph"]["group"]
     out.status[robot] = status
     out.bytes_sent[robot] = status["network"]["bytes_sent"]
+    if out.near_bias_m is None:
+        out.near_bias_m = status["graph"].get("near_range_bias_m")
     out.bias_m = {**status["graph"].get("range_bias_m", {}), **out.bias_m}
     out.scale = {**status["graph"].get("wheel_scale", {}), **out.scale}
 

@@ -55,6 +55,8 @@ class Outcome:
     bytes_sent: dict[int, int] = field(default_factory=dict)
     bias_m: dict[str, float] = field(default_factory=dict)
     """Range bias of each pair "A-B", as the lowest robot that knows it has it at the end."""
+    near_bias_m: float | None = None
+    """Of all ranges beside it, at distance 0, likewise; None while nobody knows."""
     scale: dict[str, float] = field(default_factory=dict)
     """Scale error of each robot's odometry, likewise."""
     ms: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
