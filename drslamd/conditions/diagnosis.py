@@ -279,15 +279,18 @@ def _why_not_connected(pair: PairTracker) -> str:
     if pair.connected:
         return "connected, the graph is about to be solved"
     enough = len(pair.kept) >= pair.agreement.least
+    agree = f"{len(pair.kept)} of {pair.closures_seen} closures agree"
+    if pair.agreement.confirms and enough and pair.search.is_undecided:
+        return (
+            f"{agree}, but the same ranges would rather fit wheels of another track or size, and "
+            "not clearly; look at the wheels of both"
+        )
     if pair.agreement.confirms and enough and not pair.search.is_confirmed:
         return (
-            f"{len(pair.kept)} of {pair.closures_seen} closures agree, but the same ranges would "
-            "fit wheels that run backwards, until both have driven more"
+            f"{agree}, but the same ranges would fit wheels that run backwards, until both have "
+            "driven more"
         )
-    return (
-        f"{len(pair.kept)} of {pair.closures_seen} closures agree, "
-        f"{pair.agreement.least} must and outnumber all others"
-    )
+    return f"{agree}, {pair.agreement.least} must and outnumber all others"
 
 
 def _listed(robots: object) -> str:

@@ -327,6 +327,21 @@ def test_closures_that_agree_wait_for_the_proof_that_no_wheel_runs_backwards(
     assert "run backwards" not in why(scene)
 
 
+@pytest.mark.parametrize("kept", [4, 5])
+def test_or_for_windows_that_would_rather_have_another_track(kept: int) -> None:
+    """Only where enough agree: what lacks else is agreement."""
+    scene = with_pair(4)
+    answered(scene, 4, *[1] * 5)
+    pair = scene.robot.front.pairs[4]
+    pair.kept = cast(Any, (object(),) * kept)
+    pair.search._is_rather_another = True
+    rather = "the same ranges would rather fit wheels of another track or size" in why(scene)
+    assert rather is (kept == 5)
+    assert "run backwards" not in why(scene)
+    pair.search.is_confirmed = True
+    assert "rather" not in why(scene)
+
+
 def test_when_windows_fail_after_some_that_did_not_the_last_one_is_the_reason() -> None:
     scene = with_pair(4)
     answered(scene, 4, 1, 1, 0)

@@ -100,6 +100,8 @@ class MountingSearch:
         self.is_clear = False
         self.is_confirmed = False
         self.is_provisional = False
+        self._is_rather_another = False
+        """Would all windows that are asked rather have a mistake?"""
         self._fits: deque[bool] = deque(maxlen=RECENT)
         self._answers: deque[_Answer] = deque(maxlen=MOST_ASKED)
         self._asked_at: int | None = None
@@ -144,6 +146,11 @@ class MountingSearch:
     def disagrees(self) -> bool:
         """Do ranges and odometries of the pair contradict each other again and again?"""
         return self.poor >= MOST
+
+    @property
+    def is_undecided(self) -> bool:
+        """Does no mistake explain its windows clearly, and would they rather have one than none?"""
+        return self._is_rather_another and self.found is None and not self.is_confirmed
 
     @property
     def is_contested(self) -> bool:
@@ -239,6 +246,7 @@ class MountingSearch:
             is_other = total.min() <= min(total[0] - CLEAR, FITS * freedom)
             is_backwards = least_of_backwards(total - total[0], True) < INDIFFERENT
             self._confirm(not (is_other or is_backwards))
+            self._is_rather_another = bool(is_other)
         case, is_clear = winner(total, freedom)
         # whatever happens to a mounting that was right is something else
         if case is None or self._is_final:

@@ -138,6 +138,7 @@ def test_nor_is_that_believed_while_something_else_explains_what_it_does_not(
         ask(search, {AS_IT_IS: as_it_is, MIRROR: as_it_is, **either})
         assert search.found is None
     assert search.is_confirmed is confirms
+    assert search.is_undecided is not confirms
 
 
 # what is found
