@@ -324,6 +324,23 @@ async def test_where_it_is_up_its_interface_and_own_address_are_said() -> None:
 
 
 @in_a_loop
+async def test_an_address_that_changes_meanwhile_is_said_with_the_next_look(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(multicast, "LOOK_S", 0.05)
+    addresses = ["10.0.0.7", "10.0.0.8"]
+    monkeypatch.setattr(multicast, "own_address", lambda section: addresses[0])
+    where = section("lo")
+    transport, ear = native(where)
+    async with running(transport):
+        await spoken_until(transport, ear.is_up)
+        del addresses[0]
+        await spoken_until(transport, lambda: len(ear.states) == 2)
+    said = [state.detail for state in ear.states]
+    assert said == [f"{GROUP}:{where.port} on lo (10.0.0.{last})" for last in (7, 8)]
+
+
+@in_a_loop
 async def test_a_port_that_another_program_keeps_for_itself_is_taken_once_it_is_free() -> None:
     where = section()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as keeper:

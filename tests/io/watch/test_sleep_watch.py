@@ -18,10 +18,12 @@ class Kernel:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.ran, self.slept = 5 * S, 2 * S
         self.between_readings = 0
+        self.monotonic_reads = 0
         monkeypatch.setattr(time, "monotonic_ns", self._monotonic)
         monkeypatch.setattr(time, "clock_gettime_ns", self._clock)
 
     def _monotonic(self) -> int:
+        self.monotonic_reads += 1
         self.ran += self.between_readings
         return self.ran
 
@@ -71,3 +73,16 @@ def test_who_is_held_up_between_two_readings_did_not_sleep(kernel: Kernel) -> No
 def test_this_computer_did_not_sleep_during_this_test() -> None:
     watch = SleepWatch()
     assert [watch.slept_us() for _ in range(1_000)] == [0] * 1_000
+
+
+@pytest.mark.parametrize(("ms", "compared"), [(40, 1), (125, 9)])
+def test_who_is_asked_often_compares_both_clocks_once_a_second(
+    kernel: Kernel, ms: int, compared: int
+) -> None:
+    """Over a bit more than a second; reading both takes the other clock before and after."""
+    watch = SleepWatch()
+    kernel.monotonic_reads = 0
+    for _ in range(1125 // ms):
+        kernel.ran += ms * MS
+        assert watch.slept_us() == 0
+    assert kernel.monotonic_reads == 2 * compared
