@@ -86,7 +86,7 @@ def _tables(team: TeamProblem, robot: Robot) -> dict[str, Any]:
     poses = problem.initial
     names = np.array([chain.robot for chain in team.chains])
     times = problem.n * GRID_US
-    names_and_times = [np.arange(len(poses)), problem.robot, times]
+    names_and_times = [np.arange(len(poses)), problem.robot_id, times]
     angles = se2.wrap(poses[:, 2])
     wheels = _odometry(team, robot)
     ranges, pairs = problem.ranges, np.array(team.pairs).reshape(-1, 2)
@@ -94,7 +94,7 @@ def _tables(team: TeamProblem, robot: Robot) -> dict[str, Any]:
     bias = team.start.bias[ranges.pair] if len(pairs) else np.zeros(0)
     told = [names[ranges.robots], ranges.i, ranges.j, ranges.measured, ranges.sigma, bias, error]
     edges = problem.odometry
-    is_robot = problem.robot < FIRST_NODE
+    is_robot = problem.robot_id < FIRST_NODE
     to_robots = is_robot[ranges.i] & is_robot[ranges.j]
     closures = factors.closures(PoseGraph.of(robot.back.looked_at), places)
     closures = closures.chosen(is_robot[closures.i] & is_robot[closures.j])

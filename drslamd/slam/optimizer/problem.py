@@ -248,7 +248,7 @@ class Problem:
     """One connected group of robots.
 
     Attributes:
-        robot, n: (k,) whose keyframe each pose is, and which.
+        robot_id, n: (k,) whose keyframe each pose is, and which; all else numbers robots from 0 on.
         initial: (k, 3) w_T_k.
         gauge: the pose that is held where `initial` has it.
         pairs: how many pairs of robots have ranges.
@@ -264,7 +264,7 @@ class Problem:
         width: (pairs,) of how many times their sigma ranges weigh, of their own where left out.
     """
 
-    robot: Index
+    robot_id: Index
     n: Index
     initial: Array
     gauge: int

@@ -146,7 +146,7 @@ def build_problem(
         near_bias=numbers.model.near_bias_sigma_m,
     )
     problem = Problem(
-        robot=places.robot,
+        robot_id=places.robot,
         n=places.n,
         initial=factors.initial_poses(graph, group, previous, places, known),
         gauge=factors.gauge_place(graph, group, places),

@@ -229,8 +229,8 @@ class Run:
 def contradicted(problem: Problem, point: Point) -> NDArray[np.bool_]:
     """(pairs,) whose ranges of late do not fit the solution: an unbroken run of them, or many."""
     found = lately_wrong(problem, point)
-    robots = np.unique(problem.robot)
-    ends = problem.robot[np.stack([problem.ranges.i, problem.ranges.j])]
+    robots = np.unique(problem.robot_id)
+    ends = problem.robot_id[np.stack([problem.ranges.i, problem.ranges.j])]
     for run in runs(problem, point):
         between = np.isin(ends, robots[[run.i, run.j]]).all(axis=0)
         found[problem.ranges.pair[between]] = True
@@ -257,15 +257,15 @@ def runs(problem: Problem, point: Point) -> list[Run]:
     order = np.argsort(np.maximum(ranges.i, ranges.j), kind="stable")
     wrong = outliers(problem, point)
     sigmas = sigmas_off(problem, point)
-    robots = np.unique(problem.robot)
+    robots = np.unique(problem.robot_id)
     found = []
     for pair in named:
         mine = order[ranges.pair[order] == pair][::-1]
         count = _run_length(wrong[mine]) or _scattered(sigmas[mine])
         first = mine[count - 1]
         ends = np.array([ranges.i[first], ranges.j[first]])
-        ends = ends[np.argsort(problem.robot[ends])]
-        (i, j), (n_i, n_j) = np.searchsorted(robots, problem.robot[ends]), problem.n[ends]
+        ends = ends[np.argsort(problem.robot_id[ends])]
+        (i, j), (n_i, n_j) = np.searchsorted(robots, problem.robot_id[ends]), problem.n[ends]
         found.append(Run(int(i), int(j), int(n_i), int(n_j), count))
     return found
 

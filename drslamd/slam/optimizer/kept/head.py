@@ -144,7 +144,7 @@ def _moved(place: Index, numbers: Index) -> Index:
 
 def keys_of(problem: Problem) -> Index:
     """(k,) one number for each robot and keyframe."""
-    return np.asarray(problem.robot.astype(np.int64) * KEY + problem.n.astype(np.int64))
+    return np.asarray(problem.robot_id.astype(np.int64) * KEY + problem.n.astype(np.int64))
 
 
 def tail_of(problem: Problem) -> Flags:

@@ -202,7 +202,7 @@ def _unknowns(poses: Index) -> Index:
 def _newest(problem: Problem) -> Flags:
     """(k,) the last pose of each robot."""
     found = np.zeros(len(problem.n), dtype=bool)
-    backwards = problem.robot[::-1]
+    backwards = problem.robot_id[::-1]
     found[len(found) - 1 - np.unique(backwards, return_index=True)[1]] = True
     return found
 

@@ -81,7 +81,7 @@ class KeptShares:
     @staticmethod
     def of(team: TeamProblem, last: tuple[int, ...], left: Array) -> KeptShares:
         """Of the poses `last`, one of each robot."""
-        robots = tuple(team.problem.robot[list(last)].tolist())
+        robots = tuple(team.problem.robot_id[list(last)].tolist())
         newest = int(team.problem.n.max(initial=0))
         return KeptShares(robots, len(team.problem.odometry), newest, left)
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from slam_problems import (
+    IDS,
     held_at,
     links_of,
     mismeasured,
@@ -697,7 +698,7 @@ def test_what_began_just_now_may_be_wheels_until_they_had_time_to_show_it(
     ranges: int, is_asked: bool
 ) -> None:
     problem, _ = around_walls(7)
-    newest = np.array([problem.n[problem.robot == robot].max() for robot in range(ROBOTS)])
+    newest = np.array([problem.n[problem.robot_id == robot].max() for robot in IDS[:ROBOTS]])
     problem = replace(problem, fitted=newest - 10 * ranges)
     found = explained(problem, nominal(problem))
     assert (found.equations.problem.blocked is not None) is is_asked
@@ -705,7 +706,7 @@ def test_what_began_just_now_may_be_wheels_until_they_had_time_to_show_it(
 
 def test_who_stood_all_the_time_does_not_hide_that_the_others_have_driven() -> None:
     problem, _ = around_walls(7)
-    newest = np.array([problem.n[problem.robot == robot].max() for robot in range(ROBOTS)])
+    newest = np.array([problem.n[problem.robot_id == robot].max() for robot in IDS[:ROBOTS]])
     parked = np.array([True, False, False, False])
     problem = replace(problem, fitted=newest - np.where(parked, 0, 10 * NOT_WHEELS))
     assert explained(problem, nominal(problem)).equations.problem.blocked is not None

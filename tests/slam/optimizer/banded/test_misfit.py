@@ -228,13 +228,12 @@ def test_a_run_lasts_until_now_and_goes_back_as_far_as_most_are_outliers(
 
 
 def test_each_pair_has_its_run_and_names_its_robots_as_the_problem_numbers_them() -> None:
-    """Robots 4, 7 and 9; each says when by its own clock, whichever end of a range it is."""
+    """Whose ids are others; each says when by its own clock, whichever end of a range it is."""
     pair = np.array([1, 2] * 6)
     problem, point = errs(np.full(12, 9.0), pair)
-    names = np.array([4, 7, 9])
     r = problem.ranges
     turned = replace(r, i=r.j, j=r.i, q_i=r.q_j, q_j=r.q_i)
-    problem = replace(problem, robot=names[problem.robot], ranges=turned)
+    problem = replace(problem, ranges=turned)
     found = runs(problem, point)
     assert found == [
         Run(0, 2, CLOCKS[0], CLOCKS[2], 6),

@@ -402,7 +402,7 @@ def test_robots_that_never_moved_are_not_blamed() -> None:
     columns = {name: getattr(links, name)[none] for name in links.__dataclass_fields__}
     problem = replace(
         problem,
-        robot=problem.robot[:2],
+        robot_id=problem.robot_id[:2],
         n=problem.n[:2],
         initial=problem.initial[:2],
         odometry=replace(links, **columns),

@@ -22,7 +22,7 @@ def test_covariances_and_sigmas_are_those_of_the_whole_system() -> None:
     team = a_team_problem()
     problem = team.problem
     point, scatter = shaken(problem), np.array([0.2, 0.9, 1.4])
-    wanted = np.array([np.flatnonzero(problem.robot == robot)[-1] for robot in range(3)])
+    wanted = np.array([np.flatnonzero(problem.robot_id == robot)[-1] for robot in range(3)])
     joint, spread, biases = claims.covariances(Equations(problem), point, scatter, wanted)
     ratio = problem.model.correlated_ratio(1.0) * np.maximum(scatter, LEAST_SCATTER)
     believed = Believed(problem, point, ratio)
@@ -52,7 +52,7 @@ def test_a_team_that_was_turned_as_a_whole_is_claimed_as_it_stands() -> None:
     places = (before.poses[:, :2] @ [1, 1j]) * np.exp(1j * angle) + 5
     poses = np.column_stack([places.real, places.imag, before.poses[:, 2] + angle])
     point = Point.of(problem, poses, before.calibration)
-    wanted = np.array([np.flatnonzero(problem.robot == robot)[-1] for robot in range(3)])
+    wanted = np.array([np.flatnonzero(problem.robot_id == robot)[-1] for robot in range(3)])
     joint, _, _ = claims.covariances(Equations(problem), point, scatter, wanted)
     ratio = problem.model.correlated_ratio(1.0) * np.maximum(scatter, LEAST_SCATTER)
     kept = build(Believed(problem, before, ratio), team.pairs, tail_of(problem), with_blocks=False)

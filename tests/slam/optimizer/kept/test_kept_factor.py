@@ -106,7 +106,7 @@ def test_the_newest_pose_of_each_robot_is_never_eliminated(team: TeamProblem) ->
     assert not kept.blocks
     inside = set(kept.head.keys[kept.head.front].tolist()) | set(kept.head.far.tolist())
     for robot in range(ROBOTS):
-        newest = np.flatnonzero(problem.robot == robot)[-1]
+        newest = np.flatnonzero(problem.robot_id == robot)[-1]
         assert keys_of(problem)[newest] in inside
 
 

@@ -58,7 +58,7 @@ def solved() -> tuple[Point, Array]:
 
 def kept_of(team: TeamProblem) -> Array:
     """What is known of mountings after a solution."""
-    last = tuple(int(np.flatnonzero(team.problem.robot == robot)[-1]) for robot in range(3))
+    last = tuple(int(np.flatnonzero(team.problem.robot_id == robot)[-1]) for robot in range(3))
     _, kept = kept_solver.solve(team, last, 1e-6)
     assert isinstance(kept, kept_solution.Kept)
     return kept.variances

@@ -34,7 +34,7 @@ def with_errors(problem: Problem, point: Point, sigmas: dict[int, float]) -> Poi
 
 def newest_of(problem: Problem) -> Index:
     """The last keyframe of each of three robots."""
-    return np.array([problem.n[problem.robot == robot].max() for robot in range(3)])
+    return np.array([problem.n[problem.robot_id == robot].max() for robot in range(3)])
 
 
 CASES = [

@@ -65,14 +65,14 @@ def lapse_of(problem: Problem, robots: list[int], freed: Freed) -> Lapse:
 def freed_lately(problem: Problem) -> bool:
     """Did a stretch that is freed end a minute ago or less?"""
     return any(
-        _newest(problem, one) <= span(problem, one)[1] + REGARDED_S * GRID_HZ
+        newest(problem, one.robot) <= span(problem, one)[1] + REGARDED_S * GRID_HZ
         for one in problem.freed
     )
 
 
-def _newest(problem: Problem, freed: Freed) -> int:
-    """The last keyframe of the robot whose stretch it is."""
-    return int(problem.n[problem.odometry.j[problem.odometry.robot == freed.robot]].max())
+def newest(problem: Problem, robot: int) -> int:
+    """The last keyframe of a robot, as the problem numbers it, that has links."""
+    return int(problem.n[problem.odometry.j[problem.odometry.robot == robot]].max())
 
 
 def still_freed(problem: Problem, point: Point) -> tuple[Freed, ...]:
@@ -104,6 +104,6 @@ def settled(
         if not one.is_settled:
             point = on_likelier_side(equations, point, one, most, tolerance)
             point, is_clear = best_placed(equations, point, one, most, tolerance)
-            is_old = _newest(problem, one) >= span(problem, one)[1] + SETTLES_S * GRID_HZ
+            is_old = newest(problem, one.robot) >= span(problem, one)[1] + SETTLES_S * GRID_HZ
             freed[at] = replace(one, is_settled=bool(is_clear and is_old))
     return Equations(replace(problem, freed=tuple(freed)), like=equations), point

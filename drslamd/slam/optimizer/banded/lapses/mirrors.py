@@ -166,7 +166,7 @@ def _either_side(problem: Problem, point: Point, poses: Index) -> tuple[Array, A
         end_j = place[ranges.j[which]] + sight.arm_j[which]
         antenna, seen = np.where(is_i, end_i, end_j), np.where(is_i, end_j, end_i)
         measured = np.abs(antenna - seen) - sight.error[which]
-        whose = problem.robot[np.where(is_i, ranges.j[which], ranges.i[which])]
+        whose = problem.robot_id[np.where(is_i, ranges.j[which], ranges.i[which])]
         robots = np.unique(whose)
         if len(robots) >= 2:
             a, b = (int(np.flatnonzero(whose == robot)[-1]) for robot in robots[:2])

@@ -165,10 +165,10 @@ def _ranged_later(problem: Problem, freed: Freed) -> NDArray[np.bool_]:
     out = np.zeros(len(ranges), dtype=bool)
     for pose in odometry.i[freed.links[_seconds(problem, freed.links) >= STANDS_S]].tolist():
         for mine, other in ((ranges.i, ranges.j), (ranges.j, ranges.i)):
-            for robot in np.unique(problem.robot[other[mine == pose]]).tolist():
-                later = np.flatnonzero(problem.robot == robot)
+            for robot in np.unique(problem.robot_id[other[mine == pose]]).tolist():
+                later = np.flatnonzero(problem.robot_id == robot)
                 later = later[later > pose]
-                is_its = (mine == pose) & (problem.robot[other] == robot)
+                is_its = (mine == pose) & (problem.robot_id[other] == robot)
                 if len(later):
                     out |= is_its & (problem.n[other] >= problem.n[later[0]] + GRID_HZ)
     return out

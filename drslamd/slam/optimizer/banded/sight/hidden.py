@@ -62,9 +62,9 @@ def has_witnesses(problem: Problem, point: Point) -> bool:
     robots with somebody else have fit as long? Then neither is elsewhere, and what lies between
     them has come: what wheels missed changes with where the robots drive."""
     problem = replace(problem, blocked=None)
-    robots, wrong = np.unique(problem.robot), outliers(problem, point)
+    robots, wrong = np.unique(problem.robot_id), outliers(problem, point)
     ends = np.stack([problem.ranges.i, problem.ranges.j])
-    whose, n = np.searchsorted(robots, problem.robot[ends]), problem.n[ends]
+    whose, n = np.searchsorted(robots, problem.robot_id[ends]), problem.n[ends]
     off = point.sight.error / problem.ranges.sigma
     found = runs(problem, point)
     for run in found:

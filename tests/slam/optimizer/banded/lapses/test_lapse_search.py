@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from lapse_scenes import FAULT, FROM_TO, a_team, nominal, worst
-from slam_problems import links_of, mismeasured, slipping, stuck
+from slam_problems import IDS, links_of, mismeasured, slipping, stuck
 
 from drslamd.slam.graph.estimate import Lapse
 from drslamd.slam.optimizer.banded.lapses import lapse_search
@@ -195,7 +195,7 @@ def test_an_abrupt_stretch_that_is_freed_or_long_ago_is_not_asked_for(
     assert is_asked_for(problem)
     freed = lapse_search._possible(problem)[0]
     assert not is_asked_for(replace(problem, freed=(freed,)))
-    newest = np.array([problem.n[problem.robot == robot].max() for robot in range(3)])
+    newest = np.array([problem.n[problem.robot_id == robot].max() for robot in IDS[:3]])
     assert not is_asked_for(replace(problem, fitted=newest))
 
 
@@ -207,6 +207,6 @@ def test_of_a_robot_that_parks_an_abrupt_stretch_is_not_asked_for_again_and_agai
     monkeypatch.setattr(lapse_search, "has_short_links", lambda _: True)
     monkeypatch.setattr(lapse_search, "BEHIND", 100)
     problem = given_stretches(monkeypatch, False, True)
-    newest = np.array([problem.n[problem.robot == robot].max() for robot in range(3)])
+    newest = np.array([problem.n[problem.robot_id == robot].max() for robot in IDS[:3]])
     newest[1] -= since
     assert is_asked_for(replace(problem, fitted=newest)) is is_asked

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from lapse_scenes import COUNT, ROBOTS, STEP_M, a_team, driven
-from slam_problems import links_of
+from slam_problems import IDS, links_of
 
 from drslamd.slam.odometry.jumps import JUMP_MPS
 from drslamd.slam.optimizer.banded.lapses.stretches import (
@@ -111,7 +111,7 @@ def test_a_stretch_is_abrupt_where_a_short_link_leads_to_another_speed(
     n = problem.n.copy()
     short, beside = (12, 13) if is_end else (10, 9)
     (end,) = problem.odometry.j[links_of(problem, 1, short, short + 1)]
-    n[np.flatnonzero((problem.robot == 1) & (n >= n[end]))] -= 10 - samples
+    n[np.flatnonzero((problem.robot_id == IDS[1]) & (n >= n[end]))] -= 10 - samples
     measured = problem.odometry.measured.copy()
     measured[links_of(problem, 1, beside, beside + 1)] = [speed_mps, 0.0, 0.0]
     odometry = replace(problem.odometry, measured=measured)
