@@ -65,12 +65,12 @@ def lapse_of(problem: Problem, robots: list[int], freed: Freed) -> Lapse:
 def freed_lately(problem: Problem) -> bool:
     """Did a stretch that is freed end a minute ago or less?"""
     return any(
-        newest(problem, one.robot) <= span(problem, one)[1] + REGARDED_S * GRID_HZ
+        newest_keyframe(problem, one.robot) <= span(problem, one)[1] + REGARDED_S * GRID_HZ
         for one in problem.freed
     )
 
 
-def newest(problem: Problem, robot: int) -> int:
+def newest_keyframe(problem: Problem, robot: int) -> int:
     """The last keyframe of a robot, as the problem numbers it, that has links."""
     return int(problem.n[problem.odometry.j[problem.odometry.robot == robot]].max())
 
@@ -104,6 +104,8 @@ def settled(
         if not one.is_settled:
             point = on_likelier_side(equations, point, one, most, tolerance)
             point, is_clear = best_placed(equations, point, one, most, tolerance)
-            is_old = newest(problem, one.robot) >= span(problem, one)[1] + SETTLES_S * GRID_HZ
+            is_old = (
+                newest_keyframe(problem, one.robot) >= span(problem, one)[1] + SETTLES_S * GRID_HZ
+            )
             freed[at] = replace(one, is_settled=bool(is_clear and is_old))
     return Equations(replace(problem, freed=tuple(freed)), like=equations), point

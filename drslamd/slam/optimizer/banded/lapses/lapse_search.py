@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drslamd.slam.optimizer.banded.lapses.known_lapses import GAIN, newest, settled
+from drslamd.slam.optimizer.banded.lapses.known_lapses import GAIN, newest_keyframe, settled
 from drslamd.slam.optimizer.banded.lapses.placements import RIVAL
 from drslamd.slam.optimizer.banded.lapses.stretches import (
     has_short_links,
@@ -95,7 +95,7 @@ def _has_moved(problem: Problem, robot: int) -> bool:
     """Has it made keyframes since all was as modelled? Of one that parks nothing new is known."""
     if problem.fitted is None:
         return True
-    return bool(newest(problem, robot) > problem.fitted[robot])
+    return bool(newest_keyframe(problem, robot) > problem.fitted[robot])
 
 
 def _possible(problem: Problem) -> list[Freed]:
