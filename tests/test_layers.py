@@ -94,10 +94,11 @@ OPTIMIZER_ORDER = [
     "contract",
     "banded",
     "kept",
-    "rbcd",
     "closures",
+    "rbcd",
 ]
-"""Inside module 3: the three solvers know what is common to them."""
+"""Inside module 3: the three solvers know what is common to them, and `rbcd` claims what `closures`
+does."""
 
 KNOWS_CONFIG = {"keyframe_selector", "front_end", "back_end", "settings"}
 """Where the configuration ends; rooms get numbers."""

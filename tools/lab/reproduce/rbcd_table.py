@@ -16,7 +16,7 @@ import numpy as np
 from drslamd.conventions import GRID_US
 from drslamd.slam.graph import team_frame
 from drslamd.slam.optimizer import factors
-from drslamd.slam.optimizer.closures.closure_optimizer import closure_edges
+from drslamd.slam.optimizer.closures.claimed import edges_of
 from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
 from lab.benchmark import graphs
 from lab.play import virtual_team
@@ -111,7 +111,7 @@ def held(simulator: Simulator) -> SplitGraph:
     graph = simulator.members[min(simulator.members)].robot.back.graph
     members = max(team_frame.groups(graph), key=len)
     places = factors.numbering(graph, members)
-    return SplitGraph(places.robot, places.n, closure_edges(graph, places)[0])
+    return SplitGraph(places.robot, places.n, edges_of(graph, places)[0])
 
 
 def _central(simulator: Simulator, graph: SplitGraph, poses: Array) -> Outcome:

@@ -154,19 +154,28 @@ class PoseGraphSolver:
         )
         return np.column_stack([x, y, theta])[self._place]
 
-    def joint_covariance(self, poses: Array, wanted: list[int]) -> Array:
-        """(3 k, 3 k) of x, y, theta of k poses, while the gauge is held.
+    def gains(self, poses: Array, wanted: list[int]) -> Array:
+        """(m, 3, 3 k) G = W J H^-1: how x, y, theta of k poses follow what each edge measures,
+        while the gauge is held.
 
         Args:
             poses: (n, 3), of least cost.
         """
-        factor = self._factor(self._point(poses), newton=False, damping=0.0, hold=HOLD)
+        point, edges = self._point(poses), self._edges
+        factor = self._factor(point, newton=False, damping=0.0, hold=HOLD)
         if factor is None:
             raise AssertionError("the poses of a connected graph are determined")
         unit = np.zeros((3 * self._count, 3 * len(wanted)))
         at = 3 * self._place[wanted][:, None] + np.arange(3)
         unit[at.ravel(), np.arange(at.size)] = 1
-        return np.asarray(factor.solve(unit)[at.ravel()])
+        moved = factor.solve(unit).reshape(self._count, 3, -1)
+        place, theta = moved[:, 0] + 1j * moved[:, 1], moved[:, 2]
+        # (the error of an edge is told in the frame of its first pose)
+        lever = 1j * (point.place[edges.j] - point.place[edges.i])
+        turned = place[edges.j] - place[edges.i] - lever[:, None] * theta[edges.i]
+        turned *= (edges.tau * np.exp(-1j * point.theta[edges.i]))[:, None]
+        turn = edges.kappa[:, None] * (theta[edges.j] - theta[edges.i])
+        return np.stack([turned.real, turned.imag, turn], axis=1)
 
     def cost(self, poses: Array) -> float:
         """Of poses (n, 3)."""

@@ -7,7 +7,7 @@ placed, so the frame spreads from it. When a robot may move says `pose_exchange`
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -20,6 +20,7 @@ from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.graph.thinning.chain_view import ChainView
+from drslamd.slam.optimizer.closures.claimed import WholeGraph
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.factors import chain_links
@@ -79,6 +80,7 @@ class Start:
         lifted: (k, 2 r).
         anchor: (2 r,) of the frame; None where the frame is ours.
         quiet: how many moves were made on the very same measurements.
+        claim: what is claimed of our last pose and those of neighbours; None where nobody asks.
     """
 
     own: OwnBlock
@@ -87,6 +89,7 @@ class Start:
     lifted: Array
     anchor: Array | None
     quiet: int
+    claim: Callable[[], Array] | None = None
 
 
 class RbcdOptimizer:
@@ -115,7 +118,34 @@ class RbcdOptimizer:
         frame = AnchoredFrame(group.frame, graph.view.segment(group.frame).poses[0])
         before = previous.lifted if previous and previous.frame == group.frame else None
         begun = start(own, frame, before, public, self._rank)
-        return partial(move, begun) if begun else None
+        if begun is None:
+            return None
+        return partial(move, replace(begun, claim=_claim(begun, graph, group, previous, before)))
+
+
+def _claim(
+    begun: Start,
+    graph: PoseGraph,
+    group: Group,
+    previous: TeamEstimate | None,
+    before: Lifted | None,
+) -> Callable[[], Array]:
+    """Of our last pose and of the last ones of neighbours that are known, in the order of
+    `_trajectories`. Everybody holds the whole graph, and block descent knows nothing of it."""
+    newest = {begun.own.chain.robot: begun.own.n[-1:]}
+    for chain, n in zip(begun.around.chains, begun.around.n.tolist(), strict=True):
+        newest[chain.robot] = np.maximum(newest.get(chain.robot, n), [n])
+    is_same = before is not None and _is_of(before, begun)
+    if is_same and previous is not None and list(previous.trajectories) == list(newest):
+        return lambda: previous.joint
+    whole = WholeGraph.of(graph, group)
+    ends = [int(whole.places.of(graph.view.chains[k], n)[0]) for k, n in newest.items()]
+    return partial(whole.joint, ends)
+
+
+def _is_of(before: Lifted, begun: Start) -> bool:
+    """Are keyframes and closures of ours those of our last move?"""
+    return np.array_equal(before.n, begun.own.n) and before.ends == len(begun.around.n)
 
 
 def start(
@@ -141,11 +171,10 @@ def start(
     lifted = placed_rows(own.n, own.odometry, before, around, rank if owns else None)
     if lifted is None or (anchor is None and not owns):
         return None
-    same = before is not None and np.array_equal(before.n, own.n) and before.ends == len(around.n)
-    quiet = before.quiet + 1 if before else 0
-    if not same:
-        quiet = min(quiet, AFTER_NEWS)
-    return Start(own, around, frame, lifted, anchor, quiet)
+    begun = Start(own, around, frame, lifted, anchor, before.quiet + 1 if before else 0)
+    if before is not None and _is_of(before, begun):
+        return begun
+    return replace(begun, quiet=min(begun.quiet, AFTER_NEWS))
 
 
 def placed_rows(
@@ -220,13 +249,11 @@ def move(begun: Start) -> TeamEstimate:
         lean = MOST_LEAN * begun.quiet / (begun.quiet + HALF_LEAN)
         after = riemannian_descent.leaned(block, before, lowest, lean)
     lifted = riemannian_descent.rows(after)
-    last, held = len(own.n) - 1, 0 if begun.anchor is None else None
     anchor = lifted[0] if begun.anchor is None else begun.anchor
-    covariance = riemannian_descent.conditional_covariance(block, last, held)
     return TeamEstimate(
         frame.segment,
         _trajectories(begun, lifted, anchor),
-        joint=covariance,
+        joint=begun.claim() if begun.claim else np.zeros((0, 0)),
         cost=block.cost(after),
         iterations=steps,
         converged=gain <= SETTLED,

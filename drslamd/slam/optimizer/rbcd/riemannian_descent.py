@@ -40,8 +40,6 @@ LEAST_LEAN = 0.05
 """A shorter way past the minimum is not worth a trial."""
 REGULARISATION = 1e-6
 """Of the preconditioner, relative to its diagonal."""
-HOLD = 1e10
-"""Weight that pins a pose: 10 um."""
 
 
 @dataclass(frozen=True)
@@ -217,24 +215,6 @@ def leaned(problem: BlockProblem, x: Array, y: Array, lean: float) -> Array:
 def _real(a: Array, b: Array) -> float:
     """Inner product of tangent vectors."""
     return float(np.real(np.vdot(a, b)))
-
-
-def conditional_covariance(problem: BlockProblem, pose: int, held: int | None) -> Array:
-    """(3, 3) of x, y, theta of one pose while the neighbours' poses are taken as exact.
-
-    Too small by what the neighbours do not know; the relaxation offers no better.
-
-    Args:
-        held: our pose that is the origin of the frame, when it is ours.
-    """
-    q = problem.q.copy()
-    if held is not None:
-        q[0, 2 * held : 2 * held + 2] += HOLD
-    unit = np.zeros((q.shape[1], 2))
-    unit[[2 * pose, 2 * pose + 1], [0, 1]] = 1
-    inverse = cholesky_banded_solved(_factor(q), unit)
-    turn, place = (float(inverse[2 * pose + k, k].real) for k in range(2))
-    return np.diag([place, place, 2 * turn])
 
 
 def _factor(q: Array) -> Array:

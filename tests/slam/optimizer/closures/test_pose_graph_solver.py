@@ -140,8 +140,10 @@ def test_the_order_of_the_poses_does_not_change_the_cost() -> None:
 
 @pytest.mark.parametrize("gauge", [0, 17])
 @pytest.mark.parametrize("reach", [6, 38])
-def test_the_joint_covariance_is_a_block_of_the_dense_inverse(gauge: int, reach: int) -> None:
-    """Information summed edge by edge, the gauge's rows and columns left out."""
+def test_edges_as_wrong_as_they_weigh_make_a_block_of_the_dense_inverse(
+    gauge: int, reach: int
+) -> None:
+    """G' W^-1 G is H^-1: information summed edge by edge, the gauge's rows and columns left out."""
     edges = graph(40, 30, 0.0, 11, reach)
     solver = PoseGraphSolver(edges, 40, gauge)
     poses = solver.solve().poses
@@ -161,7 +163,9 @@ def test_the_joint_covariance_is_a_block_of_the_dense_inverse(gauge: int, reach:
     at = (3 * np.array(wanted)[:, None] + np.arange(3)).ravel()
     expected = inverse[np.ix_(at, at)]
     sigma = np.sqrt(np.diag(expected))
-    off = (solver.joint_covariance(poses, wanted) - expected) / np.outer(sigma, sigma)
+    wrong = np.sqrt(1 / np.stack([edges.tau, edges.tau, edges.kappa], axis=-1))
+    moved = (wrong[:, :, None] * solver.gains(poses, wanted)).reshape(-1, 9)
+    off = (moved.T @ moved - expected) / np.outer(sigma, sigma)
     assert np.abs(off).max() < 1e-5
 
 

@@ -23,7 +23,7 @@ from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
-from drslamd.slam.optimizer.factors import chain_links
+from drslamd.slam.optimizer.closures.closure_optimizer import ClosureOptimizer
 from drslamd.slam.optimizer.rbcd.rbcd_optimizer import (
     AFTER_NEWS,
     SETTLED,
@@ -199,24 +199,26 @@ def test_a_round_says_where_we_and_the_known_poses_of_our_neighbours_are(team: S
         assert other.n.tolist() == [int(team.n[robot][k]) for k in CARRIERS]
         for pose, k in zip(other.poses, CARRIERS, strict=True):
             assert same_pose(pose, in_frame(team, robot)[k], 1e-6)
-    assert found.covariance(0) is found.covariance(2) is None
-    covariance = found.covariance(1)
-    assert covariance is not None
-    assert np.linalg.eigvalsh(covariance)[0] > 0
 
 
-def test_the_robot_of_the_frame_is_as_uncertain_as_its_odometry_since_the_origin(
-    team: SmallTeam,
-) -> None:
-    """Each link is wrong by itself, and its turn swings all that lies behind it."""
-    found = a_round(team, 0, {})
+def test_what_is_claimed_is_that_of_the_whole_graph_whoever_moved_how_far(team: SmallTeam) -> None:
+    """As the exact solver claims it, of our last pose and of the last public ones of neighbours."""
+    public = {0: true_public(team, 0), 2: true_public(team, 2)}
+    found = a_round(team, 1, public)
     assert found is not None
-    places = np.array(in_frame(team, 0))[:, :2]
-    links = chain_links(team.graph.view.chains[0], calibrated=False).covariance
-    swings = np.sum((places[-1] - places[1:]) ** 2, axis=1)
-    spread = np.sum((links[:, 0, 0] + links[:, 1, 1]) / 2 + swings * links[:, 2, 2] / 2)
-    expected = np.diag([spread, spread, np.sum(links[:, 2, 2])])
-    assert found.covariance(0) == pytest.approx(expected, rel=0.02)
+    exact = ClosureOptimizer().job(team.graph, group_of(team.graph), None, {})
+    assert exact is not None
+    ours, expected = found.covariance(1), exact().covariance(1)
+    assert ours is not None
+    assert expected is not None
+    sigma = np.sqrt(np.diag(expected))
+    assert (ours - expected) / np.outer(sigma, sigma) == pytest.approx(np.zeros((3, 3)), abs=0.1)
+    apart = found.relative(1, 2)
+    assert apart is not None
+    assert 0 < np.linalg.eigvalsh(apart[1])[0] < np.linalg.eigvalsh(apart[1])[-1] < 1.0
+    again = a_round(team, 1, public, found)
+    assert again is not None
+    assert again.joint is found.joint
 
 
 def played(team: SmallTeam, rounds: int) -> dict[int, list[TeamEstimate]]:

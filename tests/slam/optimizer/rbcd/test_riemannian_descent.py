@@ -14,10 +14,7 @@ from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.optimizer.problem import BetweenFactors
 from drslamd.slam.optimizer.rbcd.riemannian_descent import (
     ENOUGH,
-    HOLD,
-    BlockProblem,
     block,
-    conditional_covariance,
     descend,
     leaned,
     lift,
@@ -273,59 +270,3 @@ def test_rows_and_stacks_hold_the_same() -> None:
     assert stacked(lifted).shape == (8, 3)
     assert np.array_equal(rows(stacked(lifted)), lifted)
     assert np.array_equal(stacked(lifted)[3], lifted[1, 3:])
-
-
-# how certain a pose is
-
-
-def of_one_closure(is_ours_first: bool) -> BlockProblem:
-    """One pose of ours and one closure of 2 m, known to 0.2 m and 0.1 rad."""
-    covariance = np.diag([0.04, 0.04, 0.01])[None]
-    zero, nothing = np.zeros(1, dtype=int), np.zeros((0, 3))
-    edge = BetweenFactors(zero, zero, np.array([[2.0, 0.0, 0.3]]), covariance)
-    none = BetweenFactors(zero[:0], zero[:0], nothing, np.zeros((0, 3, 3)))
-    closure, nobody = ComplexFactors.of(edge), ComplexFactors.of(none)
-    leaving, arriving = (closure, nobody) if is_ours_first else (nobody, closure)
-    return block(nobody, leaving, arriving, lift(np.zeros((1, 3)), 2), 1)
-
-
-def test_a_pose_that_one_closure_leads_to_is_as_certain_as_the_closure() -> None:
-    found = conditional_covariance(of_one_closure(is_ours_first=False), 0, None)
-    assert found == pytest.approx(np.diag([0.04, 0.04, 0.01]), rel=1e-3)
-
-
-def test_a_pose_that_a_closure_leads_from_swings_on_its_lever() -> None:
-    """2 m of lever and 0.1 rad are 0.2 m across, half of it for each axis."""
-    found = conditional_covariance(of_one_closure(is_ours_first=True), 0, None)
-    assert found == pytest.approx(np.diag([0.04 + 0.04 / 2, 0.04 + 0.04 / 2, 0.01]), rel=1e-3)
-
-
-@pytest.fixture(scope="module")
-def planar() -> tuple[BlockProblem, Array]:
-    """A block of rank 1, and the second derivatives of its cost by real and imaginary parts."""
-    scene = Scene(rank=1)
-    x, unit = stacked(lift(scene.truth, 1)), np.eye(4 * OURS)
-
-    def cost(parts: Array) -> float:
-        return scene.plain_cost(x + (parts[0::2] + 1j * parts[1::2])[:, None])
-
-    single = [cost(a) for a in unit]
-    table = [[cost(a + b) for b in unit] for a in unit]
-    # the cost is quadratic, so these differences are exact
-    return scene.problem, table - np.add.outer(single, single) + cost(0 * unit[0])
-
-
-@pytest.mark.parametrize("pose", [0, 2, OURS - 1])
-@pytest.mark.parametrize("held", [None, 0])
-def test_position_and_heading_are_as_certain_as_the_dense_inverse_says(
-    planar: tuple[BlockProblem, Array], pose: int, held: int | None
-) -> None:
-    problem, hessian = planar
-    information = hessian / 2
-    if held is not None:
-        its = range(4 * held, 4 * held + 4)
-        information[its, its] += HOLD
-    variance = np.diag(np.linalg.inv(information))
-    turn, _, place, _ = variance[4 * pose : 4 * pose + 4]
-    found = conditional_covariance(problem, pose, held)
-    assert found == pytest.approx(np.diag([place, place, 2 * turn]), rel=1e-3, abs=1e-9)
