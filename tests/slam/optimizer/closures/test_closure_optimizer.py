@@ -114,9 +114,9 @@ def test_beside_a_single_closure_a_heading_is_as_uncertain_as_its_odometry() -> 
     members = {Segment(*one, 0), Segment(*other, 0)}
     job = ClosureOptimizer().job(graph, Group(members, min(members)), None, {})
     assert job is not None
-    chain = graph.view.chains[0]
-    random = chain_links(chain, calibrated=True).covariance[:, 2, 2].sum()
-    way = np.hypot(*np.diff(chain.keyframes.poses[:, :2], axis=0).T).sum()
+    seen = graph.view.chains[0]
+    random = chain_links(seen, calibrated=True).covariance[:, 2, 2].sum()
+    way = np.hypot(*np.diff(seen.keyframes.poses[:, :2], axis=0).T).sum()
     covariance = job().covariance(0)
     assert covariance is not None
     # (a constant yaw rate turns every link alike)
