@@ -6,7 +6,7 @@ Cases that are compared with a clean one, its twin, use the same seeds as that.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,6 +34,7 @@ class Case:
         what: in a few words.
         cause: what may be said of what is wrong.
         twin: name of the same case with nothing wrong.
+        algorithm: of module 3.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Case:
     mounting: Mounting = HEALTHY
     cause: Cause = NO_CAUSE
     twin: str = ""
+    algorithm: str = "banded"
 
     def run(self, seed: int, progress: Callable[[float], None] | None = None) -> Run:
         """The same seed gives the same run."""
@@ -52,7 +54,8 @@ class Case:
         count = len(recording.trails)
         fault = self.mounting.fault(seed, count)
         recording = fault(np.random.default_rng(seed), recording)
-        run = watch(recording, seed, self.mounting.hardware(recording, seed), progress)
+        extra = f'[optimizer]\nalgorithm = "{self.algorithm}"\n'
+        run = watch(recording, seed, self.mounting.hardware(recording, seed), progress, extra)
         run.at_fault = self.mounting.robots(seed, count)
         run.evident_s = (
             self.mounting.evident_s(recording, seed)
@@ -102,6 +105,24 @@ def _worlds() -> list[Case]:
         _world("slip", "wheels slip 8 % of the time", w.SLIP, SAID, SLIPS),
         Case("patrol", lanes, w.PATROL, promises.PATROL, SEEDS, PATROL_SEED),
         Case("on-the-spot", spot, w.ON_THE_SPOT, promises.ON_THE_SPOT, SPOT_SEEDS),
+    ]
+
+
+def _by_closures() -> list[Case]:
+    """Module 3 by relative poses alone."""
+    return [
+        replace(
+            case,
+            name=f"{case.name}-{algorithm}",
+            what=f"{case.what}, {algorithm}",
+            promises=promises.HONEST,
+            seeds=WORLD_SEEDS,
+            cause=NO_CAUSE,
+            algorithm=algorithm,
+        )
+        for case in _worlds()
+        if case.name in ("recorded", "configured", "slip")
+        for algorithm in ("closures", "rbcd")
     ]
 
 
@@ -162,7 +183,7 @@ def _mountings() -> list[Case]:
     return [case for kind in kinds for case in _mounted(*kind)]
 
 
-CASES = {case.name: case for case in [*_worlds(), *_mountings()]}
+CASES = {case.name: case for case in [*_worlds(), *_by_closures(), *_mountings()]}
 QUICK = {
     "recorded": 1,
     "slip": 1,

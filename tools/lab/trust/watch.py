@@ -82,9 +82,14 @@ def watch(
     seed: int,
     hardware: dict[int, Hardware] | None = None,
     progress: Callable[[float], None] | None = None,
+    extra: str = "",
 ) -> Run:
-    """Play a recording and hold against the truth whatever is claimed."""
-    simulator = virtual_team.start(recording, seed, hardware=hardware)
+    """Play a recording and hold against the truth whatever is claimed.
+
+    Args:
+        extra: TOML sections that every robot's configuration gets.
+    """
+    simulator = virtual_team.start(recording, seed, extra=extra, hardware=hardware)
     run = Run()
     for second in range(1, int(recording.duration) + 1):
         simulator.run(second)
