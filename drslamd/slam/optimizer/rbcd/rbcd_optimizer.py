@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import takewhile
 
 import numpy as np
 
@@ -131,7 +132,8 @@ def _claim(
     before: Lifted | None,
 ) -> Callable[[], Array]:
     """Of our last pose and of the last ones of neighbours that are known, in the order of
-    `_trajectories`. Everybody holds the whole graph, and block descent knows nothing of it."""
+    `_trajectories`, until one is not in the group yet. Everybody holds the whole graph, and block
+    descent knows nothing of it."""
     newest = {begun.own.chain.robot: begun.own.n[-1:]}
     for chain, n in zip(begun.around.chains, begun.around.n.tolist(), strict=True):
         newest[chain.robot] = np.maximum(newest.get(chain.robot, n), [n])
@@ -140,7 +142,7 @@ def _claim(
         return lambda: previous.joint
     whole = WholeGraph.of(graph, group)
     ends = [int(whole.places.of(graph.view.chains[k], n)[0]) for k, n in newest.items()]
-    return partial(whole.joint, ends)
+    return partial(whole.joint, list(takewhile(lambda place: place >= 0, ends)))
 
 
 def _is_of(before: Lifted, begun: Start) -> bool:

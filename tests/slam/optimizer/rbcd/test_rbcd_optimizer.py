@@ -221,6 +221,17 @@ def test_what_is_claimed_is_that_of_the_whole_graph_whoever_moved_how_far(team: 
     assert again.joint is found.joint
 
 
+def test_of_a_neighbour_outside_of_the_group_nothing_is_claimed(team: SmallTeam) -> None:
+    """Its public poses are there before its keyframes."""
+    members = {s for s in group_of(team.graph).members if s.robot != 2}
+    public = {0: true_public(team, 0), 2: true_public(team, 2)}
+    found = a_round(team, 1, public, group=Group(members, min(members)))
+    assert found is not None
+    assert list(found.trajectories) == [1, 0, 2]
+    assert found.covariance(0) is not None
+    assert found.covariance(2) is None
+
+
 def played(team: SmallTeam, rounds: int) -> dict[int, list[TeamEstimate]]:
     """The team takes turns; everybody hears everybody."""
     found: dict[int, list[TeamEstimate]] = {robot: [] for robot in range(3)}
