@@ -38,6 +38,8 @@ class PairData:
     )
     _clocks_of_ranges: ClockDifferences = field(default_factory=ClockDifferences)
     _clocks_of_closures: ClockDifferences = field(default_factory=ClockDifferences)
+    _ahead: Ahead | None = None
+    _ahead_changes: tuple[int, int] = (0, 0)
 
     def add_range(self, place: int, r: RangeMeasurement, entry: int) -> None:
         """A range that was first said at some place in its owner's log, as an entry says it."""
@@ -70,9 +72,13 @@ class PairData:
 
     def ahead(self) -> Ahead | None:
         """How the clocks of the two differ, None where nothing was measured."""
-        self._clocks_of_ranges.take(self.said_ranges, RangeTable.B_N)
-        self._clocks_of_closures.take(self.said_closures, ClosureTable.B_N)
-        return self._clocks_of_ranges.together(self._clocks_of_closures)
+        changes = self.said_ranges.changes, self.said_closures.changes
+        if changes != self._ahead_changes:
+            self._clocks_of_ranges.take(self.said_ranges, RangeTable.B_N)
+            self._clocks_of_closures.take(self.said_closures, ClosureTable.B_N)
+            self._ahead = self._clocks_of_ranges.together(self._clocks_of_closures)
+            self._ahead_changes = changes
+        return self._ahead
 
 
 def _is_believable(c: ClosureMeasurement) -> bool:

@@ -7,6 +7,8 @@ blocks, from the oldest on: what is left of a block is then all that was said of
 
 from __future__ import annotations
 
+from array import array
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +24,8 @@ WAITING = 1_024
 """Rows that came in and are not yet sorted into their blocks."""
 
 
+LATELY = 32
+"""Changes of which more is known than their block: between two looks there are a few."""
 NEVER = 2**40
 """A sample beyond all that can be said."""
 
@@ -43,6 +47,8 @@ class TimedRows:
         self._new: dict[int, list[list[float]]] = {}
         self._changed: dict[int, int] = {}
         """By block, in the order in which they changed last: `changes` then."""
+        self._lately = array("q")
+        """The first sample that each of the last changes touched."""
         self._held = self._waiting = self._changes = 0
         self._floor, self._floor_changed, self._newest = 0, 0, -1
         self._all: Array | None = None
@@ -51,9 +57,7 @@ class TimedRows:
         block = int(row[0]) // BLOCK
         if block < self._floor:
             return
-        self._changes += 1
-        self._changed.pop(block, None)
-        self._changed[block] = self._changes
+        self._change(block, int(row[0]))
         self._new.setdefault(block, []).append(row)
         self._all = None
         self._waiting += 1
@@ -62,6 +66,15 @@ class TimedRows:
             self._drop_before(block - HELD_BLOCKS + 1)
         if self._waiting >= WAITING:
             self._settle()
+
+    def _change(self, block: int, first: int) -> None:
+        """From sample `first` on something of a block changes."""
+        self._changes += 1
+        self._changed.pop(block, None)
+        self._changed[block] = self._changes
+        self._lately.append(first)
+        if len(self._lately) >= 2 * LATELY:
+            del self._lately[:LATELY]
 
     @property
     def changes(self) -> int:
@@ -81,6 +94,8 @@ class TimedRows:
 
     def is_same(self, changes: int, first: int, end: int) -> bool:
         """Are the rows of samples first .. end - 1 those of when there were so many `changes`?"""
+        if end <= self.unchanged_before(changes):
+            return True
         if self._floor_changed > changes and first < self._floor * BLOCK:
             return False
         blocks = self.changed_since(changes)
@@ -88,10 +103,14 @@ class TimedRows:
 
     def unchanged_before(self, changes: int) -> int:
         """Rows before this sample are those of when there were so many `changes`."""
-        blocks = self.changed_since(changes)
+        self._settle()
         if self._floor_changed > changes:
             return 0
-        return min(blocks) * BLOCK if blocks else NEVER
+        # (from here on one change is one entry of `_lately`)
+        count = self._changes - changes
+        if count <= len(self._lately):
+            return min(self._lately[len(self._lately) - count :], default=NEVER)
+        return min(self.changed_since(changes), default=NEVER // BLOCK) * BLOCK
 
     @property
     def floor(self) -> int:
@@ -115,9 +134,7 @@ class TimedRows:
         rows = self._blocks[block]
         self._blocks[block] = rows[which]
         self._held -= len(rows) - len(self._blocks[block])
-        self._changes += 1
-        self._changed.pop(block, None)
-        self._changed[block] = self._changes
+        self._change(block, block * BLOCK)
         self._all = None
 
     def between(self, first: int, end: int) -> Array:
@@ -187,6 +204,7 @@ class TimedRows:
         if gone:
             self._changes += 1
             self._floor_changed, self._all = self._changes, None
+            self._lately = array("q")
 
 
 def _ascends(keys: Array) -> bool:

@@ -268,14 +268,13 @@ def ranges(graph: PoseGraph, numbers: Numbering) -> tuple[RangeFactors, list[tup
     if not used.all():
         ends, table, of_pair, moves = ends[:, used], table.chosen(used), of_pair[used], moves[used]
     i, j = ends
-    there = np.unique(of_pair)
-    names = sorted({_name(pairs[k]) for k in there.tolist()})
+    is_there = (np.bincount(of_pair, minlength=len(pairs)) > 0).tolist()
+    all_names = [_name(pair) for pair in pairs]
+    names = sorted({name for name, there in zip(all_names, is_there, strict=True) if there})
     place = {name: k for k, name in enumerate(names)}
-    robots = np.zeros((len(pairs), 2), dtype=np.int64)
-    named = np.zeros(len(pairs), dtype=np.int64)
-    for k in there.tolist():
-        robots[k] = number[pairs[k].a.robot], number[pairs[k].b.robot]
-        named[k] = place[_name(pairs[k])]
+    named = np.array([place.get(name, 0) for name in all_names], dtype=np.int64)
+    robots = np.array([(number[p.a.robot], number[p.b.robot]) for p in pairs], dtype=np.int64)
+    robots = robots.reshape(-1, 2)
     carried = np.flatnonzero(moves.reshape(-1, 8).any(axis=1))
     factors = RangeFactors(
         i=i,
@@ -308,8 +307,8 @@ def sensible(i: Index, j: Index) -> NDArray[np.bool_]:
 
 
 def _name(pair: PairView) -> tuple[int, int]:
-    low, high = sorted((pair.a.robot, pair.b.robot))
-    return low, high
+    a, b = pair.a.robot, pair.b.robot
+    return (a, b) if a < b else (b, a)
 
 
 def _ends(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drslamd.slam.graph import timed_rows
-from drslamd.slam.graph.timed_rows import BLOCK, HELD_BLOCKS, NEVER, WAITING, TimedRows
+from drslamd.slam.graph.timed_rows import BLOCK, HELD_BLOCKS, LATELY, NEVER, WAITING, TimedRows
 
 Rows = list[list[float]]
 
@@ -108,19 +108,33 @@ def test_a_part_belongs_to_whoever_asked_for_it() -> None:
     assert (table.rows[:, 0] >= 0).all()
 
 
-def test_parts_are_the_same_until_something_is_added_to_their_blocks() -> None:
+def test_parts_are_the_same_until_something_is_added_to_them() -> None:
     table = filled([[n, 0.0, 0.0] for n in range(0, 5 * BLOCK, BLOCK // 2)])
     before = table.changes
     assert table.is_same(before, 0, NEVER)
     assert table.unchanged_before(before) == NEVER
     table.add([2.0 * BLOCK + 1, 0.0, 0.0])
     assert table.changed_since(before) == [2]
-    assert table.unchanged_before(before) == 2 * BLOCK
-    assert table.is_same(before, 0, 2 * BLOCK)
-    assert not table.is_same(before, 0, 2 * BLOCK + 1)
+    assert table.unchanged_before(before) == 2 * BLOCK + 1
+    assert table.is_same(before, 0, 2 * BLOCK + 1)
+    assert not table.is_same(before, 0, 2 * BLOCK + 2)
     assert not table.is_same(before, 3 * BLOCK - 1, NEVER)
     assert table.is_same(before, 3 * BLOCK, NEVER)
     assert table.is_same(table.changes, 0, NEVER)
+
+
+def test_of_many_changes_their_blocks_are_known() -> None:
+    """What is asked for now and then is not told to the sample."""
+    table = filled([[n, 0.0, 0.0] for n in range(0, 5 * BLOCK, BLOCK // 2)])
+    before = table.changes
+    for k in range(LATELY):
+        table.add([4.0 * BLOCK + 9 - (k == 3), k, 0.0])
+    assert table.unchanged_before(before) == 4 * BLOCK + 8
+    for k in range(LATELY):
+        table.add([4.0 * BLOCK + 9, LATELY + k, 0.0])
+    assert table.unchanged_before(before) == 4 * BLOCK
+    assert not table.is_same(before, 4 * BLOCK, 4 * BLOCK + 1)
+    assert table.is_same(before, 0, 4 * BLOCK)
 
 
 def test_what_is_dropped_has_changed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -214,11 +214,12 @@ class ChainView:
         held: keyframes that were said; model: of the robot's sensors.
         keyframes: those that stay; links: between them.
         parts: oldest first; the last one is recent and whole.
+        old: those of them that are thinned; the same while nothing of them changes.
     """
 
     def __init__(self, data: ChainData, old: OldParts, recent: list[ChainPart]) -> None:
         self.chain, self.model, self.held = data.chain, data.model, data.keyframes
-        self._old, self.parts = old, [*old.parts, *recent]
+        self.old, self.parts = old, [*old.parts, *recent]
         rows = [part.held.rows[part.stays] for part in self.parts]
         starts = np.cumsum([0, *map(len, rows)])[:-1].tolist()
         self.keyframes = KeyframeTable(np.concatenate(rows))
@@ -236,19 +237,24 @@ class ChainView:
         columns = zip(*(part.digested for part in self.parts), strict=True)
         return b"".join(part for column in columns for part in column)
 
+    @cached_property
+    def stretches(self) -> list[Stretch]:
+        """Of all parts."""
+        return [part.stretch for part in self.parts]
+
     @property
     def recent_n(self) -> int:
         """From this sample on all keyframes stay."""
-        return self._old.end
+        return self.old.end
 
     def old_parts(self, first: int, last: int) -> tuple[ChainPart, ...]:
         """Those that samples first .. last touch."""
-        parts = self._old.parts
+        parts = self.old.parts
         return tuple(p for p in parts if p.stretch.first <= last and first < p.stretch.end)
 
     def rows_about(self, first: int, last: int) -> HeldRows:
         """What is held of samples first .. last, and of what these are seen from."""
-        old = self._old
+        old = self.old
         between = self.held.between(first, last + 1)
         low, high = between.start, between.stop
         if low < min(high, len(old.near)):

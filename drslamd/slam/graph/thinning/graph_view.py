@@ -122,7 +122,7 @@ class Thinning:
             if a in views and b in views:
                 of_pair = before_pairs.get((pair.a, pair.b)) or PairThinning()
                 self._pairs[pair.a, pair.b] = of_pair
-                begun.append(of_pair.begin(pair, known[b], views[a], views[b]))
+                begun.append(of_pair.begin(pair, (known[a], known[b]), views[a], views[b]))
                 yield 0.5
         of_pairs, joints = [], []
         team = chains_of([part for said, _ in begun for part in said], views)

@@ -10,7 +10,7 @@ import numpy as np
 from drslamd.conventions import Segment
 from drslamd.slam.graph.tables import ClosureTable
 from drslamd.slam.graph.thinning.chain_view import ChainView
-from drslamd.slam.graph.thinning.pair_view import PairView
+from drslamd.slam.graph.thinning.pair_view import PairView, believed
 
 
 class Joint(NamedTuple):
@@ -31,29 +31,26 @@ class Joint(NamedTuple):
 def joints_of(chains: Mapping[int, ChainView], pairs: list[PairView]) -> list[Joint]:
     """Segments that are joined by closures whose both keyframes are held."""
     out = []
+    only = {
+        robot: Segment(*view.chain, int(view.keyframes.rows[0, 1]))
+        for robot, view in chains.items()
+        if view.keyframes.is_one_segment
+    }
     for pair in pairs:
         if not len(pair.closures):
             continue
-        a, b = (chains[chain.robot].keyframes for chain in (pair.a, pair.b))
-        if a.is_one_segment and b.is_one_segment:
-            out.append(_joint(pair, int(a.rows[0, 1]), int(b.rows[0, 1]), pair.closures))
+        if pair.a.robot in only and pair.b.robot in only:
+            found, place_only, is_mirrored = pair.believed
+            ends = only[pair.a.robot], only[pair.b.robot]
+            out.append(Joint(*ends, found, place_only, is_mirrored))
             continue
+        a, b = (chains[chain.robot].keyframes for chain in (pair.a, pair.b))
         at_a, _ = a.find(pair.closures.a_n)
         at_b, _ = b.find(pair.closures.b_n)
-        ends = np.stack([a.segment[at_a], b.segment[at_b]], axis=-1)
-        for one, other in np.unique(ends, axis=0).tolist():
-            these = pair.closures.chosen((ends == (one, other)).all(axis=1))
-            out.append(_joint(pair, one, other, these))
+        segments = np.stack([a.segment[at_a], b.segment[at_b]], axis=-1)
+        for one, other in np.unique(segments, axis=0).tolist():
+            these = pair.closures.chosen((segments == (one, other)).all(axis=1))
+            ends = Segment(*pair.a, one), Segment(*pair.b, other)
+            found, place_only, is_mirrored = believed(these)
+            out.append(Joint(*ends, found, place_only, is_mirrored))
     return out
-
-
-def _joint(pair: PairView, one: int, other: int, these: ClosureTable) -> Joint:
-    """Of two segments; who says a whole pose is believed before who says but a place, and wheels as
-    configured before any that turn the other way."""
-    place_only, mirrored = these.tells_place_only, these.is_mirrored
-    kinds = (~place_only & ~mirrored, ~place_only, np.ones(len(these), dtype=bool))
-    best = next(kind for kind in kinds if kind.any())
-    found = these if best.all() else these.chosen(best)
-    says_pose, is_mirrored = not place_only[best].any(), bool(mirrored[best].all())
-    ends = Segment(*pair.a, one), Segment(*pair.b, other)
-    return Joint(*ends, found, not says_pose, says_pose and is_mirrored)

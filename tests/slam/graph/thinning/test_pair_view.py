@@ -150,6 +150,35 @@ def test_a_range_whose_keyframe_never_came_takes_nobody_s_place() -> None:
 # what is carried
 
 
+@pytest.mark.parametrize("seconds", [40, 400])
+def test_a_pair_that_says_nothing_more_stays_what_it_is_while_both_drive_on(seconds: int) -> None:
+    graph = measured(seconds)
+    before, _, _ = views(graph)
+    graph.insert(A, GraphEntry(seconds, None, keyframes([10 * seconds], [ONE[seconds]])))
+    graph.insert(B, GraphEntry(seconds, None, keyframes([10 * seconds + AHEAD], [OTHER[seconds]])))
+    after, a, _ = views(graph)
+    assert a.keyframes.n[-1] == 10 * seconds
+    assert after is before
+
+
+@pytest.mark.parametrize("owner_is_late", [True, False])
+def test_a_range_counts_once_the_keyframe_that_it_names_is_there(owner_is_late: bool) -> None:
+    """It comes seconds after, and other keyframes before it."""
+    graph = measured(40)
+    late = 410, 410 + AHEAD
+    ranged = range_item(late[0], B, late[1], 5.0, ARM_A, ARM_B, 0.1)
+    graph.insert(A, GraphEntry(40, None, keyframes([430], [ONE[43]]), (ranged,)))
+    graph.insert(B, GraphEntry(40, None, keyframes([430 + AHEAD], [OTHER[43]])))
+    own, peer = (A, keyframes([late[0]], [ONE[41]])), (B, keyframes([late[1]], [OTHER[41]]))
+    first, last = (peer, own) if owner_is_late else (own, peer)
+    for seq, (chain, frames) in enumerate((first, last), start=41):
+        pair, _, _ = views(graph)
+        assert late[0] not in pair.ranges.a_n
+        graph.insert(chain, GraphEntry(seq, None, frames))
+    pair, _, _ = views(graph)
+    assert late[0] in pair.ranges.a_n
+
+
 def test_what_was_measured_at_a_keyframe_that_goes_is_true_at_the_one_that_stays() -> None:
     pair, _, _ = views(measured(2_500))
     table = pair.ranges
