@@ -18,12 +18,9 @@ import numpy as np
 
 from drslamd.slam import se2
 from drslamd.slam.lapack.routines import cholesky_solved
-from drslamd.slam.optimizer.banded.assembly import LeanSystem, System
 from drslamd.slam.optimizer.banded.layout import NOWHERE, BandLayout, border_poses
-from drslamd.slam.optimizer.banded.normal_equations import Equations
-from drslamd.slam.optimizer.banded.point import Point
-from drslamd.slam.optimizer.bias_prior import LEAST_CURVATURE
-from drslamd.slam.optimizer.factor_errors import RangeErrors, corrected, pose_errors, range_errors
+from drslamd.slam.optimizer.kept.believed import Believed
+from drslamd.slam.optimizer.kept.border import Border
 from drslamd.slam.optimizer.kept.elimination import SINGLE, Elimination, Rest, eliminated
 from drslamd.slam.optimizer.kept.head import Flags, Head, Pair, Places, keys_of, tail_of
 from drslamd.slam.optimizer.problem import Problem
@@ -36,77 +33,12 @@ AT_ONCE = 128
 
 
 @dataclass(frozen=True)
-class Believed:
-    """A problem at a point, and how much is believed of it: what a system is made of.
-
-    Attributes:
-        claims: (pairs,) for `Equations.claimed`; None for `Equations.weighed`.
-    """
-
-    problem: Problem
-    point: Point
-    claims: Array | None = None
-
-    def of_factors(self, which: Flags, layout: BandLayout, poses: Array) -> System:
-        """What some factors add where the poses are these (k, 3).
-
-        Args:
-            which: (all,) of odometry, closures and ranges, in this order.
-        """
-        equations, point, claims = self._chosen(which, layout)
-        some, calibration = equations.problem, self.point.calibration
-        sight = range_errors(poses, some.ranges, calibration, some.model)
-        link = pose_errors(poses, some.odometry, corrected(some.odometry, calibration))
-        return equations.factors_weighed(
-            replace(point, poses=poses, link=link, sight=sight), claims
-        )
-
-    def of_head(self, which: Flags, layout: BandLayout, is_curved: bool) -> LeanSystem:
-        """The same of the many of a head, with the priors that never change.
-
-        Args:
-            is_curved: the whole second derivative instead?
-        """
-        equations, point, claims = self._chosen(which, layout)
-        if is_curved:
-            system = equations.factors_curved_leanly(point)
-        else:
-            system = equations.factors_weighed_leanly(point, claims)
-        equations.add_gaussian_priors(system)
-        return system
-
-    def _chosen(self, which: Flags, layout: BandLayout) -> tuple[Equations, Point, Array]:
-        """Equations of some factors, the point for them, and claims."""
-        problem = self.problem
-        cuts = np.cumsum([len(problem.odometry), len(problem.closures)])
-        odometry, closures, ranges = np.split(which, cuts)
-        some = replace(
-            problem,
-            odometry=problem.odometry.chosen(odometry),
-            closures=problem.closures.chosen(closures),
-            ranges=problem.ranges.chosen(ranges),
-        )
-        sight = RangeErrors(*(column[ranges] for column in self.point.sight))
-        point = replace(self.point, link=self.point.link[odometry], sight=sight)
-        claims = problem.widths if self.claims is None else self.claims
-        return Equations(some, layout=layout), point, claims
-
-    def add_priors(self, system: System, layout: BandLayout) -> None:
-        """Those that depend on where the constants are."""
-        equations = Equations(self.problem, layout=layout)
-        calibration = self.point.calibration
-        if self.claims is None:
-            equations.add_heavy_priors(system, calibration, LEAST_CURVATURE)
-        else:
-            equations.add_claimed_priors(system, calibration)
-
-
-@dataclass(frozen=True)
 class KeptFactor:
     """
     Attributes:
         blocks: what was eliminated, in this order; none where solutions are not wanted.
         rest: of the front and the border.
+        border: what it came to with a tail on top, some seconds ago.
         origin: (h + d, 3) poses of the head, then of `Head.far`, where all of that was made.
     """
 
@@ -114,6 +46,7 @@ class KeptFactor:
     blocks: tuple[Elimination, ...]
     rest: Rest
     origin: Array
+    border: Border | None = None
 
     def laid_over(self, poses: Array, places: Places) -> Array:
         """(k, 3) poses of a problem: those of the head where the factor was made, the tail beside
@@ -137,13 +70,31 @@ class KeptFactor:
         is_tail = np.zeros(len(problem.n), dtype=bool)
         is_tail[places.tail] = True
         system = believed.of_factors(is_tail[i] | is_tail[j], layout, poses)
-        believed.add_priors(system, layout)
-        _add(system.corner, self.rest, 3 * len(places.tail))
+        size, pairs = len(numbers) - len(places.outer), places.head.pairs
+        border, is_claimed = self.border, believed.claims is not None
+        if border and not border.holds(problem, pairs, is_claimed):
+            border = None
+        _add(system.corner, self.rest, 3 * len(places.tail), with_border=border is None)
+        own, across = system.corner[:size, :size], system.corner[:size, size:]
         try:
-            lower = np.linalg.cholesky(system.corner)
+            if border is None:
+                believed.add_priors(system, layout)
+                whole = np.linalg.cholesky(system.corner)
+                lower, border = whole[:size, :size], Border.of(problem, pairs, whole[size:, size:])
+            else:
+                lower = np.linalg.cholesky(own)
         except np.linalg.LinAlgError:
             return None
-        return Current(self, places, poses, layout, numbers, lower)
+        return Current(
+            self,
+            places,
+            poses,
+            layout,
+            numbers,
+            lower=np.ascontiguousarray(lower),
+            across=np.ascontiguousarray(across),
+            border=border,
+        )
 
     def grown(self, believed: Believed, places: Places) -> KeptFactor | None:
         """With all but the newest poses of the tail in the head as well, laid over it."""
@@ -180,12 +131,18 @@ class KeptFactor:
         return KeptFactor(head, (*self.blocks, block) if self.blocks else (), rest, origin)
 
 
-def _add(corner: Array, rest: Rest, tail: int) -> None:
-    """Add a rest to the system of front, tail and border, whose border may be larger."""
+def _add(corner: Array, rest: Rest, tail: int, with_border: bool = True) -> None:
+    """Add a rest to the system of front, tail and border, whose border may be larger.
+
+    Args:
+        with_border: also its last rows?
+    """
     f, b = rest.border.shape
     corner[:f, :f] += rest.matrix
     outer = slice(f + tail, f + tail + b)
     corner[:f, outer] += rest.border
+    if not with_border:
+        return
     corner[outer, :f] += rest.border.T
     corner[outer, outer] += rest.corner
 
@@ -263,12 +220,11 @@ def build(
 
 @dataclass(frozen=True)
 class Current:
-    """A kept factor with the tail of a problem on top.
-
+    """
     Attributes:
         poses: (k, 3) where it was made, however the team has been turned since.
         layout: of front, tail and border; numbers: in `places.flat`.
-        lower: (m, m) Cholesky's factor of these.
+        lower: (t, t) Cholesky's factor of A_TT; across: (t, b) A_TB.
     """
 
     kept: KeptFactor
@@ -277,6 +233,8 @@ class Current:
     layout: BandLayout
     numbers: Index
     lower: Array
+    across: Array
+    border: Border
 
     def solved(self, right: Array) -> Array:
         """For right-hand sides (n,) or (n, c) in the order of `BandLayout.flat`."""
@@ -286,17 +244,32 @@ class Current:
         outer = columns[self.places.outer].astype(SINGLE)
         for block in self.kept.blocks:
             block.forward(inner, outer)
-        top = columns[self.numbers]
-        front, border = _unknowns(self.kept.head.front), len(self.places.outer)
-        top[: len(front)] = inner[front]
-        top[len(top) - border :] = outer
-        top = cholesky_solved(self.lower, top)
-        inner[front], outer = top[: len(front)], top[len(top) - border :].astype(SINGLE)
+        front = _unknowns(self.kept.head.front)
+        newest, border = columns[self.numbers[: len(self.lower)]], np.asarray(outer, dtype=float)
+        newest[: len(front)] = inner[front]
+        newest, border = self._top(newest, border)
+        inner[front], outer = newest[: len(front)], border.astype(SINGLE)
         for block in reversed(self.kept.blocks):
             block.backward(inner, outer)
         out = np.empty_like(columns)
-        out[inside], out[self.numbers] = inner, top
+        out[inside] = inner
+        out[self.numbers] = np.concatenate([newest, border])
         return out.reshape(right.shape)
+
+    def _top(self, newest: Array, border: Array) -> tuple[Array, Array]:
+        """For right-hand sides of T and B when all else is eliminated."""
+        alone = cholesky_solved(self.lower, newest)
+        border = cholesky_solved(self.border.lower, border - self.across.T @ alone)
+        return alone - cholesky_solved(self.lower, self.across @ border), border
+
+    def covariance(self, at: Index) -> Array:
+        """(k, k) of unknowns (k,) in `layout`."""
+        unit = np.zeros((len(self.numbers), len(at)))
+        unit[at, np.arange(len(at))] = 1
+        newest, border = np.split(unit, [len(self.lower)])
+        alone = cholesky_solved(self.lower, newest)
+        pull = border - self.across.T @ alone
+        return np.asarray(newest.T @ alone + pull.T @ cholesky_solved(self.border.lower, pull))
 
     def squared(self, right: Array) -> Array:
         """See `Solver.squared`."""

@@ -11,8 +11,10 @@ from drslamd.slam.calibration.range_scatter import LEAST_SCATTER
 from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem
 from drslamd.slam.optimizer.banded.odometry_levels import raised
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.kept.believed import Believed
 from drslamd.slam.optimizer.kept.head import Pair
-from drslamd.slam.optimizer.kept.kept_factor import Believed, KeptFactor
+from drslamd.slam.optimizer.kept.kept_claims import KeptSpread
+from drslamd.slam.optimizer.kept.kept_factor import KeptFactor
 from drslamd.slam.optimizer.kept.quick_check import Freedom
 from drslamd.slam.optimizer.problem import Problem
 from drslamd.slam.se2 import Array
@@ -102,7 +104,7 @@ class Kept:
 
     Attributes:
         downwards: of the system that leads to the solution; claimed: of what may be claimed there.
-        sure: when that was made.
+        sure: when that was made; spread: what it tells of all that was learned.
         variances: of the mountings, see `mountings.variances`; checked: of odometry. Both are made
             anew as the way grows.
         shares: what is left of what is claimed of poses and pairs.
@@ -111,6 +113,7 @@ class Kept:
     downwards: KeptFactor
     claimed: KeptFactor
     sure: Sureness
+    spread: KeptSpread
     variances: Array
     checked: Freedom
     shares: KeptShares

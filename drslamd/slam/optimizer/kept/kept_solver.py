@@ -23,13 +23,11 @@ from drslamd.slam.optimizer.banded.pairs import narrowing
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.banded.solution import Solution
 from drslamd.slam.optimizer.kept import kept_claims, kept_factor, quick_check
+from drslamd.slam.optimizer.kept.believed import Believed
 from drslamd.slam.optimizer.kept.fixed_point import MOST, approach
 from drslamd.slam.optimizer.kept.head import LONG_TAIL, Pair, Places, tail_of
-from drslamd.slam.optimizer.kept.kept_factor import (
-    Believed,
-    Current,
-    KeptFactor,
-)
+from drslamd.slam.optimizer.kept.kept_claims import KeptSpread
+from drslamd.slam.optimizer.kept.kept_factor import Current, KeptFactor
 from drslamd.slam.optimizer.kept.kept_solution import Kept, KeptShares, Sureness
 from drslamd.slam.optimizer.kept.quick_check import Freedom
 from drslamd.slam.optimizer.problem import Problem
@@ -101,14 +99,15 @@ def _solved(
         return None
     since = kept.sure if kept and claimed.kept is known else sure
     joint = kept_claims.kept_covariance(claimed, point, wanted)
-    spread = kept_claims.kept_spread(problem, point, claimed)
+    spread = _spread(kept, problem, point, claimed)
     downwards = _grown(current, Believed(problem, point))
     held = _grown(claimed, believed)
     if joint is None or spread is None or downwards is None or held is None:
         return None
-    shares = _shares(reached, last, kept, Claimed(ratio, joint, spread[1]))
-    after = Kept(downwards, held, since, variances, checked, shares)
-    said = _said(equations, point, scatter, sure.feared, joint, *spread)
+    learned, biases = spread.told(problem, point, claimed)
+    shares = _shares(reached, last, kept, Claimed(ratio, joint, biases))
+    after = Kept(downwards, held, since, spread, variances, checked, shares)
+    said = _said(equations, point, scatter, sure.feared, joint, learned, biases)
     return replace(said, shares=shares.left), after
 
 
@@ -240,6 +239,15 @@ def _claimed(
     return found
 
 
+def _spread(
+    kept: Kept | None, problem: Problem, point: Point, claimed: Current
+) -> KeptSpread | None:
+    """What is told of what was learned, found anew where the border is."""
+    if kept and kept.spread.border is claimed.border:
+        return kept.spread
+    return KeptSpread.of(problem, point, claimed)
+
+
 def _places(kept: KeptFactor | None, problem: Problem, pairs: list[Pair]) -> Places | None:
     """None where a factor does not fit a problem."""
     places = kept.head.places(problem, pairs) if kept else None
@@ -248,10 +256,11 @@ def _places(kept: KeptFactor | None, problem: Problem, pairs: list[Pair]) -> Pla
 
 def _grown(current: Current, believed: Believed) -> KeptFactor | None:
     """The same for the next second: a tail that is long goes to the head."""
-    tail, robots = len(current.places.tail), len(believed.problem.priors.scale)
-    if tail <= LONG_TAIL * robots:
-        return current.kept
-    return current.kept.grown(believed, current.places)
+    kept, tail = current.kept, len(current.places.tail)
+    if tail <= LONG_TAIL * len(believed.problem.priors.scale):
+        return replace(kept, border=current.border)
+    grown = kept.grown(believed, current.places)
+    return None if grown is None else replace(grown, border=current.border)
 
 
 def _said(

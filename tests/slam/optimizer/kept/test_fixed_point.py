@@ -15,9 +15,10 @@ from drslamd.slam.optimizer.banded.layout import BandLayout
 from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.kept.believed import Believed
 from drslamd.slam.optimizer.kept.fixed_point import approach
 from drslamd.slam.optimizer.kept.head import tail_of
-from drslamd.slam.optimizer.kept.kept_factor import Believed, Current, build
+from drslamd.slam.optimizer.kept.kept_factor import Current, build
 from drslamd.slam.se2 import Array
 
 

@@ -9,8 +9,9 @@ import pytest
 from kept_scenes import a_team_problem, shaken
 
 from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem
+from drslamd.slam.optimizer.kept.believed import Believed
 from drslamd.slam.optimizer.kept.head import TAIL, tail_of
-from drslamd.slam.optimizer.kept.kept_factor import Believed, build
+from drslamd.slam.optimizer.kept.kept_factor import build
 from drslamd.slam.optimizer.problem import Doubted, Problem
 
 

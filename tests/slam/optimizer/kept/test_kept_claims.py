@@ -12,9 +12,10 @@ from drslamd.slam.calibration.range_scatter import LEAST_SCATTER
 from drslamd.slam.optimizer.banded import claims
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.kept.believed import Believed
 from drslamd.slam.optimizer.kept.head import tail_of
-from drslamd.slam.optimizer.kept.kept_claims import kept_covariance, kept_spread, turn_since
-from drslamd.slam.optimizer.kept.kept_factor import Believed, build
+from drslamd.slam.optimizer.kept.kept_claims import KeptSpread, kept_covariance, turn_since
+from drslamd.slam.optimizer.kept.kept_factor import build
 from drslamd.slam.optimizer.sensor_priors import Calibration
 
 
@@ -35,8 +36,9 @@ def test_covariances_and_sigmas_are_those_of_the_whole_system() -> None:
     found = kept_covariance(current, point, wanted)
     assert found is not None
     assert np.allclose(found, joint, rtol=1e-6, atol=1e-12)
-    learned = kept_spread(problem, point, current)
-    assert learned is not None
+    kept_spread = KeptSpread.of(problem, point, current)
+    assert kept_spread is not None
+    learned = kept_spread.told(problem, point, current)
     for f in fields(Calibration):
         assert np.allclose(getattr(learned[0], f.name), getattr(spread, f.name), rtol=1e-6), f.name
     assert np.allclose(learned[1], biases, rtol=1e-6)

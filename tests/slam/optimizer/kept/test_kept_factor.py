@@ -14,8 +14,10 @@ from drslamd.slam.optimizer.banded.banded_optimizer import TeamProblem
 from drslamd.slam.optimizer.banded.layout import BandLayout
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
+from drslamd.slam.optimizer.kept import border
+from drslamd.slam.optimizer.kept.believed import Believed
 from drslamd.slam.optimizer.kept.head import LONG_TAIL, TAIL, keys_of, tail_of
-from drslamd.slam.optimizer.kept.kept_factor import Believed, Current, KeptFactor, build
+from drslamd.slam.optimizer.kept.kept_factor import Current, KeptFactor, build
 from drslamd.slam.optimizer.problem import Problem
 
 ROBOTS = 3
@@ -136,3 +138,39 @@ def test_a_bias_that_is_new_joins_the_border(team: TeamProblem) -> None:
     right = np.random.default_rng(0).normal(size=3 * count + len(found.places.flat.constants))
     expected = anew(believed, right, found.places.flat)
     assert is_close(found.solved(right), expected)
+
+
+def test_a_border_that_is_kept_is_that_of_the_same_point(
+    team: TeamProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(border, "FEW", 0)
+    problem = team.problem
+    believed = Believed(problem, shaken(problem))
+    kept = build(believed, team.pairs, tail_of(problem), with_blocks=True)
+    assert kept is not None
+    first = current(kept, believed, team)
+    second = current(replace(kept, border=first.border), believed, team)
+    assert second.border is first.border
+    right = np.random.default_rng(0).normal(
+        size=3 * len(problem.n) + len(second.places.flat.constants)
+    )
+    assert np.allclose(second.solved(right), first.solved(right), rtol=1e-9, atol=1e-12)
+
+
+def test_of_a_border_of_another_time_poses_move_as_constants_are_held_there(
+    team: TeamProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where it holds constants a million times as tightly, it is as if these were known."""
+    monkeypatch.setattr(border, "FEW", 0)
+    problem = team.problem
+    believed = Believed(problem, shaken(problem))
+    kept = build(believed, team.pairs, tail_of(problem), with_blocks=True)
+    assert kept is not None
+    first = current(kept, believed, team)
+    tight = replace(first.border, lower=1e3 * first.border.lower)
+    second = current(replace(kept, border=tight), believed, team)
+    at = second.layout.poses[np.flatnonzero(second.layout.poses[:, 0] >= 0)[-ROBOTS:]].ravel()
+    whole = first.lower @ first.lower.T
+    known = np.linalg.inv(whole)[np.ix_(at, at)]
+    assert np.allclose(second.covariance(at), known, rtol=1e-3, atol=1e-9)
+    assert (np.diag(first.covariance(at)) >= np.diag(known)).all()

@@ -19,6 +19,7 @@ from drslamd.slam.optimizer.banded.banded_solver import SETTLED
 from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.pairs import narrowing
 from drslamd.slam.optimizer.kept import (
+    border,
     kept_claims,
     kept_factor,
     kept_solution,
@@ -35,6 +36,7 @@ Said = list[tuple[Chain, GraphEntry]]
 @pytest.fixture(autouse=True)
 def however_small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kept_solver, "FEW", 0)
+    monkeypatch.setattr(border, "FEW", 0)
 
 
 @dataclass
