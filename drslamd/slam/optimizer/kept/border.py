@@ -69,8 +69,8 @@ class Border:
 
 def _times(problem: Problem) -> tuple[Index, Index]:
     """(robots,) the first and the last keyframe of each."""
-    robots = len(problem.priors.scale)
-    first, last = np.full(robots, KEY), np.full(robots, -1)
-    np.minimum.at(first, problem.robot, problem.n)
-    np.maximum.at(last, problem.robot, problem.n)
+    ids, number = np.unique(problem.robot_id, return_inverse=True)
+    first, last = np.full(len(ids), KEY), np.full(len(ids), -1)
+    np.minimum.at(first, number, problem.n)
+    np.maximum.at(last, number, problem.n)
     return first, last
