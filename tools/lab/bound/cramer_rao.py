@@ -18,7 +18,7 @@ and what is random in a step is drawn along u and, by half of its turn, along v.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -99,6 +99,35 @@ def of_team(truths: Array, scene: Scene, at: Array) -> Bound:
         np.array([smoothed[k][poses, poses] for k in at.tolist()]),
         truths[at],
     )
+
+
+def each_alone(truths: Array, scene: Scene, sigma_m: float, at: Array) -> Array:
+    """(k, 3R, 3R) covariances that a filter reaches live which weighs each range by itself.
+
+    It is told all but that ranges share their errors from one second to the next, and errs by what
+    they really are.
+
+    Args:
+        truths, at: see `of_team`.
+        sigma_m: that it takes for that of all ranges of a pair in a second.
+    """
+    robots = truths.shape[1]
+    pairs, poses = len(pairs_of(robots)), slice(0, 3 * robots)
+    unaware = replace(scene, ranges=replace(scene.ranges, slow=EXACT))
+    believed = np.full((len(truths), pairs), sigma_m**2 / STEP_S)
+    steps = through(truths, unaware, believed, at[:0])
+    transition = _Transition(scene.odometry, scene.ranges, robots, pairs)
+    covariance = _start(scene.odometry, scene.ranges, robots, pairs)
+    white, wanted, out = _white(scene), set(at.tolist()), dict[int, Array]()
+    for k, (_, gain, _) in enumerate(steps.steps):
+        if k:
+            f, q = transition.step(truths[k - 1], truths[k])
+            covariance = f @ covariance @ f.T + q
+        left = np.eye(transition.size) - gain @ steps.sight[k]
+        covariance = left @ covariance @ left.T + white * gain @ gain.T
+        if k in wanted:
+            out[k] = covariance[poses, poses]
+    return np.array([out[k] for k in at.tolist()])
 
 
 @dataclass(frozen=True)
