@@ -8,7 +8,7 @@ import numpy as np
 
 from drslamd.config import Config, OdometrySection, RelativePoseSection
 from drslamd.config_wheels import AgilexSection, DbcSection, WheelSection
-from drslamd.conventions import SECOND_US, Chain
+from drslamd.conventions import GRID_HZ, SECOND_US, Chain
 from drslamd.slam.closure_method import ClosureMethod, drslamd_method, paper_method
 from drslamd.slam.odometry.noise import OdometryNoise
 from drslamd.slam.optimizer.banded.banded_optimizer import BandedOptimizer
@@ -69,10 +69,11 @@ def closure_method(section: RelativePoseSection, tuning: Tuning = DEFAULTS) -> C
 def optimizer(config: Config, own: Chain, tuning: Tuning = DEFAULTS) -> Optimizer:
     """Of `optimizer.algorithm`."""
     section = config.optimizer
+    window_n = round(config.relative_pose.window_max_s * GRID_HZ)
     if section.algorithm == "rbcd":
-        return RbcdOptimizer(own, section.rank)
+        return RbcdOptimizer(own, section.rank, window_n)
     if section.algorithm == "closures":
-        return ClosureOptimizer(tuning.believable)
+        return ClosureOptimizer(tuning.believable, window_n)
     return banded_optimizer(config, tuning)
 
 

@@ -37,6 +37,7 @@ class Lifted:
         ends: how many closures were counted.
         quiet: how many moves were made on the very same keyframes and closures.
         gain: share of its cost that the last move brought, or would have.
+        claimed_of: of what the covariance beside it was reckoned.
     """
 
     n: Array
@@ -48,6 +49,7 @@ class Lifted:
     ends: int
     quiet: int
     gain: float
+    claimed_of: bytes = b""
 
 
 MUCH_WORSE = 3.0

@@ -10,13 +10,13 @@ estimator which weighs by W what really errs by S,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drslamd.conventions import GRID_HZ
-from drslamd.slam import se2
+from drslamd.slam import headway, se2
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.graph.thinning.chain_view import ChainView
@@ -29,7 +29,8 @@ from drslamd.slam.optimizer.problem import BetweenFactors
 from drslamd.slam.se2 import Array, Index
 
 WINDOW_N = 40 * GRID_HZ
-"""Samples that a window spans at most: closures of a pair within it rest on the same ranges."""
+"""Samples that a window spans at most, as configured: closures of a pair within it rest on the same
+ranges."""
 NOBODY = -1
 """Whose constants a closure has."""
 
@@ -73,11 +74,15 @@ class WholeGraph:
     origin: Array
 
     @staticmethod
-    def of(graph: PoseGraph, group: Group) -> WholeGraph:
+    def of(graph: PoseGraph, group: Group, window_n: int = WINDOW_N) -> WholeGraph:
+        """
+        Args:
+            window_n: samples that windows of the team span at most.
+        """
         places = factors.numbering(graph, group.members)
         gauge = factors.gauge_place(graph, group, places)
         origin = graph.view.segment(group.frame).poses[0]
-        return WholeGraph(places, *edges_of(graph, places), gauge, origin)
+        return WholeGraph(places, *edges_of(graph, places, window_n), gauge, origin)
 
     def in_frame(self, poses: Array) -> Array:
         """(n, 3) of the team, of all poses (n, 3) in any."""
@@ -87,23 +92,30 @@ class WholeGraph:
         return np.asarray(out)
 
     def joint(
-        self, wanted: list[int], poses: Array | None = None, weighed: ComplexFactors | None = None
+        self, wanted: list[int], poses: Array, weighed: ComplexFactors | None = None
     ) -> Array:
         """(3 k, 3 k) covariance of x, y, theta of k poses in the frame of the team.
 
         Args:
-            poses: (n, 3) of least cost in that frame, of the chordal relaxation where left out.
-            weighed: the edges as they were weighed for these, where not as in `edges`.
+            poses: (n, 3) in that frame, of least cost or near it.
+            weighed: the edges as they were weighed for these, where not as in `edges`: who counts
+                for little is believed to be as wrong as it counts.
         """
-        solver = PoseGraphSolver(weighed or self.edges, len(self.places.n), self.gauge)
-        at = self.in_frame(solver.chordal_start()) if poses is None else poses
-        return claim(solver.gains(at, wanted), self.errors)
+        edges, errors = self.edges, self.errors
+        if weighed is not None:
+            believed = (weighed.tau / edges.tau)[:, None, None]
+            edges, errors = weighed, replace(errors, random=errors.random / believed)
+        gains = PoseGraphSolver(edges, len(self.places.n), self.gauge).gains(poses, wanted)
+        headway.mark()
+        return claim(gains, errors)
 
 
-def edges_of(graph: PoseGraph, places: Numbering) -> tuple[ComplexFactors, EdgeErrors]:
+def edges_of(
+    graph: PoseGraph, places: Numbering, window_n: int = WINDOW_N
+) -> tuple[ComplexFactors, EdgeErrors]:
     """All edges between numbered poses as the paper weighs them, and how wrong they are."""
     closures = factors.closures(graph, places)
-    shared = _sharing(places, closures)[:, None, None]
+    shared = _sharing(graph, places, closures, window_n)[:, None, None]
     edges = [ComplexFactors.of(closures)]
     nothing = np.zeros((len(closures), 2, 3))
     errors = [(closures.covariance * shared, np.full(len(closures), NOBODY), nothing)]
@@ -131,17 +143,19 @@ def _constants(chain: ChainView) -> Array:
     return np.stack([noise.scale * by_scale, yaw * by_yaw], axis=1)
 
 
-def _sharing(places: Numbering, closures: BetweenFactors) -> Array:
-    """(m,) how many closures of its pair lie in one window with each, itself among them."""
-    n = places.n[closures.i]
-    ends = np.sort(places.robot[np.stack([closures.i, closures.j])], axis=0)
-    _, pair = np.unique(ends, axis=1, return_inverse=True)
-    out = np.ones(len(n))
+def _sharing(graph: PoseGraph, places: Numbering, closures: BetweenFactors, window_n: int) -> Array:
+    """(m,) how many closures of its pair lie in one window with each, itself among them, whichever
+    of the two told them."""
+    robots = places.robot[np.stack([closures.i, closures.j])]
+    shift = np.array([graph.view.shifts[robot] for robot in robots[0].tolist()])
+    when = places.n[closures.i] - shift
+    _, pair = np.unique(np.sort(robots, axis=0), axis=1, return_inverse=True)
+    out = np.ones(len(when))
     for number in np.unique(pair):
         mine = np.flatnonzero(pair == number)
-        order = np.sort(n[mine])
-        first = np.searchsorted(order, n[mine] - WINDOW_N // 2)
-        out[mine] = np.searchsorted(order, n[mine] + WINDOW_N // 2, side="right") - first
+        order = np.sort(when[mine])
+        first = np.searchsorted(order, when[mine] - window_n / 2)
+        out[mine] = np.searchsorted(order, when[mine] + window_n / 2, side="right") - first
     return out
 
 

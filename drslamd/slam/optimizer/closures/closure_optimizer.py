@@ -17,7 +17,7 @@ from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer import factors
 from drslamd.slam.optimizer.closures import gnc
-from drslamd.slam.optimizer.closures.claimed import WholeGraph
+from drslamd.slam.optimizer.closures.claimed import WINDOW_N, WholeGraph
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.se2 import Array
 
@@ -28,9 +28,11 @@ class ClosureOptimizer:
 
     Attributes:
         believable: see `gnc.BELIEVABLE`.
+        window_n: see `WholeGraph.of`.
     """
 
     believable: float = gnc.BELIEVABLE
+    window_n: int = WINDOW_N
 
     def job(
         self,
@@ -40,7 +42,7 @@ class ClosureOptimizer:
         public: Mapping[int, PublicPoses],
     ) -> Job | None:
         """See `Optimizer.job`; public poses are not needed."""
-        whole = WholeGraph.of(graph, group)
+        whole = WholeGraph.of(graph, group, self.window_n)
         chains = [
             graph.view.chains[robot].chain for robot in sorted({s.robot for s in group.members})
         ]

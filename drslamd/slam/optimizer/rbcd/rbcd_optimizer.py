@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import takewhile
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.graph.thinning.chain_view import ChainView
-from drslamd.slam.optimizer.closures.claimed import WholeGraph
+from drslamd.slam.optimizer.closures.claimed import WINDOW_N
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
 from drslamd.slam.optimizer.contract import Job
 from drslamd.slam.optimizer.factors import chain_links
@@ -34,6 +33,7 @@ from drslamd.slam.optimizer.rbcd.lifted_neighbours import (
     on_sphere,
     shared_closures,
 )
+from drslamd.slam.optimizer.rbcd.whole_claim import NOTHING, WholeClaim, whole_claim
 from drslamd.slam.se2 import Array, Index
 
 SETTLED = 1e-9
@@ -81,7 +81,7 @@ class Start:
         lifted: (k, 2 r).
         anchor: (2 r,) of the frame; None where the frame is ours.
         quiet: how many moves were made on the very same measurements.
-        claim: what is claimed of our last pose and those of neighbours; None where nobody asks.
+        claim: of our last pose and the last public ones of neighbours.
     """
 
     own: OwnBlock
@@ -90,18 +90,19 @@ class Start:
     lifted: Array
     anchor: Array | None
     quiet: int
-    claim: Callable[[], Array] | None = None
+    claim: Callable[[], WholeClaim] = lambda: NOTHING
 
 
 class RbcdOptimizer:
     """One move of block coordinate descent at a time."""
 
-    def __init__(self, own: Chain, rank: int) -> None:
+    def __init__(self, own: Chain, rank: int, window_n: int = WINDOW_N) -> None:
         """
         Args:
             rank: of the relaxation.
+            window_n: see `WholeGraph.of`.
         """
-        self._own, self._rank = own, rank
+        self._own, self._rank, self._window_n = own, rank, window_n
 
     def job(
         self,
@@ -121,28 +122,18 @@ class RbcdOptimizer:
         begun = start(own, frame, before, public, self._rank)
         if begun is None:
             return None
-        return partial(move, replace(begun, claim=_claim(begun, graph, group, previous, before)))
+        claim = partial(
+            whole_claim, graph.frozen(), group, previous, self._window_n, _newest(begun)
+        )
+        return partial(move, replace(begun, claim=claim))
 
 
-def _claim(
-    begun: Start,
-    graph: PoseGraph,
-    group: Group,
-    previous: TeamEstimate | None,
-    before: Lifted | None,
-) -> Callable[[], Array]:
-    """Of our last pose and of the last ones of neighbours that are known, in the order of
-    `_trajectories`, until one is not in the group yet. Everybody holds the whole graph, and block
-    descent knows nothing of it."""
-    newest = {begun.own.chain.robot: begun.own.n[-1:]}
+def _newest(begun: Start) -> dict[int, int]:
+    """Our last keyframe and the last public ones of neighbours, in the order of `_trajectories`."""
+    out = {begun.own.chain.robot: int(begun.own.n[-1])}
     for chain, n in zip(begun.around.chains, begun.around.n.tolist(), strict=True):
-        newest[chain.robot] = np.maximum(newest.get(chain.robot, n), [n])
-    is_same = before is not None and _is_of(before, begun)
-    if is_same and previous is not None and list(previous.trajectories) == list(newest):
-        return lambda: previous.joint
-    whole = WholeGraph.of(graph, group)
-    ends = [int(whole.places.of(graph.view.chains[k], n)[0]) for k, n in newest.items()]
-    return partial(whole.joint, list(takewhile(lambda place: place >= 0, ends)))
+        out[chain.robot] = max(out.get(chain.robot, n), n)
+    return out
 
 
 def _is_of(before: Lifted, begun: Start) -> bool:
@@ -252,10 +243,11 @@ def move(begun: Start) -> TeamEstimate:
         after = riemannian_descent.leaned(block, before, lowest, lean)
     lifted = riemannian_descent.rows(after)
     anchor = lifted[0] if begun.anchor is None else begun.anchor
+    claim = begun.claim()
     return TeamEstimate(
         frame.segment,
         _trajectories(begun, lifted, anchor),
-        joint=begun.claim() if begun.claim else np.zeros((0, 0)),
+        joint=claim.joint,
         cost=block.cost(after),
         iterations=steps,
         converged=gain <= SETTLED,
@@ -269,6 +261,7 @@ def move(begun: Start) -> TeamEstimate:
             ends=len(around.n),
             quiet=begun.quiet,
             gain=gain,
+            claimed_of=claim.of,
         ),
     )
 

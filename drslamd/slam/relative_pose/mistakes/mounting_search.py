@@ -149,8 +149,10 @@ class MountingSearch:
 
     @property
     def is_undecided(self) -> bool:
-        """Does no mistake explain its windows clearly, and would they rather have one than none?"""
-        return self._is_rather_another and self.found is None and not self.is_confirmed
+        """Does no mistake explain its windows clearly, and would they rather have another track,
+        scale or curve than none?"""
+        is_open = self.found is None and not self.is_confirmed
+        return is_open and self._is_rather_another and len(self._answers) == MOST_ASKED
 
     @property
     def is_contested(self) -> bool:
@@ -246,7 +248,7 @@ class MountingSearch:
             is_other = total.min() <= min(total[0] - CLEAR, FITS * freedom)
             is_backwards = least_of_backwards(total - total[0], True) < INDIFFERENT
             self._confirm(not (is_other or is_backwards))
-            self._is_rather_another = bool(is_other)
+            self._is_rather_another = bool(is_other) and int(total.argmin()) not in BACKWARDS
         case, is_clear = winner(total, freedom)
         # whatever happens to a mounting that was right is something else
         if case is None or self._is_final:

@@ -11,6 +11,7 @@ from scipy.optimize import least_squares
 from drslamd.slam import se2
 from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
 from drslamd.slam.optimizer.complex_factors import ComplexFactors
+from drslamd.slam.optimizer.problem import BetweenFactors
 
 Array = np.ndarray
 
@@ -167,6 +168,37 @@ def test_edges_as_wrong_as_they_weigh_make_a_block_of_the_dense_inverse(
     moved = (wrong[:, :, None] * solver.gains(poses, wanted)).reshape(-1, 9)
     off = (moved.T @ moved - expected) / np.outer(sigma, sigma)
     assert np.abs(off).max() < 1e-5
+
+
+@pytest.mark.parametrize("gauge", [0, 5])
+def test_poses_follow_what_edges_measure_by_their_gains(gauge: int) -> None:
+    """Against the solver itself, each measurement a little more and a little less: turned poses,
+    loops, and errors told in the frame of the first pose of each edge."""
+    rng, count, wanted = np.random.default_rng(3), 12, [11, 7]
+    poses = np.cumsum(rng.normal(size=(count, 3)), axis=0)
+    i, j = np.r_[np.arange(count - 1), 0, 3, 9], np.r_[np.arange(1, count), 7, 11, 1]
+    measured = se2.between(poses[i], poses[j])
+    spread = np.tile(0.04 * np.eye(3), (len(i), 1, 1)) * rng.uniform(0.5, 2, (len(i), 1, 1))
+
+    def solved(measured: Array) -> tuple[PoseGraphSolver, Array]:
+        edges = ComplexFactors.of(BetweenFactors(i, j, measured, spread))
+        solver = PoseGraphSolver(edges, count, gauge)
+        found = solver.solve(poses, tolerance=1e-14).poses
+        w_T_any = se2.compose(poses[gauge], se2.inverse(found[gauge]))
+        return solver, se2.compose(w_T_any[None], found)
+
+    solver, found = solved(measured)
+    gains = solver.gains(found, wanted)
+    for edge in (0, 4, len(i) - 1):
+        for axis in range(3):
+            moved = []
+            for by in (1e-4, -1e-4):
+                other = measured.copy()
+                other[edge, axis] += by
+                moved.append(solved(other)[1][wanted])
+            off = moved[0] - moved[1]
+            off[:, 2] = se2.wrap(off[:, 2])
+            assert off.ravel() / 2e-4 == pytest.approx(gains[edge, axis], abs=1e-5)
 
 
 CERTIFIED = {

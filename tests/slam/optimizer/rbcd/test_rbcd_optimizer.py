@@ -23,7 +23,6 @@ from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
-from drslamd.slam.optimizer.closures.closure_optimizer import ClosureOptimizer
 from drslamd.slam.optimizer.rbcd.rbcd_optimizer import (
     AFTER_NEWS,
     SETTLED,
@@ -199,37 +198,6 @@ def test_a_round_says_where_we_and_the_known_poses_of_our_neighbours_are(team: S
         assert other.n.tolist() == [int(team.n[robot][k]) for k in CARRIERS]
         for pose, k in zip(other.poses, CARRIERS, strict=True):
             assert same_pose(pose, in_frame(team, robot)[k], 1e-6)
-
-
-def test_what_is_claimed_is_that_of_the_whole_graph_whoever_moved_how_far(team: SmallTeam) -> None:
-    """As the exact solver claims it, of our last pose and of the last public ones of neighbours."""
-    public = {0: true_public(team, 0), 2: true_public(team, 2)}
-    found = a_round(team, 1, public)
-    assert found is not None
-    exact = ClosureOptimizer().job(team.graph, group_of(team.graph), None, {})
-    assert exact is not None
-    ours, expected = found.covariance(1), exact().covariance(1)
-    assert ours is not None
-    assert expected is not None
-    sigma = np.sqrt(np.diag(expected))
-    assert (ours - expected) / np.outer(sigma, sigma) == pytest.approx(np.zeros((3, 3)), abs=0.1)
-    apart = found.relative(1, 2)
-    assert apart is not None
-    assert 0 < np.linalg.eigvalsh(apart[1])[0] < np.linalg.eigvalsh(apart[1])[-1] < 1.0
-    again = a_round(team, 1, public, found)
-    assert again is not None
-    assert again.joint is found.joint
-
-
-def test_of_a_neighbour_outside_of_the_group_nothing_is_claimed(team: SmallTeam) -> None:
-    """Its public poses are there before its keyframes."""
-    members = {s for s in group_of(team.graph).members if s.robot != 2}
-    public = {0: true_public(team, 0), 2: true_public(team, 2)}
-    found = a_round(team, 1, public, group=Group(members, min(members)))
-    assert found is not None
-    assert list(found.trajectories) == [1, 0, 2]
-    assert found.covariance(0) is not None
-    assert found.covariance(2) is None
 
 
 def played(team: SmallTeam, rounds: int) -> dict[int, list[TeamEstimate]]:

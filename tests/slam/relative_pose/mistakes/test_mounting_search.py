@@ -141,6 +141,16 @@ def test_nor_is_that_believed_while_something_else_explains_what_it_does_not(
     assert search.is_undecided is not confirms
 
 
+def test_who_would_rather_run_backwards_on_one_side_is_not_undecided_about_a_track() -> None:
+    search = MountingSearch()
+    either = {LEFT: GOOD, Case(a=LEFT.b): GOOD}
+    for _ in range(MOST_ASKED):
+        ask(search, {AS_IT_IS: GOOD + CLEAR, MIRROR: GOOD + CLEAR, **either})
+    assert search.found is None
+    assert not search.is_confirmed
+    assert not search.is_undecided
+
+
 # what is found
 
 
