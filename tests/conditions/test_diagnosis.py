@@ -17,6 +17,7 @@ from drslamd.gossip import messages
 from drslamd.gossip.message_types import Heard
 from drslamd.jobs import OPTIMIZER, RELATIVE_POSE, Job
 from drslamd.slam.graph.estimate import TeamEstimate
+from drslamd.slam.relative_pose.mistakes.mounting_search import MOST_ASKED
 
 
 def said(scene: RobotScene, key: str) -> str | None:
@@ -335,6 +336,7 @@ def test_or_for_windows_that_would_rather_have_another_track(kept: int) -> None:
     pair = scene.robot.front.pairs[4]
     pair.kept = cast(Any, (object(),) * kept)
     pair.search._is_rather_another = True
+    pair.search._answers.extend(cast(Any, (object(),) * MOST_ASKED))
     rather = "the same ranges would rather fit wheels of another track or size" in why(scene)
     assert rather is (kept == 5)
     assert "run backwards" not in why(scene)
