@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
-from slam_scenes import Array, SmallTeam, inverted, product
+from collections.abc import Mapping
 
+import numpy as np
+from slam_scenes import EXACT, Array, SmallTeam, group_of, inverted, product, small_team
+
+from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.public_poses import PublicPoses
+from drslamd.slam.graph.team_frame import Group
+from drslamd.slam.optimizer.rbcd.rbcd_optimizer import RbcdOptimizer
 
 RANK = 3
 COUNT = 20
@@ -40,3 +45,21 @@ def true_public(
     values[0, :rank] *= anchor
     values[1:, :rank] *= length
     return PublicPoses(0, team.chains[0].epoch, rank, numbers, values)
+
+
+def good_team() -> SmallTeam:
+    """Three robots with good wheels; closures are as wrong as they say, 5 cm."""
+    return small_team(3, count=COUNT, noise=EXACT)
+
+
+def a_round(
+    team: SmallTeam,
+    robot: int,
+    public: Mapping[int, PublicPoses],
+    previous: TeamEstimate | None = None,
+    group: Group | None = None,
+) -> TeamEstimate | None:
+    """One move of a robot that knows these public poses of others."""
+    optimizer = RbcdOptimizer(team.chains[robot], RANK)
+    run = optimizer.job(team.graph, group or group_of(team.graph), previous, public)
+    return run() if run else None

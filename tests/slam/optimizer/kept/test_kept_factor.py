@@ -140,19 +140,26 @@ def test_a_bias_that_is_new_joins_the_border(team: TeamProblem) -> None:
     assert is_close(found.solved(right), expected)
 
 
+def with_a_border(
+    team: TeamProblem, monkeypatch: pytest.MonkeyPatch
+) -> tuple[Believed, KeptFactor, Current]:
+    """What is kept, and the same with the tail on top, of a team whose border is kept however small
+    it is."""
+    monkeypatch.setattr(border, "FEW", 0)
+    believed = Believed(team.problem, shaken(team.problem))
+    kept = build(believed, team.pairs, tail_of(team.problem), with_blocks=True)
+    assert kept is not None
+    return believed, kept, current(kept, believed, team)
+
+
 def test_a_border_that_is_kept_is_that_of_the_same_point(
     team: TeamProblem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(border, "FEW", 0)
-    problem = team.problem
-    believed = Believed(problem, shaken(problem))
-    kept = build(believed, team.pairs, tail_of(problem), with_blocks=True)
-    assert kept is not None
-    first = current(kept, believed, team)
+    believed, kept, first = with_a_border(team, monkeypatch)
     second = current(replace(kept, border=first.border), believed, team)
     assert second.border is first.border
     right = np.random.default_rng(0).normal(
-        size=3 * len(problem.n) + len(second.places.flat.constants)
+        size=3 * len(team.problem.n) + len(second.places.flat.constants)
     )
     assert np.allclose(second.solved(right), first.solved(right), rtol=1e-9, atol=1e-12)
 
@@ -161,12 +168,7 @@ def test_of_a_border_of_another_time_poses_move_as_constants_are_held_there(
     team: TeamProblem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where it holds constants a million times as tightly, it is as if these were known."""
-    monkeypatch.setattr(border, "FEW", 0)
-    problem = team.problem
-    believed = Believed(problem, shaken(problem))
-    kept = build(believed, team.pairs, tail_of(problem), with_blocks=True)
-    assert kept is not None
-    first = current(kept, believed, team)
+    believed, kept, first = with_a_border(team, monkeypatch)
     tight = replace(first.border, lower=1e3 * first.border.lower)
     second = current(replace(kept, border=tight), believed, team)
     at = second.layout.poses[np.flatnonzero(second.layout.poses[:, 0] >= 0)[-ROBOTS:]].ravel()

@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rbcd_scenes import CARRIERS, COUNT, RANK, in_frame, true_public
+from rbcd_scenes import CARRIERS, COUNT, RANK, a_round, good_team, in_frame, true_public
 from slam_scenes import (
     EXACT,
     SmallTeam,
-    group_of,
     inverted,
     product,
     same_pose,
@@ -26,27 +25,13 @@ from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer.rbcd.rbcd_optimizer import (
     AFTER_NEWS,
     SETTLED,
-    RbcdOptimizer,
     at_anchor,
 )
 
 
 @pytest.fixture(scope="module")
 def team() -> SmallTeam:
-    """Three robots with good wheels; closures are as wrong as they say, 5 cm."""
-    return small_team(3, count=COUNT, noise=EXACT)
-
-
-def a_round(
-    team: SmallTeam,
-    robot: int,
-    public: Mapping[int, PublicPoses],
-    previous: TeamEstimate | None = None,
-    group: Group | None = None,
-) -> TeamEstimate | None:
-    optimizer = RbcdOptimizer(team.chains[robot], RANK)
-    run = optimizer.job(team.graph, group or group_of(team.graph), previous, public)
-    return run() if run else None
+    return good_team()
 
 
 def said(estimate: TeamEstimate) -> PublicPoses:

@@ -2,39 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 import pytest
-from rbcd_scenes import CARRIERS, COUNT, RANK, true_public
-from slam_scenes import EXACT, SmallTeam, closure, group_of, inverted, product, small_team
+from rbcd_scenes import CARRIERS, a_round, good_team, true_public
+from slam_scenes import SmallTeam, closure, group_of, inverted, product
 
-from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.graph.measurements import GraphEntry
-from drslamd.slam.graph.public_poses import PublicPoses
 from drslamd.slam.graph.team_frame import Group
 from drslamd.slam.optimizer.closures.claimed import WholeGraph
 from drslamd.slam.optimizer.closures.closure_optimizer import ClosureOptimizer
 from drslamd.slam.optimizer.closures.pose_graph_solver import PoseGraphSolver
-from drslamd.slam.optimizer.rbcd.rbcd_optimizer import RbcdOptimizer
 
 
 @pytest.fixture
 def team() -> SmallTeam:
-    """Three robots with good wheels; closures are as wrong as they say, 5 cm."""
-    return small_team(3, count=COUNT, noise=EXACT)
-
-
-def a_round(
-    team: SmallTeam,
-    robot: int,
-    public: Mapping[int, PublicPoses],
-    previous: TeamEstimate | None = None,
-    group: Group | None = None,
-) -> TeamEstimate | None:
-    optimizer = RbcdOptimizer(team.chains[robot], RANK)
-    run = optimizer.job(team.graph, group or group_of(team.graph), previous, public)
-    return run() if run else None
+    return good_team()
 
 
 def test_what_is_claimed_is_that_of_the_whole_graph_whoever_moved_how_far(team: SmallTeam) -> None:
