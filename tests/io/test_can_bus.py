@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from machine_speed import allowed_s
 from places import Recorded
 
 can = pytest.importorskip("can", reason="python-can is not installed")
@@ -232,8 +233,8 @@ FLOOD_HZ, ODOMETRY_HZ = 8_000, 50
 def test_on_a_full_bus_the_others_have_their_turn_after_each_frame(
     record_property: Recorded,
 ) -> None:
-    """So nobody is late by more than a frame takes; and a second of it takes less than a second (a
-    quarter where nothing else runs)."""
+    """So nobody is late by more than a frame takes; and a second of it takes less than half a
+    second (a quarter where nothing else runs)."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     events: list[Event] = []
     between: list[int] = []
@@ -247,13 +248,14 @@ def test_on_a_full_bus_the_others_have_their_turn_after_each_frame(
     async def run() -> float:
         bus = CanBus(CanSection(), MonotonicClock(), events.append)
         reading = asyncio.ensure_future(bus._read_until_it_fails(Pipe(ours)))
-        began = time.thread_time()
+        took = 0.0
         pouring = asyncio.ensure_future(asyncio.to_thread(pour))
         while not pouring.done() or len(events) < FLOOD_HZ:
-            before = len(events)
+            before, began = len(events), time.thread_time()
             await asyncio.sleep(0)
             between.append(len(events) - before)
-        took = time.thread_time() - began
+            # turns in which nothing has come are those of a loop that waits
+            took += (time.thread_time() - began) * between[-1]
         reading.cancel()
         await asyncio.gather(reading, return_exceptions=True)
         return took
@@ -263,7 +265,7 @@ def test_on_a_full_bus_the_others_have_their_turn_after_each_frame(
     assert sum(isinstance(e, CanFrame) and e.can_id == 0x311 for e in events) == ODOMETRY_HZ
     assert len(events) == FLOOD_HZ
     assert max(between) == 1
-    assert took_s < 1.0
+    assert took_s < allowed_s(0.5)
     record_property("measured", f"a second of {FLOOD_HZ} frames takes {took_s:.2f} s of a core")
 
 

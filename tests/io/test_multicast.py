@@ -14,6 +14,7 @@ from functools import partial
 from typing import Any, cast
 
 import pytest
+from machine_speed import allowed_s
 from namespace import run_in_namespace
 from places import Recorded
 from transport_helpers import GROUP, Ear, in_a_loop, native, running, section, spoken_until, until
@@ -509,7 +510,7 @@ async def test_a_flood_of_ten_thousand_datagrams_leaves_the_loop_its_turns(
         with contextlib.suppress(asyncio.CancelledError):
             await ticking
     assert len(ear.events) + transport.flooded > 2000
-    assert max(gaps) < LONGEST_GAP_S
+    assert max(gaps) < allowed_s(LONGEST_GAP_S)
     record_property("measured", f"the loop waits {1e3 * max(gaps):.1f} ms at most")
 
 

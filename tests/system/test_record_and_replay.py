@@ -16,6 +16,7 @@ from lab.play.real_team import RealTeam
 from lab.recordings import world
 from lab.replay.exact import Replayer
 from lab.replay.runs import Run, key_of, read_runs
+from machine_speed import allowed_s
 from namespace import hindrance
 from places import REPOSITORY, Recorded
 
@@ -94,7 +95,8 @@ def test_all_of_them_decide_the_same_again_and_much_faster(runs: list[Run]) -> N
         assert (found.difference, found.ended) == (None, ""), run.name
         assert found.sends > 10
         seconds += found.seconds
-    assert seconds > 10 * (time.process_time() - began)
+    took = time.process_time() - began
+    assert took < allowed_s(seconds / 10)
     assert found.robot.back.estimate is not None
 
 
@@ -147,7 +149,7 @@ def test_recording_costs_less_than_a_hundredth_of_a_core(
     took = time.process_time() - began
     recorder._files.close()
     assert len(happened) > 1_500
-    assert took < 0.01 * seconds
+    assert took < allowed_s(0.01 * seconds)
     record_property("measured", f"recording takes {100 * took / seconds:.2f} % of a core")
 
 

@@ -20,6 +20,7 @@ SUPPORTED = ("3.10", "3.11", "3.12", "3.13")
 IN_VIRTUAL_TIME = (
     *("tests/gossip", "tests/near", "tests/robot", "tests/slam"),
     *("tests/lab/bound", "tests/lab/reproduce", "tests/lab/soak", "tests/lab/trust"),
+    *("tests/lab/hunt", "tests/system/test_honest_poses.py"),
 )
 """Slow here are computations alone, which may share the machine; what runs in real time may not."""
 SHOWN = 4_000

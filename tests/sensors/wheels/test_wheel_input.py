@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from frames import SECOND_US, ascii_line, kobuki_core, kobuki_packet
+from machine_speed import allowed_s
 
 from drslamd.config_wheels import (
     SOURCES,
@@ -304,5 +305,6 @@ def test_a_full_bus_costs_less_than_a_third_of_a_core_and_no_odometry() -> None:
     began, motions = time.process_time(), 0
     for frame in frames:
         motions += len(wheels.on_frame(frame))
-    assert time.process_time() - began < 1 / 3
+    took = time.process_time() - began
+    assert took < allowed_s(1 / 3)
     assert motions == 8_000 // 160

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from machine_speed import allowed_s
 from onlooked_team import Actor, entry, two
 from places import REPOSITORY
 
@@ -233,7 +234,8 @@ def test_a_second_of_twenty_robots_takes_less_than_a_tenth_of_one() -> None:
         drive(scene, team, second, second + 1)
         for tenth in range(10):
             json.dumps(scene.changes(second + tenth / 10, tenth == 9))
-    assert (time.process_time() - began) / 10 < 0.1
+    took = time.process_time() - began
+    assert took / 10 < allowed_s(0.1)
 
 
 def test_the_scene_knows_no_clock_no_socket_and_no_file() -> None:

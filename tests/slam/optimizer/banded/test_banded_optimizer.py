@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from machine_speed import allowed_s
 from slam_scenes import (
     BANDED,
     NOISE,
@@ -493,7 +494,8 @@ def test_ranges_all_over_the_time_do_not_stop_the_team() -> None:
     group = group_of(team.graph)
     began = time.process_time()
     estimate = solved(team.graph, group)
-    assert time.process_time() - began < 30
+    took = time.process_time() - began
+    assert took < allowed_s(30)
     assert np.isfinite(estimate.trajectories[0].poses).all()
 
 
@@ -523,7 +525,8 @@ def test_a_robot_that_waited_while_the_others_drove_costs_little() -> None:
     for _ in range(4):  # as on the robot: each solve goes on from the one before
         estimate = solved(team.graph, group, estimate)
     assert estimate
-    assert time.process_time() - began < 10
+    took = time.process_time() - began
+    assert took < allowed_s(10)
     assert estimate.converged
     true = product(inverted(team.truth[0][0]), place + [0.3, 0, 0])
     assert np.hypot(*(estimate.trajectories[2].poses[1] - true)[:2]) < 0.5

@@ -19,6 +19,7 @@ from dense_problems import (
     thresholds,
     unpacked,
 )
+from machine_speed import allowed_s
 from places import Recorded
 from slam_problems import (
     BIAS,
@@ -453,7 +454,8 @@ def test_a_robot_that_stood_for_ten_minutes_costs_little() -> None:
     problem, _ = team_problem(19, robots=2, count=600, closures=0)
     standing = [(0, k) for k in range(1, 1200)]
     edges = pose_edges(rng, problem.initial, standing, (0.3, 0.3, 0.2))
-    began = time.perf_counter()
+    began = time.process_time()
     solution = solve(replace(problem, closures=edges))
+    took = time.process_time() - began
     assert solution.converged
-    assert time.perf_counter() - began < 5.0
+    assert took < allowed_s(5.0)
