@@ -20,7 +20,7 @@ from drslamd.slam.optimizer.banded import common_level, mountings, odometry_leve
 from drslamd.slam.optimizer.banded.band_factor import BandFactor
 from drslamd.slam.optimizer.banded.common_level import ASKS, TAILS, CommonLevel, pooled
 from drslamd.slam.optimizer.banded.lapses import lapse_search
-from drslamd.slam.optimizer.banded.lapses.known_lapses import freed_lately, is_due_again, settled
+from drslamd.slam.optimizer.banded.lapses.known_lapses import freed_lately, settled
 from drslamd.slam.optimizer.banded.misfit import (
     FEW_OUTLIERS,
     Run,
@@ -98,7 +98,7 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
         nominal: the solution as configured, or with the mountings that were let go before.
         most, tolerance: of further solutions, see `descend`.
     """
-    told = equations.problem.told if _is_regarded(equations.problem, nominal) else None
+    told = equations.problem.told if freed_lately(equations.problem) else None
     hidden = _Hidden(
         Equations(told, like=equations) if told else equations, nominal, most, tolerance
     )
@@ -186,11 +186,6 @@ class _Hidden:
                 if check.is_passed():
                     return _as_is(equations, point, check.ratio)
         return None
-
-
-def _is_regarded(problem: Problem, nominal: Point) -> bool:
-    """Is it asked what else a stretch was that is freed?"""
-    return freed_lately(problem) and (is_due_again(problem) or many_wrong(problem, nominal))
 
 
 def _by_wall(equations: Equations, nominal: Point, hidden: _Hidden) -> Explanation | None:

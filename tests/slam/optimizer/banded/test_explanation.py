@@ -668,14 +668,12 @@ def test_a_wall_is_not_asked_for_each_second_of_the_hours_after_a_lapse(
         return []
 
     monkeypatch.setattr(hidden_search, "solutions", looked_for)
-    for is_lately, is_due, is_asked in (
-        *((True, True, True), (True, False, False), (False, True, False)),
-    ):
-        asked.clear()
-        monkeypatch.setattr(explanation, "freed_lately", lambda _, said=is_lately: said)
-        monkeypatch.setattr(explanation, "is_due_again", lambda _, said=is_due: said)
-        explained(freed, point)
-        assert bool(asked) is is_asked
+    explained(freed, point)
+    assert asked
+    asked.clear()
+    monkeypatch.setattr(explanation, "freed_lately", lambda _: False)
+    explained(freed, point)
+    assert not asked
 
 
 def test_sight_that_is_free_again_leaves_freed_what_was_freed() -> None:

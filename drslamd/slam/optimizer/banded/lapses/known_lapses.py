@@ -28,9 +28,6 @@ SETTLES_S = 10.0
 """After a lapse: where the robot went meanwhile shows in the ranges since."""
 REGARDED_S = 60.0
 """After a lapse: what else it may have been is asked for so long, and not each second for hours."""
-REGARDED_EACH_S = 5
-"""Where all fits, one second of so many once a lapse may have settled: four robots spent a sixth of
-their time on it, and what comes beside a lapse lasts."""
 
 
 def freed_again(problem: Problem, robots: list[int], lapses: Iterable[Lapse]) -> Problem:
@@ -67,21 +64,10 @@ def lapse_of(problem: Problem, robots: list[int], freed: Freed) -> Lapse:
 
 def freed_lately(problem: Problem) -> bool:
     """Did a stretch that is freed end a minute ago or less?"""
-    return any(age <= REGARDED_S * GRID_HZ for age in _ages(problem))
-
-
-def is_due_again(problem: Problem) -> bool:
-    """Is this one of the seconds in which it is asked what else such a stretch was, though all
-    fits? It goes by the keyframes alone, so that all robots ask alike."""
     return any(
-        age <= SETTLES_S * GRID_HZ or age // GRID_HZ % REGARDED_EACH_S == 0
-        for age in _ages(problem)
+        newest_keyframe(problem, one.robot) <= span(problem, one)[1] + REGARDED_S * GRID_HZ
+        for one in problem.freed
     )
-
-
-def _ages(problem: Problem) -> list[int]:
-    """Steps of the keyframes' grid since each stretch that is freed ended."""
-    return [newest_keyframe(problem, one.robot) - span(problem, one)[1] for one in problem.freed]
 
 
 def newest_keyframe(problem: Problem, robot: int) -> int:
