@@ -19,8 +19,9 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 SUPPORTED = ("3.10", "3.11", "3.12", "3.13")
 IN_VIRTUAL_TIME = (
     *("tests/gossip", "tests/near", "tests/robot", "tests/slam"),
-    *("tests/lab/bound", "tests/lab/reproduce", "tests/lab/soak", "tests/lab/trust"),
-    *("tests/lab/hunt", "tests/system/test_honest_poses.py"),
+    *("tests/lab/accuracy", "tests/lab/bound", "tests/lab/hunt", "tests/lab/near"),
+    *("tests/lab/replay", "tests/lab/report", "tests/lab/reproduce", "tests/lab/soak"),
+    *("tests/lab/trust", "tests/system/test_honest_poses.py", "tests/test_layers.py"),
 )
 """Slow here are computations alone, which may share the machine; what runs in real time may not."""
 SHOWN = 4_000
@@ -94,12 +95,12 @@ def _ended(name: str, code: int, began: float) -> None:
 
 
 def _other_interpreters() -> list[str]:
-    """The quick tests on every other supported interpreter, side by side; those that failed."""
+    """The quick tests on every other supported interpreter; those that failed."""
     own = f"{sys.version_info.major}.{sys.version_info.minor}"
     others = {version: _find(version) for version in SUPPORTED if version != own}
     found = {version: python for version, python in others.items() if python is not None}
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        codes = list(pool.map(_quick_tests_on, found, found.values()))
+    # one after the other on all cores: side by side, three on two cores would take two rounds
+    codes = [_quick_tests_on(version, python) for version, python in found.items()]
     absent = ", ".join(version for version in others if version not in found)
     print(f"interpreters not found, so not tested: {absent or 'none'}")
     return [f"Python {v}" for v, code in zip(found, codes, strict=True) if code]
@@ -112,7 +113,7 @@ def _quick_tests_on(version: str, python: str) -> int:
     install = [inside, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     steps = [
         [*install, "--editable", f"{ROOT}[test]"],
-        [inside, "-m", "pytest", "-q", "-m", "not slow", "-p", "no:cacheprovider"],
+        [inside, "-m", "pytest", "-q", "-n", "auto", "-m", "not slow", "-p", "no:cacheprovider"],
     ]
     if not Path(inside).exists():
         steps.insert(0, [python, "-m", "venv", str(folder)])
