@@ -28,8 +28,8 @@ URGENT = 1e-4
 """Share of its cost that a move must bring for the next one to follow as soon as it is our turn:
 when a team has just met, and for some moves after each closure that says something new."""
 
-AT_ONCE = 30
-"""Work (`Thinning.steps`) on the view of the graph in one go, about 5 ms: all of a small team. Of
+AT_ONCE = 16
+"""Work (`Thinning.steps`) on the view of the graph in one go, about 3 ms: all of a small team. Of
 fifty robots there are a thousand pairs, and nobody would read sensors for a fifth of a second."""
 
 

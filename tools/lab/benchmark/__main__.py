@@ -20,6 +20,7 @@ from lab.benchmark import (
     daemon,
     graphs,
     growth,
+    large_loop,
     module1,
     module2,
     module3,
@@ -44,6 +45,7 @@ PARTS = {
     "one-more-second": one_more_second,
     "all": pipeline,
     "daemon": daemon,
+    "large-loop": large_loop,
     "traffic": traffic,
     "growth": growth,
 }

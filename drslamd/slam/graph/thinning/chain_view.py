@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from hashlib import blake2b
 from typing import NamedTuple
 
 import numpy as np
@@ -232,10 +233,14 @@ class ChainView:
             np.concatenate([part.links.by_turn for part in self.parts]),
         )
 
+    @cached_property
     def digested(self) -> bytes:
-        """All of it, as a digest takes it; what is old is remembered."""
+        """What all of it is to a digest, however it is cut into parts."""
         columns = zip(*(part.digested for part in self.parts), strict=True)
-        return b"".join(part for column in columns for part in column)
+        h = blake2b(digest_size=16)
+        for part in (part for column in columns for part in column):
+            h.update(part)
+        return h.digest()
 
     @cached_property
     def stretches(self) -> list[Stretch]:

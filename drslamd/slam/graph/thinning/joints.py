@@ -28,14 +28,24 @@ class Joint(NamedTuple):
     is_mirrored: bool = False
 
 
-def joints_of(chains: Mapping[int, ChainView], pairs: list[PairView]) -> list[Joint]:
-    """Segments that are joined by closures whose both keyframes are held."""
-    out = []
-    only = {
+def only_segments(chains: Mapping[int, ChainView]) -> dict[int, Segment]:
+    """By robot, of those that have one."""
+    return {
         robot: Segment(*view.chain, int(view.keyframes.rows[0, 1]))
         for robot, view in chains.items()
         if view.keyframes.is_one_segment
     }
+
+
+def joints_of(
+    chains: Mapping[int, ChainView], only: Mapping[int, Segment], pairs: list[PairView]
+) -> list[Joint]:
+    """Segments that are joined by closures whose both keyframes are held.
+
+    Args:
+        only: see `only_segments`.
+    """
+    out = []
     for pair in pairs:
         if not len(pair.closures):
             continue

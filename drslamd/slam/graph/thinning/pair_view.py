@@ -59,6 +59,11 @@ class PairView:
         """See `believed`, of all closures."""
         return believed(self.closures)
 
+    @cached_property
+    def digested(self) -> bytes:
+        """All that its parts hold."""
+        return b"".join(part.digest for part in self.parts)
+
     def kept_closures(self) -> list[ClosureMeasurement]:
         """The closures one by one."""
         return self.closures.measurements(self.b)
@@ -253,7 +258,7 @@ class _Look:
         if of_a == NOBODY:
             return made, None
         robots = self.pair.a.robot, self.pair.b.robot
-        return made, Unthinned(*robots, ranges, closures, of_b)
+        return made, Unthinned(*robots, ranges, closures, of_a, of_b, own.stretch.level > 0)
 
 
 NOBODY = NEVER, -1

@@ -52,7 +52,10 @@ class TeamChains:
             spans: first and last keyframe of each robot that is asked for.
         """
         self._number = {robot: k for k, robot in enumerate(spans)}
-        self._noise = [views[robot].model.noise for robot in spans]
+        kinds: dict[OdometryNoise, int] = {}
+        noise = (views[robot].model.noise for robot in spans)
+        self._kind = np.array([kinds.setdefault(each, len(kinds)) for each in noise], int)
+        self._kinds = list(kinds)
         parts = [views[robot].rows_about(*span) for robot, span in spans.items()]
         starts = np.cumsum([0, *(len(part.held) for part in parts)])[:-1].tolist()
         each = list(zip(parts, starts, strict=True))
@@ -94,14 +97,7 @@ class TeamChains:
 
     def by_noise(self, rows: Index) -> list[tuple[OdometryNoise, Index]]:
         """Rows (m,) sorted by the noise of their odometry: which of them have it."""
-        chain = self.chain[rows]
-        found: dict[OdometryNoise, list[int]] = {}
-        for k, noise in enumerate(self._noise):
-            found.setdefault(noise, []).append(k)
-        if len(found) == 1:
-            return [(noise, np.arange(len(rows))) for noise in found]
-        kind = np.empty(len(self._noise), dtype=np.int64)
-        for k, members in enumerate(found.values()):
-            kind[members] = k
-        which = kind[chain]
-        return [(noise, np.flatnonzero(which == k)) for k, noise in enumerate(found)]
+        if len(self._kinds) == 1:
+            return [(noise, np.arange(len(rows))) for noise in self._kinds]
+        which = self._kind[self.chain[rows]]
+        return [(noise, np.flatnonzero(which == k)) for k, noise in enumerate(self._kinds)]

@@ -8,7 +8,7 @@ others beside it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import blake2b
@@ -19,7 +19,7 @@ import numpy as np
 from drslamd.conventions import GRID_HZ
 from drslamd.slam import se2
 from drslamd.slam.graph.tables import CLOSURE_COLUMNS, RANGE_COLUMNS, ClosureTable, RangeTable
-from drslamd.slam.graph.thinning.chain_view import Carried, ChainView
+from drslamd.slam.graph.thinning.chain_view import Carried
 from drslamd.slam.graph.thinning.rounding import RESOLUTION, as_digested
 from drslamd.slam.graph.thinning.team_chains import Ends, TeamChains
 from drslamd.slam.odometry.noise import PATH, OdometryNoise, by_yaw_rate, link_covariance
@@ -62,11 +62,6 @@ class PairPart:
         return h.digest()
 
 
-def digested(parts: Iterable[PairPart]) -> bytes:
-    """All that they hold; it is remembered of each."""
-    return b"".join(part.digest for part in parts)
-
-
 NOTHING = PairPart(
     RangeTable(np.zeros((0, RANGE_COLUMNS))),
     np.zeros((0, 2, 2, 2)),
@@ -79,15 +74,19 @@ class Unthinned(NamedTuple):
     """What one pair said of one stretch of the owner's time.
 
     Attributes:
-        a, b: robots; named: first and last keyframe of b that is named.
+        a, b: robots.
         closures: those that were not withdrawn.
+        of_a, of_b: the first and the last keyframe of each that is named.
+        is_old: does it lie in times that are thinned?
     """
 
     a: int
     b: int
     ranges: RangeTable
     closures: ClosureTable
-    named: tuple[int, int]
+    of_a: tuple[int, int]
+    of_b: tuple[int, int]
+    is_old: bool
 
 
 class Between(NamedTuple):
@@ -107,13 +106,8 @@ class Between(NamedTuple):
         return Between(self.chains, self.part[which], self.a.chosen(which), self.b.chosen(which))
 
 
-def chains_of(said: list[Unthinned], views: Mapping[int, ChainView]) -> TeamChains:
-    """All that is needed of the chains of a team to thin what was said."""
-    return TeamChains(views, _spans(said))
-
-
 def thinned_pairs(said: list[Unthinned], chains: TeamChains) -> list[PairPart]:
-    """A part for each of what was said; `chains` are of that and perhaps of more."""
+    """A part for each of what was said; `chains` are of its spans, and perhaps of more."""
     if not said:
         return []
     owners, peers = (
@@ -143,13 +137,11 @@ def thinned_pairs(said: list[Unthinned], chains: TeamChains) -> list[PairPart]:
     return [PairPart(RangeTable(r.copy()), m.copy(), ClosureTable(c.copy())) for r, m, c in parts]
 
 
-def _spans(said: list[Unthinned]) -> dict[int, tuple[int, int]]:
+def spans_of(said: Iterable[Unthinned]) -> dict[int, tuple[int, int]]:
     """First and last keyframe of each robot that is named."""
     out: dict[int, tuple[int, int]] = {}
     for part in said:
-        tables = [table.a_n for table in (part.ranges, part.closures) if len(table)]
-        own = int(min(n[0] for n in tables)), int(max(n[-1] for n in tables))
-        for robot, (first, last) in ((part.a, own), (part.b, part.named)):
+        for robot, (first, last) in ((part.a, part.of_a), (part.b, part.of_b)):
             low, high = out.get(robot, (first, last))
             out[robot] = min(low, first), max(high, last)
     return out

@@ -17,7 +17,9 @@ from drslamd.slam.graph.chapters.books import PER_ENTRY
 from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.thinning import chain_view, thinned_pairs
+from drslamd.slam.graph.thinning.chain_view import ChainView
 from drslamd.slam.graph.thinning.graph_view import GraphView
+from drslamd.slam.graph.thinning.pair_view import PairView
 from drslamd.slam.optimizer.banded.banded_optimizer import build_problem
 
 MINUTES = 70
@@ -284,17 +286,28 @@ def test_sines_of_another_processor_do_not_matter(small: list[Said]) -> None:
     """The last bit of a value that is carried may differ; a digest does not see it."""
     graph = graph_of(small)
     before = graph.digest(EVERYBODY)
-    parts = [part for pair in graph.view.pairs for part in pair.parts]
-    for part in parts:
+    ranges = [part for pair in graph.view.pairs for part in pair.parts]
+    links = [part for chain in graph.view.chains.values() for part in chain.parts]
+    for part in ranges:
         part.ranges.q_a[:] = np.nextafter(part.ranges.q_a, np.inf)
         part.moves[:] = np.nextafter(part.moves, np.inf)
-        vars(part).pop("digest")
-    for chain in graph.view.chains.values():
-        chain.links.sums[:] = np.nextafter(chain.links.sums, np.inf)
-    assert graph.digest(EVERYBODY) == before
-    parts[0].ranges.q_a[3] += 1e-5
-    vars(parts[0]).pop("digest")
-    assert graph.digest(EVERYBODY) != before
+    for held in links:
+        held.links.sums[:] = np.nextafter(held.links.sums, np.inf)
+    assert digest_anew(graph) == before
+    ranges[0].ranges.q_a[3] += 1e-5
+    other = digest_anew(graph)
+    assert other != before
+    links[0].links.sums[0, 0] += 1e-5
+    assert digest_anew(graph) not in (before, other)
+
+
+def digest_anew(graph: PoseGraph) -> int:
+    """With nothing remembered of what was digested before."""
+    views: list[PairView | ChainView] = [*graph.view.pairs, *graph.view.chains.values()]
+    for each in (*views, *(part for view in views for part in view.parts)):
+        for name in ("digest", "digested"):
+            vars(each).pop(name, None)
+    return graph.digest(EVERYBODY)
 
 
 # a team in the course of hours

@@ -11,7 +11,7 @@ from drslamd.conventions import Chain, Segment
 from drslamd.slam.graph.measurements import ClosureMeasurement, GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.tables import NO_HEADING
-from drslamd.slam.graph.thinning.joints import Joint, joints_of
+from drslamd.slam.graph.thinning.joints import Joint, joints_of, only_segments
 
 A, B = Chain(0, 1), Chain(1, 1)
 ORIGIN = np.zeros(3)
@@ -25,7 +25,8 @@ def joints(*closures: ClosureMeasurement, break_at: int = 100) -> list[Joint]:
             frames = keyframes([10 * k], [ORIGIN], segment)
             graph.insert(chain, GraphEntry(k, keyframes=frames))
     graph.insert(A, GraphEntry(4, closures=closures))
-    return joints_of(graph.view.chains, graph.view.pairs)
+    chains = graph.view.chains
+    return joints_of(chains, only_segments(chains), graph.view.pairs)
 
 
 def whole(number: int, n: int) -> ClosureMeasurement:

@@ -9,11 +9,12 @@ from slam_scenes import keyframes, range_item
 from drslamd.conventions import Chain
 from drslamd.slam.graph.measurements import GraphEntry
 from drslamd.slam.graph.pose_graph import PoseGraph
+from drslamd.slam.graph.thinning.team_chains import TeamChains
 from drslamd.slam.graph.thinning.thinned_pairs import (
     NOTHING,
     PairPart,
     Unthinned,
-    chains_of,
+    spans_of,
     thinned_pairs,
 )
 
@@ -29,15 +30,22 @@ def said_and_graph() -> tuple[list[Unthinned], PoseGraph]:
             middle = np.median(ranges.a_n)
             ranges = ranges.chosen((ranges.a_n > middle) == half)
             closures = closures.chosen((closures.a_n > middle) == half)
-            named = np.concatenate([ranges.b_n, closures.b_n]).astype(int)
-            span = int(named.min()), int(named.max())
-            out.append(Unthinned(pair.a.robot, pair.b.robot, ranges, closures, span))
+            spans = (
+                span(ranges.a_n, closures.a_n),
+                span(ranges.b_n, closures.b_n),
+            )
+            out.append(Unthinned(pair.a.robot, pair.b.robot, ranges, closures, *spans, True))
     return out, graph
+
+
+def span(*keyframes: np.ndarray) -> tuple[int, int]:
+    named = np.concatenate(keyframes).astype(int)
+    return int(named.min()), int(named.max())
 
 
 def thinned(said: list[Unthinned], graph: PoseGraph) -> list[PairPart]:
     """By chains of nothing else."""
-    return thinned_pairs(said, chains_of(said, graph.view.chains))
+    return thinned_pairs(said, TeamChains(graph.view.chains, spans_of(said)))
 
 
 def bits(part: PairPart) -> tuple[bytes, ...]:
@@ -59,7 +67,7 @@ def test_what_becomes_of_a_pair_does_not_depend_on_the_others() -> None:
         assert bits(alone) == bits(part)
     assert thinned([], graph) == []
     # nor on what else there is of the chains
-    of_all = thinned_pairs(said[:1], chains_of(said, graph.view.chains))
+    of_all = thinned_pairs(said[:1], TeamChains(graph.view.chains, spans_of(said)))
     assert bits(of_all[0]) == bits(together[0])
 
 
@@ -69,10 +77,11 @@ def test_what_names_keyframes_that_nobody_holds_waits() -> None:
     one = said[0]
     late = one.ranges.copy()
     late.rows[:, :3] += [1e6, 0, 1e6]
-    named = int(late.b_n.min()), int(late.b_n.max())
-    (none,) = thinned([Unthinned(one.a, one.b, late, NOTHING.closures, named)], graph)
+    spans = span(late.a_n), span(late.b_n)
+    unheld = Unthinned(one.a, one.b, late, NOTHING.closures, *spans, True)
+    (none,) = thinned([unheld], graph)
     assert (len(none.ranges), len(none.moves), len(none.closures)) == (0, 0, 0)
-    both = [Unthinned(one.a, one.b, late, NOTHING.closures, named), one]
+    both = [unheld, one]
     assert len(thinned(both, graph)[1].ranges) > 0
 
 
