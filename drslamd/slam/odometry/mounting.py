@@ -117,5 +117,9 @@ COARSE_SCALES = SCALES[::2]
 """Of a whole team that was configured from one file."""
 LEAST_BEND = math.radians(4.0)
 """rad/m. A wheel a tenth larger than the other, 0.3 m beside it, makes five times as much."""
-CURVES = tuple(Repair(Fault.CURVE, bend=k * LEAST_BEND) for k in (-4, -2, -1, 1, 2, 4))
-"""One wheel is larger than the other. Backwards they turn the same way, as module 3 has it."""
+CURVES = tuple(
+    Repair(Fault.CURVE, bend=k * LEAST_BEND) for k in (-9, -6, -4, -2, -1, 1, 2, 4, 6, 9)
+)
+"""One wheel is larger than the other, by up to a seventh on a base as narrow as 0.23 m: where no
+such case is near, wheels that run backwards fit best, and would be named. Backwards they turn the
+same way, as module 3 has it."""

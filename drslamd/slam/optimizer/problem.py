@@ -262,6 +262,7 @@ class Problem:
         blocked: (pairs,) between whom sight was blocked for long, nobody where left out: a signal
             that went around something is too long and never too short.
         width: (pairs,) of how many times their sigma ranges weigh, of their own where left out.
+        half_track: (robots,) m, see `RobotModel.half_track_m`; nobody has sides where left out.
     """
 
     robot_id: Index
@@ -281,6 +282,7 @@ class Problem:
     fitted: Array | None = None
     blocked: NDArray[np.bool_] | None = None
     width: Array | None = None
+    half_track: Array | None = None
 
     @cached_property
     def widths(self) -> Array:

@@ -139,6 +139,7 @@ SCALE = Cause(WHEELS, keys=frozenset({frozenset({"wheels.counts_per_metre"})}))
 X, Y = "uwb.antenna_x_m", "uwb.antenna_y_m"
 ANTENNA = Cause(RANGES, keys=frozenset({frozenset({X}), frozenset({Y}), frozenset({X, Y})}))
 ENCODERS = Cause(WHEELS, WHEELS)
+UNEVEN = Cause(WHEELS, r"wheel is (smaller|larger)")
 BREAKS_S, SPIN_MPS = 50.0, 0.5
 AHEAD, ASIDE = (0.3, 0.0), (-0.45, 0.2)
 
@@ -164,12 +165,14 @@ def _mounted(
 
 def _mountings() -> list[Case]:
     m, named, learned, noticed = mountings, promises.NAMED, promises.LEARNED, promises.NOTICED
+    half = m.left_standing(BREAKS_S)
     freezing, sticking = m.standing(BREAKS_S), m.standing(BREAKS_S, BREAKS_S + 5)
     spinning = m.spinning(BREAKS_S, BREAKS_S + 10, SPIN_MPS)
     kinds = [
         ("reversed", "both wheels run backwards", MIRRORED, named, Mounting(m.both_reversed)),
         ("swapped", "left and right are swapped", MIRRORED, named, Mounting(m.swapped)),
         ("left-back", "left wheel runs backwards", HALF_MIRRORED, named, Mounting(m.left_reversed)),
+        ("uneven", "left wheel counts a tenth more", UNEVEN, named, Mounting(m.uneven(1.1))),
         ("wide", "turns count 30 % more", TRACK, learned, Mounting(m.turning(1.3))),
         ("narrow", "turns count 30 % less", TRACK, learned, Mounting(m.turning(0.7))),
         ("half", "metres count half", SCALE, learned, Mounting(m.scaled(0.5))),
@@ -177,6 +180,7 @@ def _mountings() -> list[Case]:
         ("ahead", "antennas 0.3 m ahead", ANTENNA, learned, Mounting(antennas=3 * (AHEAD,))),
         ("aside", "antenna 0.5 m off", ANTENNA, learned, Mounting(antennas=(ASIDE,))),
         ("frozen", "counters freeze", ENCODERS, noticed, Mounting(freezing, (), BREAKS_S)),
+        ("left-frozen", "left counter freezes", ENCODERS, noticed, Mounting(half, (), BREAKS_S)),
         ("stuck", "counters stick for 5 s", ENCODERS, noticed, Mounting(sticking, (), BREAKS_S)),
         ("spinning", "wheels spin for 10 s", ENCODERS, noticed, Mounting(spinning, (), BREAKS_S)),
     ]

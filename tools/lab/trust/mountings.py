@@ -97,11 +97,25 @@ def turning(times: float) -> Wiring:
 def standing(since: float, until: float = np.inf) -> Wiring:
     """Counters that stand for a while, and go on from there."""
 
-    def held(t: Array, way: Array) -> Array:
-        first, last = np.interp([since, min(until, t[-1])], t, way)
-        return np.where(t < since, way, np.where(t < until, first, way - (last - first)))
+    return lambda t, left, right: (
+        _held(t, left, since, until),
+        _held(t, right, since, until),
+    )
 
-    return lambda t, left, right: (held(t, left), held(t, right))
+
+def left_standing(since: float) -> Wiring:
+    """The counter of one side stands from then on."""
+    return lambda t, left, right: (_held(t, left, since, np.inf), right)
+
+
+def _held(t: Array, way: Array, since: float, until: float) -> Array:
+    first, last = np.interp([since, min(until, t[-1])], t, way)
+    return np.where(t < since, way, np.where(t < until, first, way - (last - first)))
+
+
+def uneven(times: float) -> Wiring:
+    """Every metre of the left side counts as so many: its wheel is so much smaller."""
+    return lambda t, left, right: (times * left, right)
 
 
 def spinning(since: float, until: float, speed: float) -> Wiring:

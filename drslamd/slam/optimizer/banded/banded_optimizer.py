@@ -159,6 +159,7 @@ def build_problem(
         range_sigma=numbers.range_sigma,
         model=numbers.model,
         width=range_weights.widths(pairs, by_gyro),
+        half_track=np.array([data.model.half_track_m for data in chains]),
     )
     if previous is not None:
         fitted = np.array([previous.fitted.get(robot, 0) for robot in robots], dtype=float)

@@ -1,4 +1,5 @@
-"""Where wheels may have stood or spun, as they show it themselves, and problems with that freed."""
+"""Where wheels, or one of two, may have stood or spun, as they show it themselves, and problems
+with that freed."""
 
 from __future__ import annotations
 
@@ -17,6 +18,11 @@ STANDS_S = 2.0
 """Who stands for less is back before anything can be seen of it."""
 STILL_MPS, STILL_RADPS = 0.05, 0.1
 """Wheels that stand."""
+PIVOTS_S, PIVOTS_RADPS = 3.0, 0.2
+"""Who turns about one of its wheels for so long, and so fast: the counter of that wheel stands."""
+PIVOTS_AT, ALIKE = (0.65, 1.5), 0.05
+"""So far from its middle, in halves of the configured track, which may be another one; and by how
+much of it two such links in a row differ."""
 MOVES_MPS = 0.1
 """Links slower than this say nothing of how fast a robot drives."""
 FASTER = 1.25
@@ -59,6 +65,13 @@ def _of_robot(problem: Problem, robot: int, mine: Index) -> list[Freed]:
         for first, last in _stretches(stands, until, 0.0)
         if seconds[first : last + 1].sum() >= STANDS_S
     ]
+    half_track = 0.0 if problem.half_track is None else float(problem.half_track[robot])
+    pivots = _pivots(odometry.measured[mine], seconds, half_track)
+    stood += [
+        (first, last, True)
+        for first, last in _stretches(pivots, until, APART_S)
+        if seconds[first : last + 1].sum() >= PIVOTS_S
+    ]
     is_fast = speed > FASTER * _usual_speed(speed)
     spun = [(first, last, False) for first, last in _stretches(is_fast, until, APART_S)]
     jumps = _jumps(speed, seconds)
@@ -87,6 +100,20 @@ def _jumps(speed: Array, seconds: Array) -> NDArray[np.bool_]:
     is_short = seconds[1:-1] <= SHORT_S
     out[1:-1] = is_short & (np.abs(speed[2:] - speed[:-2]) > SHARE * JUMP_MPS)
     return out
+
+
+def _pivots(measured: Array, seconds: Array, half_track: float) -> NDArray[np.bool_]:
+    """(k,) links (k, 3) that turn about one wheel, as those beside them do.
+
+    Args:
+        half_track: m, 0 where nothing turns about a wheel.
+    """
+    turn = np.abs(measured[:, 2])
+    radius = np.hypot(*measured[:, :2].T) / np.maximum(2 * np.sin(np.minimum(turn, 3.0) / 2), 1e-9)
+    nearest, farthest = (times * half_track for times in PIVOTS_AT)
+    turns = (turn > PIVOTS_RADPS * seconds) & (radius > nearest) & (radius < farthest)
+    is_next = turns[1:] & turns[:-1] & (np.abs(np.diff(radius)) < ALIKE * radius[1:])
+    return np.asarray(np.append(is_next, False) | np.append(False, is_next))
 
 
 def _seconds(problem: Problem, links: Index) -> Array:
@@ -126,8 +153,8 @@ def freed_links(problem: Problem, robot: int, links: Index, stands: bool) -> Fre
 def _freedom(
     odometry: OdometryFactors, links: Index, speed: float, seconds: Array, stands: bool
 ) -> Array:
-    """(k, 3, 3) what a robot can do beside what wheels say: anything where they stand, and another
-    way in the same direction where they spin.
+    """(k, 3, 3) what a robot can do beside what wheels say: anything where they or one of them
+    stand, and another way in the same direction where they spin.
 
     Args:
         speed: m/s at which it drives; seconds: (k,) that links last.
@@ -136,7 +163,7 @@ def _freedom(
     way = (speed * seconds) ** 2
     if stands:
         out[:, 0, 0] = out[:, 1, 1] = way
-        out[:, 2, 2] = (MOST_RADPS * seconds) ** 2
+        out[:, 2, 2] = (MOST_RADPS * seconds) ** 2 + odometry.measured[links, 2] ** 2
         return out
     chord = odometry.measured[links, :2]
     along = chord / np.maximum(np.hypot(*chord.T), 1e-9)[:, None]

@@ -55,6 +55,57 @@ def test_who_turns_or_creeps_does_not_stand(way: float, turn: float, stands: int
     assert len(found(driven({10: way, 11: way}, turn))) == stands
 
 
+def arcs(*radii: float, turn: float = 0.9, half_track: float | None = 0.2) -> Problem:
+    """Robot 1 turns about a point beside it in some seconds, as far away as is said."""
+    problem = driven({})
+    measured = problem.odometry.measured.copy()
+    for second, radius in enumerate(radii, start=10):
+        chord = 2 * radius * math.sin(turn / 2)
+        ahead = [chord * math.cos(turn / 2), chord * math.sin(turn / 2), turn]
+        measured[links_of(problem, 1, second, second + 1)] = ahead
+    odometry = replace(problem.odometry, measured=measured)
+    tracks = None if half_track is None else np.array([0.0, half_track, 0.0])
+    return replace(problem, odometry=odometry, half_track=tracks)
+
+
+@pytest.mark.parametrize(("seconds", "stands"), [(2, False), (3, True), (6, True)])
+def test_who_turns_about_one_wheel_for_three_seconds_has_a_counter_that_stands(
+    seconds: int, stands: bool
+) -> None:
+    for turn in (-0.9, 0.9):
+        ends = found(arcs(*seconds * [0.2], turn=turn))
+        assert ends == ([(9, 11 + seconds, True)] if stands else [])
+
+
+@pytest.mark.parametrize(
+    ("radii", "turn", "stands"),
+    [
+        ((0.128, 0.128, 0.128), 0.9, False),  # about no wheel of any track
+        ((0.132, 0.132, 0.132), 0.9, True),
+        ((0.302, 0.302, 0.302), 0.9, False),
+        ((0.298, 0.298, 0.298), 0.9, True),
+        ((0.2, 0.212, 0.2), 0.9, False),  # a curve as drives have them
+        ((0.2, 0.208, 0.2), 0.9, True),
+        ((0.25, 0.25, 0.25), 0.19, False),  # so slowly anybody turns
+        ((0.25, 0.25, 0.25), 0.21, True),
+    ],
+)
+def test_who_turns_otherwise_has_none(radii: tuple[float, ...], turn: float, stands: bool) -> None:
+    assert bool(found(arcs(*radii, turn=turn))) is stands
+
+
+@pytest.mark.parametrize("half_track", [0.0, None])
+def test_nor_has_a_base_whose_wheels_have_no_sides(half_track: float | None) -> None:
+    assert found(arcs(0.2, 0.2, 0.2, half_track=half_track)) == []
+
+
+def test_what_one_wheel_made_of_a_turn_may_be_none_of_it() -> None:
+    (freed,) = likely_stretches(arcs(*3 * [0.2]))
+    turned = MOST_RADPS**2 + 0.9**2
+    assert freed.added[:, 2, 2] == pytest.approx([MOST_RADPS**2, *3 * [turned], MOST_RADPS**2])
+    assert freed.added[:, 0, 0] == pytest.approx(STEP_M**2)
+
+
 @pytest.mark.parametrize(("late", "stands"), [(0, 0), (9, 0), (10, 1)])
 def test_a_second_without_a_keyframe_is_one_in_which_wheels_stood(late: int, stands: int) -> None:
     problem = driven({})
