@@ -232,7 +232,8 @@ class Freed:
         added: (k, 3, 3) what their covariances have for that beside the noise of odometry.
         stands: did its wheels stand, or spin?
         is_settled: is it known for sure where the robot went meanwhile?
-        is_abrupt: did its wheels begin or end to do so at once, as no robot does?
+        is_telling: did its wheels do what no robot does: begin or end at once, or turn it for
+            seconds about one of them?
     """
 
     robot: int
@@ -240,7 +241,7 @@ class Freed:
     added: Array
     stands: bool
     is_settled: bool = False
-    is_abrupt: bool = False
+    is_telling: bool = False
 
 
 @dataclass(frozen=True)
