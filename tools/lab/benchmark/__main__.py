@@ -20,17 +20,16 @@ from lab.benchmark import (
     daemon,
     graphs,
     growth,
-    large_loop,
     module1,
     module2,
     module3,
-    one_more_second,
     pipeline,
     rows,
     sdp,
     timing,
     traffic,
 )
+from lab.benchmark.large_teams import large_loop, one_more_second
 from lab.benchmark.rows import Row
 from lab.files import keep, result_file
 from lab.progress import Progress

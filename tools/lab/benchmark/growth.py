@@ -18,7 +18,7 @@ from drslamd.slam.graph.measurements import (
     RangeMeasurement,
 )
 from lab.benchmark import timing
-from lab.benchmark.met_team import MetTeam, begun
+from lab.benchmark.large_teams.met_team import MetTeam, begun
 from lab.benchmark.rows import Row
 from lab.play import virtual_team
 from lab.recordings import world

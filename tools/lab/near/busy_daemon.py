@@ -25,7 +25,7 @@ from drslamd.sensors.samples import Motion
 from drslamd.slam.back_end import BackEnd
 from drslamd.slam.graph.estimate import TeamEstimate, Trajectory
 from lab.benchmark import growth
-from lab.benchmark.met_team import begun
+from lab.benchmark.large_teams.met_team import begun
 
 SECONDS = 40
 NEIGHBOURS = 14

@@ -104,9 +104,7 @@ class Thinning:
             chains: all that are held, by robot; nodes: likewise of modules that no robot carries;
             pairs: of two of these.
         """
-        while self._former:
-            self._former.popleft()
-            yield PAIR / 2
+        yield from self._let_go()
         known: dict[int, ChainData] = {}
         newest: dict[int, int] = {}
         for robot, data in sorted(chains.items()):
@@ -123,13 +121,7 @@ class Thinning:
         age, recent = ages(newest, teams), recent_s(len(chains), self._recent_s)
         known |= nodes
         age |= dict.fromkeys(nodes, 0)
-        before, self._chains, views = self._chains, {}, {}
-        for robot, data in known.items():
-            thinning = before.get(data.chain) or ChainThinning()
-            self._chains[data.chain] = thinning
-            views[robot] = thinning.view(data, age[robot], recent)
-            _ = views[robot].digested  # (remembered: so a digest of the whole takes no long)
-            yield CHAIN * (1 + thinning.made)
+        views = yield from self._chain_views(known, age, recent)
         before_pairs, self._pairs = self._pairs, {}
         begun: deque[Begun] = deque()
         for pair in pairs:
@@ -156,6 +148,25 @@ class Thinning:
         self._former, self._latest = self._latest, deque([*views.values(), *of_pairs])
         shifts = {robot: shift for table in teams for robot, shift in table.items()}
         return GraphView(views, of_pairs, dict.fromkeys(nodes, 0.0) | shifts, joints)
+
+    def _let_go(self) -> Iterator[float]:
+        """Forget what was seen before the last view."""
+        while self._former:
+            self._former.popleft()
+            yield PAIR / 2
+
+    def _chain_views(
+        self, known: Mapping[int, ChainData], age: Mapping[int, int], recent: int
+    ) -> Generator[float, None, dict[int, ChainView]]:
+        """Of all chains, by robot."""
+        before, self._chains, views = self._chains, {}, {}
+        for robot, data in known.items():
+            thinning = before.get(data.chain) or ChainThinning()
+            self._chains[data.chain] = thinning
+            views[robot] = thinning.view(data, age[robot], recent)
+            _ = views[robot].digested  # (remembered: so a digest of the whole takes no long)
+            yield CHAIN * (1 + thinning.made)
+        return views
 
 
 def _batches(begun: deque[Begun]) -> Iterator[list[Begun]]:

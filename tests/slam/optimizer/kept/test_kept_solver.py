@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from kept_scenes import a_team_problem
-from lab.benchmark.met_team import MetTeam, begun
+from lab.benchmark.large_teams.met_team import MetTeam, begun
 
 from drslamd.conventions import Chain
 from drslamd.slam.graph.estimate import TeamEstimate

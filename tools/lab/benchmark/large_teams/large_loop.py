@@ -17,7 +17,7 @@ from drslamd.conventions import SECOND_US
 from drslamd.events import JobDone
 from drslamd.io.worker import Finished, Worker
 from drslamd.jobs import OPTIMIZER, Job, Jobs
-from lab.benchmark.met_team import MetTeam
+from lab.benchmark.large_teams.met_team import MetTeam
 from lab.benchmark.rows import Row
 
 ROBOTS = {True: 10, False: 50}

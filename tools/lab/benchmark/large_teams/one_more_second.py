@@ -18,7 +18,7 @@ from drslamd.slam.graph.estimate import TeamEstimate
 from drslamd.slam.optimizer.banded import banded_optimizer
 from drslamd.slam.optimizer.banded.banded_solver import SETTLED
 from lab.benchmark import timing
-from lab.benchmark.met_team import MetTeam, begun
+from lab.benchmark.large_teams.met_team import MetTeam, begun
 from lab.benchmark.rows import Peer, Row
 
 TIMES_LESS = {3: 1.8, 10: 5.0, 20: 8.0, 50: 22.0, 100: 35.0}

@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 
 import pytest
-from lab.benchmark import large_loop, rows
+from lab.benchmark import rows
+from lab.benchmark.large_teams import large_loop
 
 from drslamd.slam.back_end import BackEnd
 

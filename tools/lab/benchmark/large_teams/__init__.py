@@ -1,0 +1,1 @@
+"""What teams cost of which most pairs have met."""
