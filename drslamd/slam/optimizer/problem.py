@@ -232,8 +232,7 @@ class Freed:
         added: (k, 3, 3) what their covariances have for that beside the noise of odometry.
         stands: did its wheels stand, or spin?
         is_settled: is it known for sure where the robot went meanwhile?
-        is_telling: did its wheels do what no robot does: begin or end at once, or turn it for
-            seconds about one of them?
+        is_abrupt: did its wheels begin or end to do so at once, as no robot does?
     """
 
     robot: int
@@ -241,7 +240,7 @@ class Freed:
     added: Array
     stands: bool
     is_settled: bool = False
-    is_telling: bool = False
+    is_abrupt: bool = False
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,7 @@ Two robots alone only know of each other how far they are apart: what one of the
 stretch explains much of what the other did in another one. So only what came to an end not long
 before all still was as modelled is looked at, and where a stretch of another robot explains nearly
 as much nobody can say who it was. But a robot has mass: wheels that stopped or went faster all at
-once say more than those that did so as robots do, and so does one about which it turned for
-seconds.
+once say more than those that did so as robots do.
 """
 
 from __future__ import annotations
@@ -17,8 +16,8 @@ import numpy as np
 from drslamd.slam.optimizer.banded.lapses.known_lapses import GAIN, newest_keyframe, settled
 from drslamd.slam.optimizer.banded.lapses.placements import RIVAL
 from drslamd.slam.optimizer.banded.lapses.stretches import (
+    has_short_links,
     likely_stretches,
-    may_tell,
     span,
     with_freed,
 )
@@ -31,9 +30,9 @@ ROUND, ROUGH = 8, 1e-3
 """Steps, and m and rad, after which it is seen which are worth more."""
 LITTLE, MOST_POLISHED = 10.0, 3
 """What gains less by then is not gone on with, and so many are."""
-TELLING = 15.0
-"""Of cost, for a stretch in which wheels did what no robot does. Of twenty drives in which the
-counters of one robot stuck nineteen have it, and of their healthy robots none."""
+ABRUPT = 15.0
+"""Of cost, for a stretch in which wheels changed their speed at once: of twenty drives in which the
+counters of one robot stuck nineteen have that, and of their healthy robots none."""
 MOST_PAIRS = 45
 """That have met, ten robots: a stretch takes some solutions, and larger teams ask only once
 something does not fit."""
@@ -49,19 +48,19 @@ class Tried:
     Attributes:
         robot: whose it is, as the problem numbers them.
         gain: by how much the cost fell.
-        is_telling: see `Freed`.
+        is_abrupt: see `Freed`.
     """
 
     robot: int
     equations: Equations
     point: Point
     gain: float
-    is_telling: bool = False
+    is_abrupt: bool = False
 
     @property
     def worth(self) -> float:
         """What speaks for it."""
-        return self.gain + (TELLING if self.is_telling else 0.0)
+        return self.gain + (ABRUPT if self.is_abrupt else 0.0)
 
 
 def best(equations: Equations, nominal: Point, most: int, tolerance: float) -> Tried | None:
@@ -86,10 +85,10 @@ def best(equations: Equations, nominal: Point, most: int, tolerance: float) -> T
 
 
 def is_asked_for(problem: Problem) -> bool:
-    """Did wheels do of late what no robot does? Then it is asked though all fits."""
-    if problem.pairs > MOST_PAIRS or not may_tell(problem):
+    """Did wheels stop, or go faster, all at once of late? Then it is asked though all fits."""
+    if problem.pairs > MOST_PAIRS or not has_short_links(problem):
         return False
-    return any(f.is_telling and _has_moved(problem, f.robot) for f in _possible(problem))
+    return any(f.is_abrupt and _has_moved(problem, f.robot) for f in _possible(problem))
 
 
 def _has_moved(problem: Problem, robot: int) -> bool:
@@ -126,7 +125,7 @@ def _roughly(equations: Equations, nominal: Point, freed: Freed) -> Tried:
     point = descend(wider, nominal.calibration, ROUND, ROUGH)
     near = Equations(replace(problem, initial=point.poses), like=wider)
     return Tried(
-        freed.robot, near, point, _gain(equations, nominal, problem, point), freed.is_telling
+        freed.robot, near, point, _gain(equations, nominal, problem, point), freed.is_abrupt
     )
 
 
@@ -136,7 +135,7 @@ def _polished(
     point = descend(rough.equations, rough.point.calibration, most, tolerance)
     freed, point = settled(rough.equations, point, most, tolerance)
     return Tried(
-        rough.robot, freed, point, _gain(equations, nominal, freed.problem, point), rough.is_telling
+        rough.robot, freed, point, _gain(equations, nominal, freed.problem, point), rough.is_abrupt
     )
 
 

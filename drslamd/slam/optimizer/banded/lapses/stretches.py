@@ -65,9 +65,10 @@ def _of_robot(problem: Problem, robot: int, mine: Index) -> list[Freed]:
         for first, last in _stretches(stands, until, 0.0)
         if seconds[first : last + 1].sum() >= STANDS_S
     ]
-    pivots = _alike(_radius(problem, mine)) & _turns_about_a_wheel(problem, mine)
-    turned = [
-        (first, last)
+    half_track = 0.0 if problem.half_track is None else float(problem.half_track[robot])
+    pivots = _pivots(odometry.measured[mine], seconds, half_track)
+    stood += [
+        (first, last, True)
         for first, last in _stretches(pivots, until, APART_S)
         if seconds[first : last + 1].sum() >= PIVOTS_S
     ]
@@ -75,24 +76,16 @@ def _of_robot(problem: Problem, robot: int, mine: Index) -> list[Freed]:
     spun = [(first, last, False) for first, last in _stretches(is_fast, until, APART_S)]
     jumps = _jumps(speed, seconds)
     # each began and ended somewhere in the links beside
-    beside = [
-        (max(first - 1, 0), last + 2, is_still, bool(jumps[max(first - 1, 0) : last + 2].any()))
-        for first, last, is_still in stood + spun
+    spans = [
+        (slice(max(first - 1, 0), last + 2), is_still)
+        for first, last, is_still in sorted(stood + spun)[-MOST_TRIED:]
     ]
-    beside += [(max(first - 1, 0), last + 2, True, True) for first, last in turned]
     return [
-        replace(freed_links(problem, robot, mine[first:end], is_still), is_telling=is_telling)
-        for first, end, is_still, is_telling in sorted(beside)[-MOST_TRIED:]
+        replace(
+            freed_links(problem, robot, mine[span], is_still), is_abrupt=bool(jumps[span].any())
+        )
+        for span, is_still in spans
     ]
-
-
-def may_tell(problem: Problem) -> bool:
-    """May some stretch be telling (`Freed`)? What is found out quickly, each second."""
-    if has_short_links(problem):
-        return True
-    every = np.arange(len(problem.odometry))
-    about = every[_turns_about_a_wheel(problem, every)]
-    return bool(_seconds(problem, about).sum() >= PIVOTS_S)
 
 
 def has_short_links(problem: Problem) -> bool:
@@ -109,27 +102,17 @@ def _jumps(speed: Array, seconds: Array) -> NDArray[np.bool_]:
     return out
 
 
-def _turns_about_a_wheel(problem: Problem, links: Index) -> NDArray[np.bool_]:
-    """(k,) which links turn about a point that is as far away as a wheel may be."""
-    if problem.half_track is None:
-        return np.zeros(len(links), dtype=bool)
-    odometry, seconds = problem.odometry, _seconds(problem, links)
-    radius, half_track = _radius(problem, links), problem.half_track[odometry.robot[links]]
+def _pivots(measured: Array, seconds: Array, half_track: float) -> NDArray[np.bool_]:
+    """(k,) links (k, 3) that turn about one wheel, as those beside them do.
+
+    Args:
+        half_track: m, 0 where nothing turns about a wheel.
+    """
+    turn = np.abs(measured[:, 2])
+    radius = np.hypot(*measured[:, :2].T) / np.maximum(2 * np.sin(np.minimum(turn, 3.0) / 2), 1e-9)
     nearest, farthest = (times * half_track for times in PIVOTS_AT)
-    is_turn = np.abs(odometry.measured[links, 2]) > PIVOTS_RADPS * seconds
-    return np.asarray(is_turn & (radius > nearest) & (radius < farthest))
-
-
-def _radius(problem: Problem, links: Index) -> Array:
-    """(k,) m, of the arcs that links are."""
-    x, y, turn = problem.odometry.measured[links].T
-    half = np.minimum(np.abs(turn), 3.0) / 2
-    return np.asarray(np.hypot(x, y) / np.maximum(2 * np.sin(half), 1e-9))
-
-
-def _alike(radius: Array) -> NDArray[np.bool_]:
-    """(k,) whether that of the link before, or of the one behind, is the same."""
-    is_next = np.abs(np.diff(radius)) < ALIKE * radius[1:]
+    turns = (turn > PIVOTS_RADPS * seconds) & (radius > nearest) & (radius < farthest)
+    is_next = turns[1:] & turns[:-1] & (np.abs(np.diff(radius)) < ALIKE * radius[1:])
     return np.asarray(np.append(is_next, False) | np.append(False, is_next))
 
 

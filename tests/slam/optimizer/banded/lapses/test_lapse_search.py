@@ -13,8 +13,8 @@ from drslamd.slam.graph.estimate import Lapse
 from drslamd.slam.optimizer.banded.lapses import lapse_search
 from drslamd.slam.optimizer.banded.lapses.known_lapses import GAIN, lapse_of
 from drslamd.slam.optimizer.banded.lapses.lapse_search import (
+    ABRUPT,
     BEHIND,
-    TELLING,
     Tried,
     best,
     is_asked_for,
@@ -132,17 +132,17 @@ def test_a_stretch_behind_which_all_was_as_modelled_for_long_is_no_reason(
     assert (tried(replace(problem, fitted=fitted)) is not None) is is_tried
 
 
-def given_stretches(monkeypatch: pytest.MonkeyPatch, *telling: bool) -> Problem:
-    """Robots 0, 1 and so on have one each, of which some are telling."""
+def given_stretches(monkeypatch: pytest.MonkeyPatch, *abrupt: bool) -> Problem:
+    """Robots 0, 1 and so on have one each, of which some are abrupt."""
     problem = slipping(a_team(7)[0], 1, *FAULT)
     (freed,) = likely_stretches(problem)
-    each = [replace(freed, robot=robot, is_telling=a) for robot, a in enumerate(telling)]
+    each = [replace(freed, robot=robot, is_abrupt=a) for robot, a in enumerate(abrupt)]
     monkeypatch.setattr(lapse_search, "likely_stretches", lambda _: each)
     return problem
 
 
 @pytest.mark.parametrize(("less", "named"), [(-1.0, None), (1.0, 1)])
-def test_a_telling_stretch_is_preferred_to_one_that_explains_a_little_more(
+def test_an_abrupt_stretch_is_preferred_to_one_that_explains_a_little_more(
     less: float, named: int | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     problem = given_stretches(monkeypatch, False, True)
@@ -150,7 +150,7 @@ def test_a_telling_stretch_is_preferred_to_one_that_explains_a_little_more(
 
     def gaining(*args: object) -> Tried:
         answer = polished(*args)  # type: ignore[arg-type]
-        return replace(answer, gain=100.0 if answer.robot else 100.0 + TELLING - RIVAL - less)
+        return replace(answer, gain=100.0 if answer.robot else 100.0 + ABRUPT - RIVAL - less)
 
     monkeypatch.setattr(lapse_search, "_polished", gaining)
     answer = tried(problem)
@@ -158,12 +158,12 @@ def test_a_telling_stretch_is_preferred_to_one_that_explains_a_little_more(
 
 
 @pytest.mark.parametrize("more", [-1.0, 1.0])
-@pytest.mark.parametrize("is_telling", [False, True])
-def test_a_telling_stretch_need_not_explain_as_much(
-    is_telling: bool, more: float, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("is_abrupt", [False, True])
+def test_an_abrupt_stretch_need_not_explain_as_much(
+    is_abrupt: bool, more: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    problem = given_stretches(monkeypatch, is_telling)
-    gain = GAIN + more - TELLING * is_telling
+    problem = given_stretches(monkeypatch, is_abrupt)
+    gain = GAIN + more - ABRUPT * is_abrupt
     polished = lapse_search._polished
     monkeypatch.setattr(
         lapse_search,
@@ -174,23 +174,23 @@ def test_a_telling_stretch_need_not_explain_as_much(
 
 
 @pytest.mark.parametrize(
-    ("is_telling", "samples", "pairs", "is_asked"),
+    ("abrupt", "samples", "pairs", "is_asked"),
     [(1, 2, 45, 1), (0, 2, 45, 0), (1, 3, 45, 0), (1, 2, 46, 0)],
 )
-def test_a_small_team_asks_for_telling_stretches_though_all_fits(
-    is_telling: int, samples: int, pairs: int, is_asked: int, monkeypatch: pytest.MonkeyPatch
+def test_a_small_team_asks_for_abrupt_stretches_though_all_fits(
+    abrupt: int, samples: int, pairs: int, is_asked: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    problem = given_stretches(monkeypatch, bool(is_telling))
+    problem = given_stretches(monkeypatch, bool(abrupt))
     n = problem.n.copy()
     (link,) = links_of(problem, 1, 20, 21)
     n[problem.odometry.j[link]] = n[problem.odometry.i[link]] + samples
     assert is_asked_for(replace(problem, n=n, pairs=pairs)) is bool(is_asked)
 
 
-def test_a_telling_stretch_that_is_freed_or_long_ago_is_not_asked_for(
+def test_an_abrupt_stretch_that_is_freed_or_long_ago_is_not_asked_for(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(lapse_search, "may_tell", lambda _: True)
+    monkeypatch.setattr(lapse_search, "has_short_links", lambda _: True)
     problem = given_stretches(monkeypatch, False, True)
     assert is_asked_for(problem)
     freed = lapse_search._possible(problem)[0]
@@ -200,11 +200,11 @@ def test_a_telling_stretch_that_is_freed_or_long_ago_is_not_asked_for(
 
 
 @pytest.mark.parametrize(("since", "is_asked"), [(0, False), (10, True)])
-def test_of_a_robot_that_parks_a_telling_stretch_is_not_asked_for_again_and_again(
+def test_of_a_robot_that_parks_an_abrupt_stretch_is_not_asked_for_again_and_again(
     since: int, is_asked: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The last solution had all but so much of its way, and it ends soon behind the stretch."""
-    monkeypatch.setattr(lapse_search, "may_tell", lambda _: True)
+    monkeypatch.setattr(lapse_search, "has_short_links", lambda _: True)
     monkeypatch.setattr(lapse_search, "BEHIND", 100)
     problem = given_stretches(monkeypatch, False, True)
     newest = np.array([problem.n[problem.robot_id == robot].max() for robot in IDS[:3]])

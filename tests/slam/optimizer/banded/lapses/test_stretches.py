@@ -21,7 +21,6 @@ from drslamd.slam.optimizer.banded.lapses.stretches import (
     UNKNOWN_M,
     has_short_links,
     likely_stretches,
-    may_tell,
     under,
     with_freed,
 )
@@ -74,10 +73,8 @@ def test_who_turns_about_one_wheel_for_three_seconds_has_a_counter_that_stands(
     seconds: int, stands: bool
 ) -> None:
     for turn in (-0.9, 0.9):
-        problem = arcs(*seconds * [0.2], turn=turn)
-        assert found(problem) == ([(9, 11 + seconds, True)] if stands else [])
-        assert may_tell(problem) is stands
-        assert all(freed.is_telling for freed in likely_stretches(problem))
+        ends = found(arcs(*seconds * [0.2], turn=turn))
+        assert ends == ([(9, 11 + seconds, True)] if stands else [])
 
 
 @pytest.mark.parametrize(
@@ -99,9 +96,7 @@ def test_who_turns_otherwise_has_none(radii: tuple[float, ...], turn: float, sta
 
 @pytest.mark.parametrize("half_track", [0.0, None])
 def test_nor_has_a_base_whose_wheels_have_no_sides(half_track: float | None) -> None:
-    problem = arcs(0.2, 0.2, 0.2, half_track=half_track)
-    assert found(problem) == []
-    assert not may_tell(problem)
+    assert found(arcs(0.2, 0.2, 0.2, half_track=half_track)) == []
 
 
 def test_what_one_wheel_made_of_a_turn_may_be_none_of_it() -> None:
@@ -154,12 +149,12 @@ def test_of_many_stretches_the_latest_are_looked_at() -> None:
 
 
 @pytest.mark.parametrize(
-    ("samples", "speed_mps", "is_telling"),
+    ("samples", "speed_mps", "is_abrupt"),
     [(2, 0.26, True), (2, 0.23, False), (3, 0.26, False), (2, -0.26, True)],
 )
 @pytest.mark.parametrize("is_end", [False, True])
-def test_a_stretch_is_telling_where_a_short_link_leads_to_another_speed(
-    samples: int, speed_mps: float, is_telling: bool, is_end: bool
+def test_a_stretch_is_abrupt_where_a_short_link_leads_to_another_speed(
+    samples: int, speed_mps: float, is_abrupt: bool, is_end: bool
 ) -> None:
     """Robot 1 stands in seconds 10 to 12 but for the first or the last samples of that, before or
     behind which it drives at some speed."""
@@ -175,7 +170,7 @@ def test_a_stretch_is_telling_where_a_short_link_leads_to_another_speed(
     assert not has_short_links(problem)
     (freed,) = likely_stretches(replace(problem, odometry=odometry, n=n))
     assert freed.stands
-    assert freed.is_telling is is_telling
+    assert freed.is_abrupt is is_abrupt
     assert pytest.approx(0.245) == SHARE * JUMP_MPS
 
 
