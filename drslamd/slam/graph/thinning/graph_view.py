@@ -29,9 +29,9 @@ from drslamd.slam.graph.thinning.time_cells import ages, recent_s
 AT_ONCE, PAIRS_AT_ONCE = 24, 128
 """Stretches of pairs that are thinned together, and pairs of which few said anything."""
 CHAIN, PAIR, BEGUN, PART, OLD = 1.0, 0.06, 0.3, 0.2, 4
-"""Work (`Thinning.steps`): of a chain or of one part of it that is made, of a pair that is looked
-at, of one of its stretches that is taken up and one that is thinned, and as how many of these one
-of old times counts."""
+"""Work (`Thinning.steps`) of: a chain, and each of its parts that is made; a pair that is looked
+at; its clocks, and each of its stretches that is taken up; one that is thinned; and as how many
+of these one of old times counts."""
 
 Begun = tuple[list[Unthinned], Callable[[list[PairPart]], PairView]]
 """See `PairThinning.begin`."""

@@ -18,7 +18,7 @@ from drslamd.slam.graph.measurements import GraphEntry, Keyframe
 from drslamd.slam.graph.pose_graph import PoseGraph
 from drslamd.slam.graph.thinning import chain_view, thinned_pairs
 from drslamd.slam.graph.thinning.chain_view import ChainView
-from drslamd.slam.graph.thinning.graph_view import GraphView
+from drslamd.slam.graph.thinning.graph_view import GraphView, Thinning
 from drslamd.slam.graph.thinning.pair_view import PairView
 from drslamd.slam.optimizer.banded.banded_optimizer import build_problem
 
@@ -390,3 +390,23 @@ def test_all_that_a_digest_takes_long_for_is_done_while_the_view_is_made(
     for module in (chain_view, thinned_pairs):
         monkeypatch.setattr(module, "as_digested", lambda values: pytest.fail("in one go"))
     assert view.digest({0, 1, 2}) != view.digest({0, 1})
+
+
+def test_the_work_of_a_step_has_a_bound_whatever_the_team(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also at a step of time, and where most pairs said nothing."""
+    monkeypatch.setattr("drslamd.slam.graph.thinning.graph_view.AT_ONCE", 2)
+    monkeypatch.setattr("drslamd.slam.graph.thinning.graph_view.PAIRS_AT_ONCE", 3)
+    drives = [Drive(clock=77_777 * k) for k in range(5)]
+    graph = PoseGraph()
+    for origin, entry in logs(8, 900, drives, every=2):
+        graph.insert(origin, entry)
+    thinning = Thinning(300)
+    first = list(thinning.steps(graph.chains, graph.nodes, graph.usable()))
+    # ten pairs with some stretches each, of which two or three are thinned at once
+    assert len(first) > 50
+    assert max(first) < 10
+    again = list(thinning.steps(graph.chains, graph.nodes, graph.usable()))
+    assert sum(again) < sum(first) / 2
+    third = list(thinning.steps(graph.chains, graph.nodes, graph.usable()))
+    # and the fifteen views of the first look are let go one by one
+    assert len(third) == len(again) + 15

@@ -332,7 +332,7 @@ def test_what_strong_signals_do_is_one_constant_of_the_team() -> None:
 def test_priors_are_those_of_the_robots_and_of_the_configuration() -> None:
     team = small_team(3)
     still = replace(NOISE, yaw_rad_per_m=1e-6, scale=0.07)
-    team.graph.insert(team.chains[1], GraphEntry(9, RobotModel(still)))
+    team.graph.insert(team.chains[1], GraphEntry(9, RobotModel(still, half_track_m=0.115)))
     problem = build_problem(
         team.graph, group_of(team.graph), None, replace(BANDED, bias_sigma=0.25)
     ).problem
@@ -345,6 +345,7 @@ def test_priors_are_those_of_the_robots_and_of_the_configuration() -> None:
     )
     assert problem.priors.near_bias == LINKTRACK.near_bias_sigma_m
     assert (problem.pairs, problem.range_sigma) == (3, 0.10)
+    assert problem.half_track == pytest.approx([0.0, 0.115, 0.0])
 
 
 @pytest.mark.parametrize(("robots", "wider"), [((1,), ()), ((0, 1), ((0, 1),))])

@@ -39,16 +39,18 @@ def rows(quick: bool) -> Iterator[Row]:
     work = f"event loop of one of {robots} robots that have met"
     yield Row(3, f"{work}, lag p99", float(np.quantile(loop.lags, 0.99)), "ms", GOAL_MS)
     yield Row(3, f"{work}, longest lag", max(loop.lags), "ms")
-    yield Row(3, f"{work}, between two answers, mean", seconds / max(1, loop.solved), "s")
+    apart = seconds / loop.solved if loop.solved else float("inf")
+    yield Row(3, f"{work}, between two answers, mean", apart, "s")
 
 
 @dataclass
-class _LargeLoop:
+class LargeLoop:
     """What a robot does of module 3, and what its sensors see of that.
 
     Attributes:
         lags: ms by which each look of sensors came late.
         solved: answers of module 3.
+        failed: raises what a computation ended with.
     """
 
     team: MetTeam
@@ -56,23 +58,25 @@ class _LargeLoop:
     jobs: Jobs = field(default_factory=Jobs)
     lags: list[float] = field(default_factory=list)
     solved: int = 0
+    failed: asyncio.Future[None] = field(default_factory=lambda: asyncio.Future())
 
     @property
     def _utime(self) -> int:
         return round(asyncio.get_running_loop().time() * SECOND_US)
 
     def read(self, due: float, until: float) -> None:
-        """Sensors are looked at, and again after `READ_S`: how late was it?"""
+        """Sensors are looked at each `READ_S`: how late? Each look that was missed counts."""
         loop = asyncio.get_running_loop()
         now = loop.time()
-        self.lags.append(1e3 * (now - due))
-        if now < until:
-            due = max(due + READ_S, now)
+        while due <= now:
+            self.lags.append(1e3 * (now - due))
+            due += READ_S
+        if due < until:
             loop.call_at(due, self.read, due, until)
 
     async def answer(self) -> None:
         """Until the first one is there."""
-        while not self.solved:
+        while not self.solved and not self.failed.done():
             await asyncio.sleep(READ_S)
 
     async def drive(self, seconds: int) -> None:
@@ -85,14 +89,13 @@ class _LargeLoop:
                 due = began + second + number / len(said)
                 await asyncio.sleep(max(0.0, due - loop.time()))
                 back.insert(chain, entry)
-            if not back.is_looking:
-                self.optimize()
-            await asyncio.sleep(0)
+                if not back.is_looking:
+                    self.optimize()
             back.said_digest()
 
     def optimize(self) -> None:
         """Look at some of the graph; go on at once after sensors were read, or begin to solve."""
-        if not self.jobs.is_free(OPTIMIZER, self._utime):
+        if self.failed.done() or not self.jobs.is_free(OPTIMIZER, self._utime):
             return
         back, loop = self.team.back, asyncio.get_running_loop()
         job = back.begin(self.team.living, utime=self._utime)
@@ -104,18 +107,19 @@ class _LargeLoop:
 
     def _ended(self, job_id: int, done: Finished) -> None:
         if done.error is not None:
-            raise done.error
+            self.failed.set_exception(done.error)
+            return
         elapsed, now = round(done.seconds * SECOND_US), self._utime
         self.jobs.finish(JobDone(now, job_id, done.result, elapsed))
         self.team.back.on_solution(done.result, now)
         self.solved += 1
 
 
-async def _measured(team: MetTeam, seconds: int) -> _LargeLoop:
+async def _measured(team: MetTeam, seconds: int) -> LargeLoop:
     """Drive on for so long, from the first answer on."""
     worker = Worker()
     worker.start()
-    loop = _LargeLoop(team, worker)
+    loop = LargeLoop(team, worker)
     try:
         loop.optimize()
         await asyncio.wait_for(loop.answer(), FIRST_S)
@@ -124,6 +128,8 @@ async def _measured(team: MetTeam, seconds: int) -> _LargeLoop:
         now = asyncio.get_running_loop().time()
         loop.read(now, now + seconds)
         await loop.drive(seconds)
+        if loop.failed.done():
+            loop.failed.result()
     finally:
         worker.stop()
     return loop

@@ -19,10 +19,12 @@ STANDS_S = 2.0
 STILL_MPS, STILL_RADPS = 0.05, 0.1
 """Wheels that stand."""
 PIVOTS_S, PIVOTS_RADPS = 3.0, 0.2
-"""Who turns about one of its wheels for so long, and so fast: the counter of that wheel stands."""
-PIVOTS_AT, ALIKE = (0.65, 1.5), 0.05
-"""So far from its middle, in halves of the configured track, which may be another one; and by how
-much of it two such links in a row differ."""
+"""Who turns about one wheel for so long, and so fast: the counter of that wheel may stand."""
+PIVOTS_AT = (0.95, 1.05)
+"""How far from its middle, in halves of the configured track: whatever the true one is, a counter
+that stands has odometry turn about the place where its wheel is configured."""
+PIVOTS_APART_S = 2.0
+"""Between such links of one stretch, in which the other wheel hardly moved; a lane lasts longer."""
 MOVES_MPS = 0.1
 """Links slower than this say nothing of how fast a robot drives."""
 FASTER = 1.25
@@ -69,8 +71,8 @@ def _of_robot(problem: Problem, robot: int, mine: Index) -> list[Freed]:
     pivots = _pivots(odometry.measured[mine], seconds, half_track)
     stood += [
         (first, last, True)
-        for first, last in _stretches(pivots, until, APART_S)
-        if seconds[first : last + 1].sum() >= PIVOTS_S
+        for first, last in _stretches(pivots, until, PIVOTS_APART_S)
+        if (seconds * pivots)[first : last + 1].sum() >= PIVOTS_S
     ]
     is_fast = speed > FASTER * _usual_speed(speed)
     spun = [(first, last, False) for first, last in _stretches(is_fast, until, APART_S)]
@@ -103,7 +105,7 @@ def _jumps(speed: Array, seconds: Array) -> NDArray[np.bool_]:
 
 
 def _pivots(measured: Array, seconds: Array, half_track: float) -> NDArray[np.bool_]:
-    """(k,) links (k, 3) that turn about one wheel, as those beside them do.
+    """(k,) links (k, 3) that turn about one wheel.
 
     Args:
         half_track: m, 0 where nothing turns about a wheel.
@@ -111,9 +113,8 @@ def _pivots(measured: Array, seconds: Array, half_track: float) -> NDArray[np.bo
     turn = np.abs(measured[:, 2])
     radius = np.hypot(*measured[:, :2].T) / np.maximum(2 * np.sin(np.minimum(turn, 3.0) / 2), 1e-9)
     nearest, farthest = (times * half_track for times in PIVOTS_AT)
-    turns = (turn > PIVOTS_RADPS * seconds) & (radius > nearest) & (radius < farthest)
-    is_next = turns[1:] & turns[:-1] & (np.abs(np.diff(radius)) < ALIKE * radius[1:])
-    return np.asarray(np.append(is_next, False) | np.append(False, is_next))
+    is_turn = turn > PIVOTS_RADPS * seconds
+    return np.asarray(is_turn & (radius > nearest) & (radius < farthest))
 
 
 def _seconds(problem: Problem, links: Index) -> Array:

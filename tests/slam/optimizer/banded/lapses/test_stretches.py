@@ -56,15 +56,18 @@ def test_who_turns_or_creeps_does_not_stand(way: float, turn: float, stands: int
 
 
 def arcs(*radii: float, turn: float = 0.9, half_track: float | None = 0.2) -> Problem:
-    """Robot 1 turns about a point beside it in some seconds, as far away as is said."""
+    """Robot 1 turns about a point beside it in some seconds, as far away as is said, or drives
+    straight on."""
     problem = driven({})
     measured = problem.odometry.measured.copy()
     for second, radius in enumerate(radii, start=10):
+        if np.isnan(radius):
+            continue  # straight on
         chord = 2 * radius * math.sin(turn / 2)
         ahead = [chord * math.cos(turn / 2), chord * math.sin(turn / 2), turn]
         measured[links_of(problem, 1, second, second + 1)] = ahead
     odometry = replace(problem.odometry, measured=measured)
-    tracks = None if half_track is None else np.array([0.0, half_track, 0.0])
+    tracks = None if half_track is None else np.array([0.3, half_track, 0.1])
     return replace(problem, odometry=odometry, half_track=tracks)
 
 
@@ -80,14 +83,12 @@ def test_who_turns_about_one_wheel_for_three_seconds_has_a_counter_that_stands(
 @pytest.mark.parametrize(
     ("radii", "turn", "stands"),
     [
-        ((0.128, 0.128, 0.128), 0.9, False),  # about no wheel of any track
-        ((0.132, 0.132, 0.132), 0.9, True),
-        ((0.302, 0.302, 0.302), 0.9, False),
-        ((0.298, 0.298, 0.298), 0.9, True),
-        ((0.2, 0.212, 0.2), 0.9, False),  # a curve as drives have them
-        ((0.2, 0.208, 0.2), 0.9, True),
-        ((0.25, 0.25, 0.25), 0.19, False),  # so slowly anybody turns
-        ((0.25, 0.25, 0.25), 0.21, True),
+        ((0.189, 0.189, 0.189), 0.9, False),  # about no wheel
+        ((0.191, 0.191, 0.191), 0.9, True),
+        ((0.211, 0.211, 0.211), 0.9, False),
+        ((0.209, 0.209, 0.209), 0.9, True),
+        ((0.2, 0.2, 0.2), 0.19, False),  # so slowly anybody turns
+        ((0.2, 0.2, 0.2), 0.21, True),
     ],
 )
 def test_who_turns_otherwise_has_none(radii: tuple[float, ...], turn: float, stands: bool) -> None:
@@ -97,6 +98,30 @@ def test_who_turns_otherwise_has_none(radii: tuple[float, ...], turn: float, sta
 @pytest.mark.parametrize("half_track", [0.0, None])
 def test_nor_has_a_base_whose_wheels_have_no_sides(half_track: float | None) -> None:
     assert found(arcs(0.2, 0.2, 0.2, half_track=half_track)) == []
+
+
+@pytest.mark.parametrize(
+    ("lane", "ends"), [(2, [(9, 17, True)]), (3, []), (1, [(9, 16, True)])], ids=str
+)
+def test_turns_about_a_wheel_with_a_lane_between_are_two(
+    lane: int, ends: list[tuple[int, int, bool]]
+) -> None:
+    """Of two seconds each: too short alone, and long enough together."""
+    assert found(arcs(0.2, 0.2, *lane * [np.nan], 0.2, 0.2)) == ends
+
+
+def test_the_lane_itself_is_no_turn_about_a_wheel() -> None:
+    assert found(arcs(0.2, np.nan, 0.2, np.nan)) == []
+
+
+def test_of_such_turns_and_later_spins_the_latest_are_looked_at() -> None:
+    problem = arcs(0.2, 0.2, 0.2)
+    measured = problem.odometry.measured.copy()
+    for second in range(17, 42, 6):
+        measured[links_of(problem, 1, second, second + 1)] = [0.8, 0.0, 0.0]
+    odometry = replace(problem.odometry, measured=measured)
+    kinds = [stands for _, _, stands in found(replace(problem, odometry=odometry))]
+    assert kinds == MOST_TRIED * [False]
 
 
 def test_what_one_wheel_made_of_a_turn_may_be_none_of_it() -> None:
