@@ -18,13 +18,15 @@ from deploy_helpers import (
     example_in,
     refused,
 )
+from machine_speed import allowed_s
 
 from drslamd.cli.exit_codes import BAD_CONFIG, OK, USAGE
 from drslamd.gossip.seal import KEY_BYTES
 
-LONGEST_CPU_S = 2.5
+LONGEST_CPU_S = 1.6
 """Of a process that starts Python and reads its configuration: 0.3 to 0.8 s, twice as much where
-other programs share the core. What they do to the clock does not count."""
+other programs share the core, and more on a slower machine. What they do to the clock does not
+count."""
 SECRET = "5e" * KEY_BYTES
 
 slow = pytest.mark.slow
@@ -65,7 +67,7 @@ def refusal(config: Path) -> str:
     assert code == BAD_CONFIG, said
     assert "Traceback" not in said
     assert not opened(config)
-    assert seconds < LONGEST_CPU_S
+    assert seconds < allowed_s(LONGEST_CPU_S)
     return said
 
 
