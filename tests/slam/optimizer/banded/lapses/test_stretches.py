@@ -91,7 +91,9 @@ def test_who_turns_about_one_wheel_for_three_seconds_has_a_counter_that_stands(
         ((0.2, 0.2, 0.2), 0.21, True),
     ],
 )
-def test_who_turns_otherwise_has_none(radii: tuple[float, ...], turn: float, stands: bool) -> None:
+def test_such_a_counter_has_only_who_turns_about_its_wheel(
+    radii: tuple[float, ...], turn: float, stands: bool
+) -> None:
     assert bool(found(arcs(*radii, turn=turn))) is stands
 
 
