@@ -1,4 +1,5 @@
-"""Shared by all tests; how the suite polices itself is in policing.py."""
+"""Shared by all tests; how the suite polices itself is in policing.py, how interpreters share
+it in sharing.py."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ from pathlib import Path
 import pytest
 from places import SHARED
 
-pytest_plugins = ["policing", "pytester"]
+pytest_plugins = ["policing", "pytester", "sharing"]
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,7 @@ from lab import run_tests
 from places import REPOSITORY
 
 QUICK = ["lint", "format", "quick tests", "types"]
-SLOW = ["slow tests in virtual time", "slow tests"]
+SLOW = ["slow tests side by side", "slow tests one by one"]
 STEPS = sorted([*QUICK, *SLOW])
 
 
@@ -68,6 +68,17 @@ def test_another_interpreter_that_fails_counts_unless_it_is_quick(steps: Steps) 
     steps.others = ["Python 3.10"]
     assert run_tests.main([]) == 1
     assert run_tests.main(["--quick"]) == 0
+
+
+def test_the_other_interpreters_share_the_quick_tests(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = f"{sys.version_info.major}.{sys.version_info.minor}"
+    others = [version for version in run_tests.SUPPORTED if version != own]
+    asked: list[tuple[str, ...]] = []
+    monkeypatch.setattr(run_tests, "_find", lambda v: None if v == others[1] else f"python{v}")
+    monkeypatch.setattr(run_tests, "_quick_tests_on", lambda *what: asked.append(what))
+    assert run_tests._other_interpreters() == []
+    first, _, last = others
+    assert asked == [(first, f"python{first}", "1/2"), (last, f"python{last}", "2/2")]
 
 
 def test_arguments_go_to_pytest_alone(steps: Steps) -> None:

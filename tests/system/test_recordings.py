@@ -33,7 +33,7 @@ MOST_M, MOST_DEG = 0.10, 3.0
 SAME_M = 0.02
 FASTER = 2.5
 """Than real time, all robots of a team on one core of a quiet machine. It was 10 before poses knew
-what they do not know, then 5; TIERS took 37 to 52 s of its 122 s in a slow night, and less than 24$
+what they do not know, then 5; TIERS took 37 to 52 s of its 122 s in a slow night, and less than 24
 two days earlier. A robot takes 3 to 4 % of a core, in such a night 8 to 11 %."""
 
 

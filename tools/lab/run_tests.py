@@ -1,8 +1,9 @@
 """tools/test: lint, types, and the suite on every interpreter that is found.
 
-On the interpreter of .venv everything runs; on the others all but the tests marked slow: real
-processes, real time, long computations, none of which depends on the interpreter. Exit code 0
-only when everything passed.
+On the interpreter of .venv everything runs. The others share the quick tests among them, each
+taking every third of all that are collected, so of every file something runs on each: what depends
+on an interpreter is its syntax and its library, not a number, and types are checked for the oldest.
+Exit code 0 only when everything passed.
 """
 
 from __future__ import annotations
@@ -17,13 +18,15 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SUPPORTED = ("3.10", "3.11", "3.12", "3.13")
-IN_VIRTUAL_TIME = (
+SIDE_BY_SIDE = (
     *("tests/gossip", "tests/near", "tests/robot", "tests/slam"),
     *("tests/lab/accuracy", "tests/lab/bound", "tests/lab/hunt", "tests/lab/near"),
     *("tests/lab/replay", "tests/lab/report", "tests/lab/reproduce", "tests/lab/soak"),
     *("tests/lab/trust", "tests/system/test_honest_poses.py", "tests/test_layers.py"),
+    *("tests/deploy/test_package.py", "tests/deploy/test_lines_for_a_clone.py"),
 )
-"""Slow here are computations alone, which may share the machine; what runs in real time may not."""
+"""Slow here are virtual time and packages that are built, which may share the machine; what runs in
+real time may not."""
 SHOWN = 4_000
 """Characters of the end of what another interpreter says."""
 
@@ -57,9 +60,11 @@ def main(arguments: list[str] | None = None) -> int:
     ]
     if not options.quick:
         slow = [python, "-m", "pytest", "-q", "-m", "slow"]
-        real = [f"--ignore={folder}" for folder in IN_VIRTUAL_TIME]
-        steps.append(("slow tests in virtual time", [*slow, "-n", "auto", *IN_VIRTUAL_TIME]))
-        steps.append(("slow tests", [*slow, *real]))
+        # what the tests of a file have in common, such as a package, is made once
+        together = [*slow, "-n", "auto", "--dist", "loadfile", *SIDE_BY_SIDE]
+        others = [f"--ignore={folder}" for folder in SIDE_BY_SIDE]
+        steps.append(("slow tests side by side", together))
+        steps.append(("slow tests one by one", [*slow, *others]))
     types = [python, "-m", "mypy", "drslamd", "tools/lab", *_test_files()]
     with ThreadPoolExecutor(1) as pool:
         # they take the time in which tests wait
@@ -95,26 +100,28 @@ def _ended(name: str, code: int, began: float) -> None:
 
 
 def _other_interpreters() -> list[str]:
-    """The quick tests on every other supported interpreter; those that failed."""
+    """The quick tests on the other supported interpreters that are found; those that failed."""
     own = f"{sys.version_info.major}.{sys.version_info.minor}"
     others = {version: _find(version) for version in SUPPORTED if version != own}
     found = {version: python for version, python in others.items() if python is not None}
     # one after the other on all cores: side by side, three on two cores would take two rounds
-    codes = [_quick_tests_on(version, python) for version, python in found.items()]
+    codes = [
+        _quick_tests_on(version, python, f"{part}/{len(found)}")
+        for part, (version, python) in enumerate(found.items(), start=1)
+    ]
     absent = ", ".join(version for version in others if version not in found)
     print(f"interpreters not found, so not tested: {absent or 'none'}")
     return [f"Python {v}" for v, code in zip(found, codes, strict=True) if code]
 
 
-def _quick_tests_on(version: str, python: str) -> int:
+def _quick_tests_on(version: str, python: str, share: str) -> int:
     """In an environment of its own; what is said is printed at the end."""
     began, folder = time.monotonic(), ROOT / ".venvs" / version
     inside = str(folder / "bin" / "python")
-    install = [inside, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    steps = [
-        [*install, "--editable", f"{ROOT}[test]"],
-        [inside, "-m", "pytest", "-q", "-n", "auto", "-m", "not slow", "-p", "no:cacheprovider"],
-    ]
+    # most of what is installed is never imported here, so nothing is compiled before it is
+    install = [inside, "-m", "pip", "install", "--quiet", "--no-compile", "--editable"]
+    quick = [inside, "-m", "pytest", "-q", "-n", "auto", "-m", "not slow", "--share", share]
+    steps = [[*install, f"{ROOT}[test]"], [*quick, "-p", "no:cacheprovider"]]
     if not Path(inside).exists():
         steps.insert(0, [python, "-m", "venv", str(folder)])
     code = 0
