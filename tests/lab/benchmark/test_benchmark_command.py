@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -46,6 +47,29 @@ def test_what_became_worse_is_said_and_ends_with_1(
     said = capsys.readouterr()
     assert "| 1 | some | 4 ms |" in said.out
     assert "worse: 1 some [ms]: 2.50 times as fast as other, was 5.00" in said.err
+
+
+class Interrupted(Fake):
+    """A part that is ended after its first row."""
+
+    def rows(self, quick: bool) -> Iterator[Row]:
+        yield row(self.value)
+        raise KeyboardInterrupt
+
+
+def test_rows_that_were_measured_outlive_a_run_that_is_ended(
+    part: Fake, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    stored, unfinished = tmp_path / "now.json", tmp_path / "now-unfinished.json"
+    asked = ["--quick", "--json", str(stored)]
+    monkeypatch.setattr(command, "PARTS", {"1": part, "2": Interrupted(3.0)})
+    with pytest.raises(KeyboardInterrupt):
+        command.main(asked)
+    assert not stored.exists()
+    assert [r["value"] for r in json.loads(unfinished.read_text())["rows"]] == [2.0, 3.0]
+    monkeypatch.setattr(command, "PARTS", {"1": part})
+    assert command.main(asked) == 0
+    assert not unfinished.exists()
 
 
 @pytest.mark.parametrize("content", [None, "", "{}", '{"rows": [{"module": 1}]}'])

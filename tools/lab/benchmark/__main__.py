@@ -50,7 +50,8 @@ PARTS = {
 }
 EXAMPLES = """\
 examples:
-  tools/benchmark                              all of it, some minutes
+  tools/benchmark --json now.json              all of it, an hour or two; until then rows that are
+                                               measured stand in now-unfinished.json
   tools/benchmark --quick --json now.json      under two minutes, fewer repetitions
   tools/benchmark --quick --check before.json  and say what became worse
   tools/benchmark --module 3                   one module
@@ -73,17 +74,15 @@ def main(arguments: list[str] | None = None) -> int:
         return NO_INPUT
     timing.pin()
     try:
-        found = _run(options.module or _possible(), options.quick)
+        found = _run(options.module or _possible(), options.quick, options.json)
     except (OSError, BadRecording) as error:
         print(f"{error}; DRSLAMD_POSEGRAPHS names the folder", file=sys.stderr)
         return NO_INPUT
     print(f"{_machine()}\n\n{rows.markdown(found)}")
     code = 0
     if options.json:
-        # a line for each row, so that a stored file can be read and compared
-        lines = ",\n".join(json.dumps(row) for row in rows.to_json(found))
-        head = json.dumps({"machine": _machine(), "quick": options.quick})[:-1]
-        code = keep(options.json, f'{head}, "rows": [\n{lines}\n]}}\n')
+        code = keep(options.json, _stored(found, options.quick))
+        _unfinished(options.json).unlink(missing_ok=True)
     if options.picture:
         code = curves.draw(found, options.picture) or code
     worse = rows.regressions(found, stored)
@@ -117,14 +116,29 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _run(parts: list[str], quick: bool) -> list[Row]:
+def _run(parts: list[str], quick: bool, result: Path | None) -> list[Row]:
     progress, found = Progress("benchmark", len(parts), "parts"), []
     for done, part in enumerate(parts):
         progress(done)
-        found += list(PARTS[part].rows(quick))
+        for row in PARTS[part].rows(quick):
+            found.append(row)
+            if result is not None:
+                # a row may take a quarter of an hour: what ends the run does not take the others
+                keep(_unfinished(result), _stored(found, quick))
     progress(len(parts))
     progress.end()
     return found
+
+
+def _unfinished(result: Path) -> Path:
+    return result.with_name(f"{result.stem}-unfinished{result.suffix}")
+
+
+def _stored(found: list[Row], quick: bool) -> str:
+    """A line for each row, so that a stored file can be read and compared."""
+    lines = ",\n".join(json.dumps(row) for row in rows.to_json(found))
+    head = json.dumps({"machine": _machine(), "quick": quick})[:-1]
+    return f'{head}, "rows": [\n{lines}\n]}}\n'
 
 
 def _machine() -> str:
