@@ -72,6 +72,14 @@ def test_wheels_that_spin_turn_faster_for_a_while() -> None:
         assert found[T >= 15] == pytest.approx(way[T >= 15] + 5.0)
 
 
+def test_one_wheel_that_spins_has_the_other_count_as_ever() -> None:
+    left, right = mountings.left_spinning(5.0, 10.0, 0.5)(T, LEFT, RIGHT)
+    assert right == pytest.approx(RIGHT)
+    assert left[T <= 5] == pytest.approx(LEFT[T <= 5])
+    assert left[T == 8] == pytest.approx(LEFT[T == 8] + 1.5)
+    assert left[T >= 10] == pytest.approx(LEFT[T >= 10] + 2.5)
+
+
 def motions(mounting: Mounting, seed: int, robot: int) -> Array:
     """(k, 2) forward m and turned rad that a daemon reads off the wheels of a robot."""
     recording = world.simulate(replace(STRAIGHT, seconds=15.0), 5)

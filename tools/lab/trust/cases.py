@@ -168,6 +168,7 @@ def _mountings() -> list[Case]:
     half = m.left_standing(BREAKS_S)
     freezing, sticking = m.standing(BREAKS_S), m.standing(BREAKS_S, BREAKS_S + 5)
     spinning = m.spinning(BREAKS_S, BREAKS_S + 10, SPIN_MPS)
+    slipping = m.left_spinning(BREAKS_S, BREAKS_S + 5, SPIN_MPS)
     kinds = [
         ("reversed", "both wheels run backwards", MIRRORED, named, Mounting(m.both_reversed)),
         ("swapped", "left and right are swapped", MIRRORED, named, Mounting(m.swapped)),
@@ -183,6 +184,13 @@ def _mountings() -> list[Case]:
         ("left-frozen", "left counter freezes", ENCODERS, noticed, Mounting(half, (), BREAKS_S)),
         ("stuck", "counters stick for 5 s", ENCODERS, noticed, Mounting(sticking, (), BREAKS_S)),
         ("spinning", "wheels spin for 10 s", ENCODERS, noticed, Mounting(spinning, (), BREAKS_S)),
+        (
+            "left-spin",
+            "left wheel spins for 5 s",
+            ENCODERS,
+            noticed,
+            Mounting(slipping, (), BREAKS_S),
+        ),
     ]
     return [case for kind in kinds for case in _mounted(*kind)]
 

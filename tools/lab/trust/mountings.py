@@ -118,6 +118,11 @@ def uneven(times: float) -> Wiring:
     return lambda t, left, right: (times * left, right)
 
 
+def left_spinning(since: float, until: float, speed: float) -> Wiring:
+    """The left wheel has no hold: it counts more than the robot drives, by so much a second."""
+    return lambda t, left, right: (left + speed * (np.clip(t, since, until) - since), right)
+
+
 def spinning(since: float, until: float, speed: float) -> Wiring:
     """Both wheels turn faster than the robot drives, by so many m/s."""
 

@@ -41,6 +41,12 @@ SHARE = 0.7
 """... if those beside it show that, which are longer, by so much of a jump."""
 MOST_TRIED = 4
 """Stretches of each robot, the latest ones."""
+SLIDES = 2 * GRID_HZ
+"""Steps of the grid from one stretch to the next where odometry shows nothing: each lasts twice as
+long."""
+MOST_SLIDES, SLIDES_BEFORE = 10, 5
+"""So many of each robot, and how many of them before all was still as modelled: ranges show it once
+the robot has driven some metres."""
 
 
 def likely_stretches(problem: Problem) -> list[Freed]:
@@ -76,18 +82,49 @@ def _of_robot(problem: Problem, robot: int, mine: Index) -> list[Freed]:
     ]
     is_fast = speed > FASTER * _usual_speed(speed)
     spun = [(first, last, False) for first, last in _stretches(is_fast, until, APART_S)]
-    jumps = _jumps(speed, seconds)
-    # each began and ended somewhere in the links beside
-    spans = [
-        (slice(max(first - 1, 0), last + 2), is_still)
-        for first, last, is_still in sorted(stood + spun)[-MOST_TRIED:]
-    ]
-    return [
-        replace(
-            freed_links(problem, robot, mine[span], is_still), is_abrupt=bool(jumps[span].any())
-        )
-        for span, is_still in spans
-    ]
+    return _freed(problem, robot, mine, sorted(stood + spun)[-MOST_TRIED:])
+
+
+def any_stretches(problem: Problem) -> list[Freed]:
+    """All of the seconds in which something began not to fit, of all robots: where one wheel slips,
+    somebody pushes, or wheels count other ways from then on, odometry may look like that of any
+    drive."""
+    out = []
+    for robot in range(len(problem.priors.scale)):
+        mine = np.flatnonzero(problem.odometry.robot == robot)
+        mine = mine[np.argsort(problem.n[problem.odometry.j[mine]], kind="stable")]
+        # by the grid and not by how many links there are, so that they stay where they are
+        slide = problem.n[problem.odometry.i[mine]] // SLIDES
+        begins = np.unique(slide)
+        last = len(begins)
+        if problem.fitted is not None:
+            fitted = int(np.searchsorted(begins, problem.fitted[robot] // SLIDES))
+            last = min(last, fitted - SLIDES_BEFORE + MOST_SLIDES)
+        begins = begins[max(last - MOST_SLIDES, 0) : last]
+        firsts = np.searchsorted(slide, begins)
+        lasts = np.searchsorted(slide, begins + 2) - 1
+        spans = [(int(a), int(b), True) for a, b in zip(firsts, lasts, strict=True)]
+        out += _freed(problem, robot, mine, spans)
+    return out
+
+
+def _freed(
+    problem: Problem, robot: int, mine: Index, spans: list[tuple[int, int, bool]]
+) -> list[Freed]:
+    """
+    Args:
+        mine: (k,) its links in the order of time.
+        spans: first, last and whether its wheels stand; each began and ended somewhere in the links
+            beside.
+    """
+    seconds = _seconds(problem, mine)
+    speed = np.hypot(*problem.odometry.measured[mine, :2].T) / seconds
+    jumps, out = _jumps(speed, seconds), []
+    for first, last, stands in spans:
+        beside = slice(max(first - 1, 0), last + 2)
+        freed = freed_links(problem, robot, mine[beside], stands)
+        out.append(replace(freed, is_abrupt=bool(jumps[beside].any())))
+    return out
 
 
 def has_short_links(problem: Problem) -> bool:

@@ -16,9 +16,12 @@ from drslamd.slam.optimizer.banded.lapses.stretches import (
     FASTER,
     LEAST_MPS,
     MOST_RADPS,
+    MOST_SLIDES,
     MOST_TRIED,
     SHARE,
+    SLIDES_BEFORE,
     UNKNOWN_M,
+    any_stretches,
     has_short_links,
     likely_stretches,
     under,
@@ -48,6 +51,35 @@ def test_who_drives_as_ever_has_no_lapse() -> None:
 def test_wheels_that_stand_for_two_seconds_may_have_stood_a_little_sooner_and_longer() -> None:
     assert found(driven({10: 0.0})) == []
     assert found(driven({10: 0.0, 11: 0.0})) == [(9, 13, True)]
+
+
+def test_where_wheels_show_nothing_it_may_have_been_any_four_seconds_of_late() -> None:
+    """Keyframes, one a second, of robot 1; each stretch with a link more at both ends."""
+    spans = spans_of(1, a_team()[0])
+    assert spans[-2:] == [(39, 44), (41, 44)]
+    assert spans[:2] == [(23, 29), (25, 31)]
+    assert len(spans) == MOST_SLIDES
+    assert {f.robot for f in any_stretches(a_team()[0])} == {0, 1, 2}
+    assert all(f.stands for f in any_stretches(a_team()[0]))
+
+
+def test_it_was_about_when_all_was_still_as_modelled() -> None:
+    problem = a_team()[0]
+    fitted = problem.n[links_of(problem, 1, 20, 21) * 0 + ROBOTS * 20 + 1]
+    then = replace(problem, fitted=np.repeat(fitted, ROBOTS).astype(float))
+    spans = spans_of(1, then)
+    assert len(spans) == MOST_SLIDES
+    assert spans[SLIDES_BEFORE] == (19, 25)
+
+
+def spans_of(robot: int, problem: Problem) -> list[tuple[int, int]]:
+    """First and last keyframe of any stretch of a robot."""
+    ends = [
+        (problem.odometry.i[freed.links[0]], problem.odometry.j[freed.links[-1]])
+        for freed in any_stretches(problem)
+        if freed.robot == robot
+    ]
+    return [(int(a) // ROBOTS, int(b) // ROBOTS) for a, b in ends]
 
 
 @pytest.mark.parametrize(("way", "turn", "stands"), [(0.04, 0.09, 1), (0.06, 0.0, 0), (0, 0.11, 0)])
