@@ -287,7 +287,7 @@ def test_an_abrupt_stretch_that_is_freed_or_long_ago_is_not_asked_for(
     monkeypatch.setattr(lapse_search, "has_short_links", lambda _: True)
     problem = given_stretches(monkeypatch, False, True)
     assert is_asked_for(problem)
-    freed = lapse_search._possible(problem, lapse_search.likely_stretches(problem))[0]
+    (freed,) = likely_stretches(problem)
     assert not is_asked_for(replace(problem, freed=(freed,)))
     newest = np.array([problem.n[problem.robot_id == robot].max() for robot in IDS[:3]])
     assert not is_asked_for(replace(problem, fitted=newest))
