@@ -18,7 +18,7 @@ def _part_of(text: str) -> tuple[int, int]:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """After marks have selected what runs; every file is spread over all parts."""
+    """After marks have selected what runs; a file with many is spread over all parts."""
     part, parts = config.getoption("--share")
     others = [item for number, item in enumerate(items) if number % parts != part - 1]
     if others:

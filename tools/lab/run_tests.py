@@ -1,8 +1,8 @@
 """tools/test: lint, types, and the suite on every interpreter that is found.
 
-On the interpreter of .venv everything runs. The others share the quick tests among them, each
-taking every third of all that are collected, so of every file something runs on each: what depends
-on an interpreter is its syntax and its library, not a number, and types are checked for the oldest.
+On the interpreter of .venv everything runs. The others import every test and share the quick ones
+among them, of three each every third: what depends on an interpreter is its syntax and its library,
+not a number, and types are checked for the oldest.
 Exit code 0 only when everything passed.
 """
 

@@ -82,7 +82,8 @@ def main(arguments: list[str] | None = None) -> int:
     code = 0
     if options.json:
         code = keep(options.json, _stored(found, options.quick))
-        _unfinished(options.json).unlink(missing_ok=True)
+        if code == 0:
+            _unfinished(options.json).unlink(missing_ok=True)
     if options.picture:
         code = curves.draw(found, options.picture) or code
     worse = rows.regressions(found, stored)

@@ -28,6 +28,7 @@ from drslamd.slam.optimizer.banded.newton_descent import descend
 from drslamd.slam.optimizer.banded.normal_equations import Equations
 from drslamd.slam.optimizer.banded.point import Point
 from drslamd.slam.optimizer.problem import Freed, Problem
+from drslamd.slam.se2 import Index
 
 ROUND, ROUGH = 8, 1e-3
 """Steps, and m and rad, after which it is seen which are worth more."""
@@ -40,6 +41,8 @@ FEWEST = 3
 """Robots: of two that are off each other anything explains everything."""
 MANY_BEFORE = 2 * FEW_OUTLIERS
 """Of the ranges of any pair: a solution that was bent until later ones fit leaves fewer."""
+MOST_TRIED_PAIRS = 10
+"""That have met, five robots: of each ten stretches are tried where odometry shows nothing."""
 IN_A_ROW, LATELY = 3, 20
 """Ranges of a pair, one a second, that are outliers, and how many came since."""
 MOST_PAIRS = 45
@@ -108,7 +111,8 @@ def is_anywhere(problem: Problem, nominal: Point, is_as_modelled: bool) -> bool:
     Args:
         is_as_modelled: does odometry fit, and do ranges at the end?
     """
-    if len(problem.priors.scale) < FEWEST or problem.pairs > MOST_PAIRS:
+    robots = len(np.unique(problem.odometry.robot))
+    if robots < FEWEST or problem.pairs > MOST_TRIED_PAIRS:
         return False
     if not is_as_modelled:
         return True
@@ -161,8 +165,13 @@ def _possible(problem: Problem, stretches: list[Freed]) -> list[Freed]:
     return [
         freed
         for freed in stretches
-        if _is_recent(problem, freed) and not np.isin(freed.links[1:-1], taken).any()
+        if _is_recent(problem, freed) and not np.isin(_core(freed), taken).any()
     ]
+
+
+def _core(freed: Freed) -> Index:
+    """Its links without those beside it."""
+    return freed.links[1:-1] if len(freed.links) > 2 else freed.links
 
 
 def _is_recent(problem: Problem, freed: Freed) -> bool:

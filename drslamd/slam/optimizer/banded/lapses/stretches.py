@@ -47,6 +47,8 @@ long."""
 MOST_SLIDES, SLIDES_BEFORE = 10, 5
 """So many of each robot, and how many of them before all was still as modelled: ranges show it once
 the robot has driven some metres."""
+SOON_S = 30.0
+"""Since all was as modelled: what no stretch explains by then none will, and each takes a while."""
 
 
 def likely_stretches(problem: Problem) -> list[Freed]:
@@ -82,7 +84,12 @@ def _of_robot(problem: Problem, robot: int, mine: Index) -> list[Freed]:
     ]
     is_fast = speed > FASTER * _usual_speed(speed)
     spun = [(first, last, False) for first, last in _stretches(is_fast, until, APART_S)]
-    return _freed(problem, robot, mine, sorted(stood + spun)[-MOST_TRIED:])
+    jumps, out = _jumps(speed, seconds), []
+    for first, last, is_still in sorted(stood + spun)[-MOST_TRIED:]:
+        links = _with_those_beside(first, last)
+        freed = freed_links(problem, robot, mine[links], is_still)
+        out.append(replace(freed, is_abrupt=bool(jumps[links].any())))
+    return out
 
 
 def any_stretches(problem: Problem) -> list[Freed]:
@@ -96,35 +103,34 @@ def any_stretches(problem: Problem) -> list[Freed]:
         # by the grid and not by how many links there are, so that they stay where they are
         slide = problem.n[problem.odometry.i[mine]] // SLIDES
         begins = np.unique(slide)
-        last = len(begins)
-        if problem.fitted is not None:
-            fitted = int(np.searchsorted(begins, problem.fitted[robot] // SLIDES))
-            last = min(last, fitted - SLIDES_BEFORE + MOST_SLIDES)
-        begins = begins[max(last - MOST_SLIDES, 0) : last]
-        firsts = np.searchsorted(slide, begins)
-        lasts = np.searchsorted(slide, begins + 2) - 1
-        spans = [(int(a), int(b), True) for a, b in zip(firsts, lasts, strict=True)]
-        out += _freed(problem, robot, mine, spans)
+        begins = begins[_latest(begins, None if problem.fitted is None else problem.fitted[robot])]
+        firsts = np.searchsorted(slide, begins).tolist()
+        lasts = (np.searchsorted(slide, begins + 2) - 1).tolist()
+        out += [
+            freed_links(problem, robot, mine[_with_those_beside(first, last)], True)
+            for first, last in zip(firsts, lasts, strict=True)
+        ]
     return out
 
 
-def _freed(
-    problem: Problem, robot: int, mine: Index, spans: list[tuple[int, int, bool]]
-) -> list[Freed]:
-    """
+def _latest(begins: Index, fitted: float | None) -> slice:
+    """Which of the slides (k,) of a robot are looked at.
+
     Args:
-        mine: (k,) its links in the order of time.
-        spans: first, last and whether its wheels stand; each began and ended somewhere in the links
-            beside.
+        fitted: its keyframe until which all was as modelled, 0 where it never was; None where
+            nothing is known of that.
     """
-    seconds = _seconds(problem, mine)
-    speed = np.hypot(*problem.odometry.measured[mine, :2].T) / seconds
-    jumps, out = _jumps(speed, seconds), []
-    for first, last, stands in spans:
-        beside = slice(max(first - 1, 0), last + 2)
-        freed = freed_links(problem, robot, mine[beside], stands)
-        out.append(replace(freed, is_abrupt=bool(jumps[beside].any())))
-    return out
+    if fitted is None:
+        return slice(max(len(begins) - MOST_SLIDES, 0), None)
+    if not len(begins) or not fitted or begins[-1] * SLIDES > fitted + SOON_S * GRID_HZ:
+        return slice(0)
+    at = int(np.searchsorted(begins, fitted // SLIDES))
+    return slice(max(at - SLIDES_BEFORE, 0), at - SLIDES_BEFORE + MOST_SLIDES)
+
+
+def _with_those_beside(first: int, last: int) -> slice:
+    """What happened began and ended somewhere in the links beside."""
+    return slice(max(first - 1, 0), last + 2)
 
 
 def has_short_links(problem: Problem) -> bool:

@@ -132,9 +132,9 @@ def test_of_two_robots_alone_and_of_large_teams_it_is_not_asked(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert not is_anywhere(*with_outliers([0, 1, 2], robots=2), is_as_modelled=False)
-    monkeypatch.setattr(lapse_search, "MOST_PAIRS", 3)
+    monkeypatch.setattr(lapse_search, "MOST_TRIED_PAIRS", 3)
     assert is_anywhere(*with_outliers([]), is_as_modelled=False)
-    monkeypatch.setattr(lapse_search, "MOST_PAIRS", 2)
+    monkeypatch.setattr(lapse_search, "MOST_TRIED_PAIRS", 2)
     assert not is_anywhere(*with_outliers([0, 1, 2]), is_as_modelled=False)
 
 

@@ -63,13 +63,30 @@ def test_where_wheels_show_nothing_it_may_have_been_any_four_seconds_of_late() -
     assert all(f.stands for f in any_stretches(a_team()[0]))
 
 
-def test_it_was_about_when_all_was_still_as_modelled() -> None:
+@pytest.mark.parametrize(("second", "is_asked"), [(20, True), (15, True), (11, False), (0, False)])
+def test_it_was_about_when_all_was_still_as_modelled_if_that_was_half_a_minute_ago(
+    second: int, is_asked: bool
+) -> None:
+    """Of 44 seconds."""
     problem = a_team()[0]
-    fitted = problem.n[links_of(problem, 1, 20, 21) * 0 + ROBOTS * 20 + 1]
-    then = replace(problem, fitted=np.repeat(fitted, ROBOTS).astype(float))
-    spans = spans_of(1, then)
-    assert len(spans) == MOST_SLIDES
-    assert spans[SLIDES_BEFORE] == (19, 25)
+    fitted = problem.n[ROBOTS * second : ROBOTS * (second + 1)].astype(float)
+    spans = spans_of(1, replace(problem, fitted=fitted))
+    assert len(spans) == (MOST_SLIDES if is_asked else 0)
+    if is_asked:
+        first, last = spans[SLIDES_BEFORE]
+        assert abs(first + 1 - second) <= 1
+        assert last == first + 6
+
+
+def test_who_never_was_as_modelled_has_none() -> None:
+    problem = a_team()[0]
+    fitted = np.array([0.0, 1.0, 0.0]) * problem.n[ROBOTS * 30 + 1]
+    asked = any_stretches(replace(problem, fitted=fitted))
+    assert {freed.robot for freed in asked} == {1}
+
+
+def test_wheels_that_change_their_speed_at_once_say_nothing_for_what_they_do_not_show() -> None:
+    assert not any(freed.is_abrupt for freed in any_stretches(driven({20: 0.0, 21: 0.0})))
 
 
 def spans_of(robot: int, problem: Problem) -> list[tuple[int, int]]:
