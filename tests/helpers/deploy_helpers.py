@@ -184,7 +184,7 @@ def refused(config: Path, **extra: str) -> tuple[int, str, float]:
         capture_output=True,
         text=True,
         env=environment(**extra),
-        timeout=10,
+        timeout=60,
         check=False,
     )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -45,18 +45,3 @@ def driven(ways: dict[int, float], turn: float = 0.0) -> Problem:
     for second, way in ways.items():
         measured[links_of(problem, 1, second, second + 1)] = [way, 0.0, turn]
     return replace(problem, odometry=replace(odometry, measured=measured))
-
-
-def until(problem: Problem, second: int) -> Problem:
-    """What was known of a team by then."""
-    count = len(problem.priors.scale) * second
-    odometry, closures, ranges = problem.odometry, problem.closures, problem.ranges
-    return replace(
-        problem,
-        robot_id=problem.robot_id[:count],
-        n=problem.n[:count],
-        initial=problem.initial[:count],
-        odometry=odometry.chosen((odometry.i < count) & (odometry.j < count)),
-        closures=closures.chosen((closures.i < count) & (closures.j < count)),
-        ranges=ranges.chosen((ranges.i < count) & (ranges.j < count)),
-    )

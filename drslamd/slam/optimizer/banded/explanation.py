@@ -113,7 +113,7 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
     if common is not None and not check.scores.ask():
         return _commonly(equations, common)
     if common is None and (not fits or lapse_search.is_asked_for(equations.problem)):
-        lapse = _by_lapse(equations, nominal, check, most, tolerance)
+        lapse = _by_lapse(equations, nominal, most, tolerance)
         if lapse is not None:
             return lapse
     if fits:
@@ -149,18 +149,14 @@ def explain(equations: Equations, nominal: Point, most: int, tolerance: float) -
 
 
 def _by_lapse(
-    equations: Equations, nominal: Point, check: _Check, most: int, tolerance: float
+    equations: Equations, nominal: Point, most: int, tolerance: float
 ) -> Explanation | None:
-    """Wheels stood or spun, if that explains all: where odometry shows it, or else anywhere."""
-    is_anywhere = lapse_search.is_anywhere(equations.problem, nominal, check.is_passed())
-    for anywhere in (False, True) if is_anywhere else (False,):
-        found = lapse_search.best(equations, nominal, anywhere, most, tolerance)
-        if found is not None and _fits(found.equations, found.point):
-            again = _checked(found.equations, found.point)
-            # what a mounting makes of each second is no lapse of some
-            if again.is_passed() and not (anywhere and again.scores.ask()):
-                return _as_is(found.equations, found.point, again.ratio)
-    return None
+    """Wheels stood or spun, if that explains all."""
+    found = lapse_search.best(equations, nominal, most, tolerance)
+    if found is None or not _fits(found.equations, found.point):
+        return None
+    check = _checked(found.equations, found.point)
+    return _as_is(found.equations, found.point, check.ratio) if check.is_passed() else None
 
 
 @dataclass(frozen=True)

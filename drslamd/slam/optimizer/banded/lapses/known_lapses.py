@@ -31,8 +31,7 @@ REGARDED_S = 60.0
 
 
 def freed_again(problem: Problem, robots: list[int], lapses: Iterable[Lapse]) -> Problem:
-    """With lapses freed that were found before, as far as they are by now; of those that wheels do
-    not show only the ones of which all is known.
+    """With lapses freed that were found before, as far as they are by now.
 
     Args:
         robots: as the problem numbers them.
@@ -52,8 +51,6 @@ def freed_again(problem: Problem, robots: list[int], lapses: Iterable[Lapse]) ->
         if not len(links):
             continue
         same = [f for f in found if f.stands == lapse.stood and np.isin(links, f.links).all()]
-        if not same and last[odometry.robot == robot].max() < lapse.last + SETTLES_S * GRID_HZ:
-            continue  # which seconds it was is seen better with every range: it is asked anew
         freed = same[0] if same else freed_links(problem, robot, links, lapse.stood)
         problem = with_freed(problem, replace(freed, is_settled=lapse.is_settled))
     return problem

@@ -41,14 +41,6 @@ SHARE = 0.7
 """... if those beside it show that, which are longer, by so much of a jump."""
 MOST_TRIED = 4
 """Stretches of each robot, the latest ones."""
-SLIDES = 2 * GRID_HZ
-"""Steps of the grid from one stretch to the next where odometry shows nothing: each lasts twice as
-long."""
-MOST_SLIDES, SLIDES_BEFORE = 10, 5
-"""So many of each robot, and how many of them before all was still as modelled: ranges show it once
-the robot has driven some metres."""
-SOON_S = 30.0
-"""Since all was as modelled: what no stretch explains by then none will, and each takes a while."""
 
 
 def likely_stretches(problem: Problem) -> list[Freed]:
@@ -84,53 +76,18 @@ def _of_robot(problem: Problem, robot: int, mine: Index) -> list[Freed]:
     ]
     is_fast = speed > FASTER * _usual_speed(speed)
     spun = [(first, last, False) for first, last in _stretches(is_fast, until, APART_S)]
-    jumps, out = _jumps(speed, seconds), []
-    for first, last, is_still in sorted(stood + spun)[-MOST_TRIED:]:
-        links = _with_those_beside(first, last)
-        freed = freed_links(problem, robot, mine[links], is_still)
-        out.append(replace(freed, is_abrupt=bool(jumps[links].any())))
-    return out
-
-
-def any_stretches(problem: Problem) -> list[Freed]:
-    """All of the seconds in which something began not to fit, of all robots: where one wheel slips,
-    somebody pushes, or wheels count other ways from then on, odometry may look like that of any
-    drive."""
-    out = []
-    for robot in range(len(problem.priors.scale)):
-        mine = np.flatnonzero(problem.odometry.robot == robot)
-        mine = mine[np.argsort(problem.n[problem.odometry.j[mine]], kind="stable")]
-        # by the grid and not by how many links there are, so that they stay where they are
-        slide = problem.n[problem.odometry.i[mine]] // SLIDES
-        begins = np.unique(slide)
-        begins = begins[_latest(begins, None if problem.fitted is None else problem.fitted[robot])]
-        firsts = np.searchsorted(slide, begins).tolist()
-        lasts = (np.searchsorted(slide, begins + 2) - 1).tolist()
-        out += [
-            freed_links(problem, robot, mine[_with_those_beside(first, last)], True)
-            for first, last in zip(firsts, lasts, strict=True)
-        ]
-    return out
-
-
-def _latest(begins: Index, fitted: float | None) -> slice:
-    """Which of the slides (k,) of a robot are looked at.
-
-    Args:
-        fitted: its keyframe until which all was as modelled, 0 where it never was; None where
-            nothing is known of that.
-    """
-    if fitted is None:
-        return slice(max(len(begins) - MOST_SLIDES, 0), None)
-    if not len(begins) or not fitted or begins[-1] * SLIDES > fitted + SOON_S * GRID_HZ:
-        return slice(0)
-    at = int(np.searchsorted(begins, fitted // SLIDES))
-    return slice(max(at - SLIDES_BEFORE, 0), at - SLIDES_BEFORE + MOST_SLIDES)
-
-
-def _with_those_beside(first: int, last: int) -> slice:
-    """What happened began and ended somewhere in the links beside."""
-    return slice(max(first - 1, 0), last + 2)
+    jumps = _jumps(speed, seconds)
+    # each began and ended somewhere in the links beside
+    spans = [
+        (slice(max(first - 1, 0), last + 2), is_still)
+        for first, last, is_still in sorted(stood + spun)[-MOST_TRIED:]
+    ]
+    return [
+        replace(
+            freed_links(problem, robot, mine[span], is_still), is_abrupt=bool(jumps[span].any())
+        )
+        for span, is_still in spans
+    ]
 
 
 def has_short_links(problem: Problem) -> bool:

@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lapse_scenes import a_team, driven, nominal, until
-from slam_problems import CLOCKS, links_of, mismeasured
+from lapse_scenes import a_team, driven, nominal
+from slam_problems import CLOCKS
 
 from drslamd.slam.graph.estimate import Lapse
-from drslamd.slam.optimizer.banded.banded_solver import solve
 from drslamd.slam.optimizer.banded.lapses import known_lapses
 from drslamd.slam.optimizer.banded.lapses.known_lapses import (
     GAIN,
@@ -55,33 +54,6 @@ def test_a_lapse_that_no_longer_shows_in_the_links_stays_where_it_was() -> None:
     (again,) = freed_again(driven({}), [4, 6, 9], [name]).freed
     assert again.links.tolist() == freed.links.tolist()
     assert again.added == pytest.approx(freed.added)
-
-
-@pytest.mark.parametrize(("end", "is_freed"), [(34, True), (36, False)])
-def test_what_wheels_never_showed_is_asked_anew_until_ten_seconds_later(
-    end: int, is_freed: bool
-) -> None:
-    """The last of all keyframes is 44."""
-    problem = driven({})
-    name = Lapse(6, CLOCKS[1] + 10 * (end - 6), CLOCKS[1] + 10 * end, True)
-    assert bool(freed_again(problem, [4, 6, 9], [name]).freed) is is_freed
-
-
-def test_who_asked_before_and_who_asks_for_the_first_time_find_the_same_seconds() -> None:
-    """Robot 1 turned in seconds 24 to 30 while its wheels counted as ever."""
-    team, _ = a_team(7)
-    links = links_of(team, 1, 24, 30)
-    team = mismeasured(team, links, team.odometry.measured[links] + [0.0, 0.0, 0.4])
-    team = replace(team, fitted=team.n[3 * 24 : 3 * 25].astype(float))
-    early, late = until(team, 29), until(team, 36)
-    before = solve(early)
-    known = [lapse_of(early, [4, 6, 9], freed) for freed in before.freed]
-    assert known
-    found = [
-        [lapse_of(late, [4, 6, 9], freed) for freed in solve(problem).freed]
-        for problem in (late, freed_again(late, [4, 6, 9], known))
-    ]
-    assert found[0] == found[1] != known
 
 
 def test_of_who_is_not_there_or_did_not_drive_then_nothing_is_freed() -> None:

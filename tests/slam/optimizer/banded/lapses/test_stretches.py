@@ -16,12 +16,9 @@ from drslamd.slam.optimizer.banded.lapses.stretches import (
     FASTER,
     LEAST_MPS,
     MOST_RADPS,
-    MOST_SLIDES,
     MOST_TRIED,
     SHARE,
-    SLIDES_BEFORE,
     UNKNOWN_M,
-    any_stretches,
     has_short_links,
     likely_stretches,
     under,
@@ -51,52 +48,6 @@ def test_who_drives_as_ever_has_no_lapse() -> None:
 def test_wheels_that_stand_for_two_seconds_may_have_stood_a_little_sooner_and_longer() -> None:
     assert found(driven({10: 0.0})) == []
     assert found(driven({10: 0.0, 11: 0.0})) == [(9, 13, True)]
-
-
-def test_where_wheels_show_nothing_it_may_have_been_any_four_seconds_of_late() -> None:
-    """Keyframes, one a second, of robot 1; each stretch with a link more at both ends."""
-    spans = spans_of(1, a_team()[0])
-    assert spans[-2:] == [(39, 44), (41, 44)]
-    assert spans[:2] == [(23, 29), (25, 31)]
-    assert len(spans) == MOST_SLIDES
-    assert {f.robot for f in any_stretches(a_team()[0])} == {0, 1, 2}
-    assert all(f.stands for f in any_stretches(a_team()[0]))
-
-
-@pytest.mark.parametrize(("second", "is_asked"), [(20, True), (15, True), (11, False), (0, False)])
-def test_it_was_about_when_all_was_still_as_modelled_if_that_was_half_a_minute_ago(
-    second: int, is_asked: bool
-) -> None:
-    """Of 44 seconds."""
-    problem = a_team()[0]
-    fitted = problem.n[ROBOTS * second : ROBOTS * (second + 1)].astype(float)
-    spans = spans_of(1, replace(problem, fitted=fitted))
-    assert len(spans) == (MOST_SLIDES if is_asked else 0)
-    if is_asked:
-        first, last = spans[SLIDES_BEFORE]
-        assert abs(first + 1 - second) <= 1
-        assert last == first + 6
-
-
-def test_who_never_was_as_modelled_has_none() -> None:
-    problem = a_team()[0]
-    fitted = np.array([0.0, 1.0, 0.0]) * problem.n[ROBOTS * 30 + 1]
-    asked = any_stretches(replace(problem, fitted=fitted))
-    assert {freed.robot for freed in asked} == {1}
-
-
-def test_wheels_that_change_their_speed_at_once_say_nothing_for_what_they_do_not_show() -> None:
-    assert not any(freed.is_abrupt for freed in any_stretches(driven({20: 0.0, 21: 0.0})))
-
-
-def spans_of(robot: int, problem: Problem) -> list[tuple[int, int]]:
-    """First and last keyframe of any stretch of a robot."""
-    ends = [
-        (problem.odometry.i[freed.links[0]], problem.odometry.j[freed.links[-1]])
-        for freed in any_stretches(problem)
-        if freed.robot == robot
-    ]
-    return [(int(a) // ROBOTS, int(b) // ROBOTS) for a, b in ends]
 
 
 @pytest.mark.parametrize(("way", "turn", "stands"), [(0.04, 0.09, 1), (0.06, 0.0, 0), (0, 0.11, 0)])
