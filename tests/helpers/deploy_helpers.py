@@ -82,7 +82,11 @@ def command(*arguments: str, fault: str = "") -> list[str]:
 
 
 def environment(**extra: str) -> dict[str, str]:
-    foreign = ("NOTIFY_SOCKET", "WATCHDOG_USEC", "STATE_DIRECTORY", "RUNTIME_DIRECTORY")
+    """Of a process that starts as on a robot: no manager's, and with its bytecode kept."""
+    foreign = (
+        *("NOTIFY_SOCKET", "WATCHDOG_USEC", "STATE_DIRECTORY", "RUNTIME_DIRECTORY"),
+        "PYTHONDONTWRITEBYTECODE",
+    )
     kept = {name: value for name, value in os.environ.items() if name not in foreign}
     return {**kept, "PYTHONPATH": str(REPOSITORY), **extra}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -81,6 +82,30 @@ def test_the_other_interpreters_share_the_quick_tests(monkeypatch: pytest.Monkey
     assert asked == [(first, f"python{first}", "1/2"), (last, f"python{last}", "2/2")]
 
 
+@pytest.mark.parametrize(("there", "is_made"), [("python", True), ("pip", False)])
+def test_another_interpreter_runs_its_share_in_an_environment_that_was_made_to_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, there: str, is_made: bool
+) -> None:
+    """pip is the last thing that one gets."""
+    programs = tmp_path / ".venvs" / "3.12" / "bin"
+    programs.mkdir(parents=True)
+    (programs / there).touch()
+    ran: list[list[str]] = []
+
+    def run(command: list[str], **_: object) -> subprocess.CompletedProcess[str]:
+        ran.append(command)
+        return subprocess.CompletedProcess(command, 0, "", "")
+
+    monkeypatch.setattr(run_tests, "ROOT", tmp_path)
+    monkeypatch.setattr(subprocess, "run", run)
+    assert run_tests._quick_tests_on("3.12", "python3.12", "2/3") == 0
+    made = ["python3.12", "-m", "venv", "--clear", str(programs.parent)]
+    assert (ran[0] == made) is is_made
+    assert f"{tmp_path}[test]" in ran[-2]
+    at = ran[-1].index("--share")
+    assert ran[-1][at + 1] == "2/3"
+
+
 def test_arguments_go_to_pytest_alone(steps: Steps) -> None:
     assert run_tests.main(["--", "-k", "clock"]) == 0
     assert steps.commands == {"tests": (sys.executable, "-m", "pytest", "-k", "clock")}
@@ -101,6 +126,15 @@ def test_what_runs_beside_the_tests_is_told_at_its_end_and_only_if_it_failed(
     assert run_tests._run("types", sys.executable, "-c", says.format(1), shown=False) == 1
     told = capfd.readouterr().out
     assert told.index("== types\na wrong type") < told.index("== types: FAILED")
+
+
+def test_what_tests_start_finds_its_bytecode_whatever_the_caller_says(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    says = "import sys; print('kept' if not sys.dont_write_bytecode else 'lost')"
+    assert run_tests._run("bytecode", sys.executable, "-c", says) == 0
+    assert "kept" in capfd.readouterr().out
 
 
 def test_an_interpreter_is_found_when_it_says_its_version(

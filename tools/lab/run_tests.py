@@ -2,8 +2,7 @@
 
 On the interpreter of .venv everything runs. The others import every test and share the quick ones
 among them, of three each every third: what depends on an interpreter is its syntax and its library,
-not a number, and types are checked for the oldest.
-Exit code 0 only when everything passed.
+not a number, and types are checked for the oldest. Exit code 0 only when everything passed.
 """
 
 from __future__ import annotations
@@ -87,11 +86,21 @@ def _run(name: str, *command: str, shown: bool = True) -> int:
     began = time.monotonic()
     if shown:
         print(f"== {name}", flush=True)
-    done = subprocess.run(command, cwd=ROOT, check=False, text=True, capture_output=not shown)
+    done = subprocess.run(
+        command, cwd=ROOT, env=_as_users(), check=False, text=True, capture_output=not shown
+    )
     if not shown and done.returncode:
         print(f"\n== {name}\n{done.stdout}{done.stderr}")
     _ended(name, done.returncode, began)
     return done.returncode
+
+
+def _as_users() -> dict[str, str]:
+    """The environment in which bytecode is kept, whatever that of the caller says: without it each
+    daemon that a test starts compiles all modules anew, which takes it longer than all the rest."""
+    kept = os.environ.copy()
+    kept.pop("PYTHONDONTWRITEBYTECODE", None)
+    return kept
 
 
 def _ended(name: str, code: int, began: float) -> None:
@@ -122,11 +131,14 @@ def _quick_tests_on(version: str, python: str, share: str) -> int:
     install = [inside, "-m", "pip", "install", "--quiet", "--no-compile", "--editable"]
     quick = [inside, "-m", "pytest", "-q", "-n", "auto", "-m", "not slow", "--share", share]
     steps = [[*install, f"{ROOT}[test]"], [*quick, "-p", "no:cacheprovider"]]
-    if not Path(inside).exists():
-        steps.insert(0, [python, "-m", "venv", str(folder)])
+    # pip comes last: an environment without it was begun and not ended
+    if not (folder / "bin" / "pip").exists():
+        steps.insert(0, [python, "-m", "venv", "--clear", str(folder)])
     code = 0
     for step in steps:
-        done = subprocess.run(step, cwd=ROOT, check=False, text=True, capture_output=True)
+        done = subprocess.run(
+            step, cwd=ROOT, env=_as_users(), check=False, text=True, capture_output=True
+        )
         code = done.returncode
         if code:
             break

@@ -10,6 +10,7 @@ import pytest
 from lab.benchmark import __main__ as command
 from lab.benchmark import graphs, timing
 from lab.benchmark.rows import Peer, Row
+from lab.files import CANNOT_WRITE, keep
 
 
 def row(value: float, peer: float = 10.0, unit: str = "ms", work: str = "some") -> Row:
@@ -70,6 +71,19 @@ def test_rows_that_were_measured_outlive_a_run_that_is_ended(
     monkeypatch.setattr(command, "PARTS", {"1": part})
     assert command.main(asked) == 0
     assert not unfinished.exists()
+
+
+def test_rows_stay_where_the_result_cannot_be_written(
+    part: Fake, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    stored = tmp_path / "now.json"
+
+    def full(path: Path, content: str) -> int:
+        return CANNOT_WRITE if path == stored else keep(path, content)
+
+    monkeypatch.setattr(command, "keep", full)
+    assert command.main(["--quick", "--json", str(stored)]) == CANNOT_WRITE
+    assert (tmp_path / "now-unfinished.json").exists()
 
 
 @pytest.mark.parametrize("content", [None, "", "{}", '{"rows": [{"module": 1}]}'])
